@@ -1,4 +1,4 @@
-//! Bags as streams: one interface over every format, told apart by their first bytes.
+//! Bags as streams: one interface over every format, distinguished by their first bytes.
 //!
 //! A reader owns a file and feeds a [`Sink`]; it knows nothing of evidence, windows or graphs. Adding a format is
 //! one file below `bag/` and one row in `FORMATS`.
@@ -8,6 +8,7 @@ mod checksum;
 mod chunked;
 pub(crate) mod decompress;
 mod deferred;
+mod folder;
 mod input;
 mod mcap;
 mod model;
@@ -19,22 +20,24 @@ mod rosbag2;
 pub(crate) mod source;
 #[cfg(feature = "sqlite")]
 mod sqlite3;
+pub(crate) mod straight;
 mod unknown;
 mod zstd;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 
 pub(crate) use deferred::open_each;
+pub(crate) use folder::recordings;
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
-use input::{head, place};
-pub(crate) use model::ETAG;
+use input::{closed, head, place};
 pub use model::{
     Connection, ConnectionId, Encoding, Lumps, Message, OpenOptions, Reader, Report, Sink, Tier,
     Want,
 };
+pub(crate) use model::{ETAG, Growing, Growth};
 pub(crate) use object::{list, version};
 use unknown::explain;
 
@@ -48,7 +51,7 @@ pub const FORMATS: &[FormatRow] = &[
     zstd::FORMAT,
 ];
 
-/// The kind of an input, told by its first bytes.
+/// The kind of an input, recognized by its first bytes.
 #[derive(Clone, Copy)]
 pub enum InputKind {
     /// A bag of this format. Standard input and URLs are not read for this and count as ROS 1 bags here.
@@ -60,7 +63,7 @@ pub enum InputKind {
 /// Tells the kind of `input` by its first bytes. Standard input is left untouched.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if
+/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if
 /// it is of no known format.
 pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
@@ -78,10 +81,10 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
     }
 }
 
-/// Opens a bag of any format, told by its first bytes. Objects need the feature `remote`.
+/// Opens a bag of any format, recognized by its first bytes. Objects need the feature `remote`.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::Remote`](crate::Error::Remote) if a store does not give it, [`Error::UnknownBag`](crate::Error::UnknownBag), [`Error::Unsupported`](crate::Error::Unsupported) or [`Error::Malformed`](crate::Error::Malformed) with a
+/// [`Error::Io`] if it cannot be read, [`Error::Remote`] if a store does not give it, [`Error::UnknownBag`], [`Error::Unsupported`] or [`Error::Malformed`] with a
 /// hint if nothing in it can be.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     if let Input::Url(url) = input {
@@ -98,4 +101,57 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     let folder = matches!(place, BagPlace::Folder(_));
     Err(explain(&path, &head, folder))
+}
+
+/// Follows a recording that is still being written, told by its first bytes; of a folder that is not a recording the newest
+/// in it.
+///
+/// # Errors
+/// As [`open`], and [`Error::Unsupported`] for what does not grow: pipes, objects, and what is
+/// compressed as a whole.
+pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
+    let within = match input {
+        Input::Path(path) if path.is_dir() && !folder::has_storage(path) => {
+            let newest = newest(path).ok_or_else(|| explain(path, &[], true))?;
+            Some(newest)
+        }
+        Input::Path(path) => closed(path).map(Input::Path),
+        _ => None,
+    };
+    let input = within.as_ref().unwrap_or(input);
+    match input {
+        Input::Path(path) if !input.is_pipe() => match sniff(input)? {
+            InputKind::Bag(FormatRow {
+                follow: Some(follow),
+                ..
+            }) => follow(path),
+            _ => Err(fixed(input)),
+        },
+        _ => Err(fixed(input)),
+    }
+}
+
+/// The recording in a folder that was written to last.
+fn newest(folder: &Path) -> Option<Input> {
+    let entries = folder.read_dir().ok()?.flatten();
+    let bags = entries
+        .map(|entry| Input::Path(entry.path()))
+        .filter(|input| match input {
+            Input::Path(path) if path.is_dir() => folder::has_storage(path),
+            _ => matches!(sniff(input), Ok(InputKind::Bag(row)) if row.follow.is_some()),
+        });
+    let written = |input: &Input| match input {
+        Input::Path(path) => path.metadata().and_then(|meta| meta.modified()).ok(),
+        _ => None,
+    };
+    bags.max_by_key(written)
+}
+
+fn fixed(input: &Input) -> Error {
+    Error::Unsupported {
+        path: input.name().into(),
+        what: "it cannot be followed while it grows".to_owned(),
+        hint: "name a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder"
+            .to_owned(),
+    }
 }

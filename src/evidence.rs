@@ -11,9 +11,9 @@ pub mod collector;
 pub mod conclude;
 mod kinds;
 pub(crate) mod message;
+pub(crate) mod numbers;
 pub(crate) mod proof;
 pub(crate) mod publishers;
-pub(crate) mod restarts;
 pub(crate) mod source;
 pub(crate) mod spread;
 #[cfg(feature = "source")]
@@ -30,11 +30,11 @@ pub(crate) use source::Source;
 
 use message::{definition, parameters};
 use source::{
-    NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery,
-    dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, metrics, only_publisher,
-    parameter_events, payload, private_name, qos, qos_overrides, recorder, rosgraph, rosout,
-    rosout_ros2, rosout_rule, service_event, sim_time, sister, statistics, tf_pair,
-    topic_statistics,
+    NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery, duplicate,
+    dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, messages_lost, metrics,
+    only_publisher, parameter_events, payload, private_name, qos, qos_overrides, recorder,
+    rosgraph, rosout, rosout_ros2, rosout_rule, service_event, sim_time, sister, statistics,
+    tf_pair, topic_statistics,
 };
 
 /// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
@@ -59,11 +59,14 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "rosgraph",
-        about: "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`)",
+        about: "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`), and single nodes of nodl (`rosgraph_msgs/msg/Node`)",
         reads: &[
             (rosgraph::SHAPE, rosgraph::read),
             (rosgraph::OLD_SHAPE, rosgraph::read),
+            (rosgraph::NODE_SHAPE, rosgraph::read_node),
         ],
+        holds: true,
+        conclude: &[rosgraph::conclude],
         ..NOTHING
     },
     Source {
@@ -106,7 +109,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "sim_time",
-        about: "`use_sim_time` in parameter events: such a node subscribes `/clock`",
+        about: "`use_sim_time` in parameter events: such a node subscribes to `/clock`",
         reads: &[(parameters::SHAPE, sim_time::read)],
         own: true,
         ..NOTHING
@@ -122,7 +125,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "diagnostics",
-        about: "statuses are named after their nodes; what publishes `/diagnostics_agg` subscribes `/diagnostics`",
+        about: "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`",
         reads: &[
             (diagnostics::SHAPE, diagnostics::read),
             (diagnostics::SHAPE2, diagnostics::read),
@@ -144,13 +147,31 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "log_text",
-        about: "log texts in which a node names a topic as its own",
+        about: "log messages in which a node names one of its topics",
         reads: &[
             (definition::LOG, log_text::read),
             (definition::OLD_LOG, log_text::read),
             (definition::LOG2, log_text::read),
         ],
         conclude: &[log_text::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "duplicate",
+        about: "log texts about two nodes of one name",
+        reads: &[
+            (definition::LOG, duplicate::read),
+            (definition::OLD_LOG, duplicate::read),
+            (definition::LOG2, duplicate::read),
+        ],
+        conclude: &[duplicate::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "messages_lost",
+        about: "`/events/rosbag2_messages_lost`: messages that the recorder lost (`rosbag2_interfaces/msg/MessagesLostEvent`)",
+        reads: &[(messages_lost::SHAPE, messages_lost::read)],
+        conclude: &[messages_lost::conclude],
         ..NOTHING
     },
     Source {
@@ -169,26 +190,26 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "private_name",
-        about: "a topic below the full name of a node, which nobody else is known to publish",
+        about: "a topic in a node's private namespace with no other publisher",
         conclude: &[private_name::conclude],
         ..NOTHING
     },
     Source {
         word: "action",
-        about: "an action's server publishes status, feedback and result and subscribes goal and cancel; its client does the reverse",
+        about: "an action's server publishes status, feedback and result and subscribes to goal and cancel; its client does the reverse",
         reads: &[(action::SHAPE, action::read)],
         conclude: &[action::conclude],
         ..NOTHING
     },
     Source {
         word: "bond",
-        about: "both ends of a bond (`bond/Status`) publish its topic and subscribe it",
+        about: "both ends of a bond (`bond/Status`) publish and subscribe to its topic",
         conclude: &[bond::conclude],
         ..NOTHING
     },
     Source {
         word: "echo",
-        about: "log texts that repeat a recorded message",
+        about: "log messages that quote a recorded message",
         reads: &[
             (definition::LOG, echo::read),
             (definition::OLD_LOG, echo::read),
@@ -210,7 +231,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "only_publisher",
-        about: "messages that name no publisher, of topics that one node is known to publish",
+        about: "messages without a publisher, of topics with one known publisher",
         conclude: &[only_publisher::conclude],
         ..NOTHING
     },
@@ -228,13 +249,13 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "tf_pair",
-        about: "a listener of `/tf` is one of `/tf_static` too, and the other way round",
+        about: "a listener of `/tf` also listens to `/tf_static`, and vice versa",
         conclude: &[tf_pair::conclude],
         ..NOTHING
     },
     Source {
         word: "sister",
-        about: "a node whose twin in another namespace publishes the same and subscribes more",
+        about: "a node whose twin in another namespace publishes the same and subscribes to more",
         conclude: &[sister::conclude],
         ..NOTHING
     },
@@ -246,7 +267,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "recorder",
-        about: "the recorder subscribes everything recorded; its log records name its source file",
+        about: "the recorder subscribes to everything it records; its log records name its source file",
         reads: &[
             (definition::LOG, recorder::read),
             (definition::OLD_LOG, recorder::read),
@@ -263,32 +284,32 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "topology",
-        about: "a file of the user's that states nodes and edges (CSV, YAML, DOT)",
+        about: "your file of nodes and edges (CSV, YAML, DOT)",
         ..NOTHING
     },
     Source {
         word: "launch",
-        about: "a launch file of the user's, which declares nodes; in Python, it is read and never run",
+        about: "your launch file, which declares nodes; Python is parsed and never executed",
         ..NOTHING
     },
     Source {
         word: "source",
-        about: "source code of the user's: what a node that the bag names declares (with `--source`)",
+        about: "your source code: what it declares for nodes in the bag (with `--source`)",
         ..NOTHING
     },
     Source {
         word: "source_only",
-        about: "source code of the user's: the only place that can be meant (with `--infer source`)",
+        about: "your source code: the only matching place for a node (with `--infer source`)",
         ..NOTHING
     },
     Source {
         word: "unknown",
-        about: "publishers that a ROS 2 recording counts and nothing names",
+        about: "publishers that a ROS 2 recording counts but does not name",
         ..NOTHING
     },
     Source {
         word: "owned_type",
-        about: "a publisher that nothing names, of a type that one well-known program publishes",
+        about: "an unnamed publisher of a type that only one well-known program publishes",
         ..NOTHING
     },
 ];

@@ -12,6 +12,7 @@ mod gif;
 mod graphml;
 pub(crate) mod html;
 mod json;
+mod mcap;
 pub(crate) mod mermaid;
 pub mod options;
 pub(crate) mod palette;
@@ -55,39 +56,39 @@ pub const FORMATS: &[OutputFormat] = &[
     },
     OutputFormat {
         word: "apng",
-        what: "the animation, lossless for all but antialiasing",
+        what: "animation with full colour",
         start: apng::start,
         ..ANIMATION
     },
     OutputFormat {
         word: "svg",
-        what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
+        what: "a drawing per window with `{n}`, otherwise an animation",
         start: start_svg,
         whole: OneDrawing::Asked,
         ..PICTURE
     },
     OutputFormat {
         word: "png",
-        what: "an image per window with `{n}`, the only window, or a film strip",
+        what: "an image per window with `{n}`, otherwise a film strip",
         start: png::start_png,
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
-        what: "an image per window with `{n}`, the only window, or a film strip",
+        what: "an image per window with `{n}`, otherwise a film strip",
         start: png::start_webp,
         ..IMAGE
     },
     OutputFormat {
         word: "dot",
-        what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
+        what: "a graph that `rqt_graph` loads",
         start: dot::start,
         is_viewed: true,
         ..DATA
     },
     OutputFormat {
         word: "mmd",
-        what: "a Mermaid flow chart, per window with `{n}`, else the union",
+        what: "a Mermaid flow chart",
         start: mermaid::encoder::start,
         is_viewed: true,
         ..DATA
@@ -95,14 +96,14 @@ pub const FORMATS: &[OutputFormat] = &[
     #[cfg(feature = "pdf")]
     OutputFormat {
         word: "pdf",
-        what: "a page per window as vectors, or the `--strip`",
+        what: "vectors, one page per window",
         start: pdf::start,
         whole: OneDrawing::Asked,
         ..PICTURE
     },
     OutputFormat {
         word: "tex",
-        what: "the lines that put a `--figure` into LaTeX, with a caption",
+        what: "LaTeX lines that include a figure, with a caption",
         start: tex::start,
         whole: OneDrawing::Asked,
         ..PICTURE
@@ -125,7 +126,7 @@ pub const FORMATS: &[OutputFormat] = &[
     },
     OutputFormat {
         word: "html",
-        what: "one page that plays the mission, with everything in it",
+        what: "a page to step through the mission, in one file",
         start: html::encoder::start,
         is_unfolded: true,
         ..PICTURE
@@ -139,8 +140,14 @@ pub const FORMATS: &[OutputFormat] = &[
     },
     OutputFormat {
         word: "json",
-        what: "the evolution as data, which can be read again",
+        what: "the mission as data; can be read again as an input",
         start: json::start,
+        ..DATA
+    },
+    OutputFormat {
+        word: "mcap",
+        what: "the graph over time as `/rosgraph`, with the event log, for Foxglove and others",
+        start: mcap::start,
         ..DATA
     },
     OutputFormat {
@@ -160,7 +167,7 @@ pub const FORMATS: &[OutputFormat] = &[
     },
     OutputFormat {
         word: "gexf",
-        what: "one dynamic graph for Gephi: who is there from when to when",
+        what: "a dynamic graph for Gephi",
         start: gexf::start,
         ..DATA
     },
@@ -227,8 +234,11 @@ impl Output {
         let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
         let all = all.join(", ");
         let Some(word) = word else {
-            let what = format!("`{}` does not say its format", name.display());
-            return Err(Error::usage(what, format!("say it with `--format`: {all}")));
+            let what = format!("`{}` has no known extension", name.display());
+            return Err(Error::usage(
+                what,
+                format!("choose one with `--format`: {all}"),
+            ));
         };
         match FORMATS.iter().find(|f| f.word == word) {
             Some(format) => Ok(Self { format, target }),

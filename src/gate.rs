@@ -1,7 +1,7 @@
 //! Judgements of missions: compared with each other, written down as an expectation, held against one.
 //!
 //! Everything here judges lives, rates and the ledger, never the difference of two windows. An element without evidence
-//! in the bag is not absent: it is undecidable, and told as such.
+//! in the bag is not absent: it is undecidable, and reported as such.
 
 mod baseline;
 mod difference;
@@ -15,7 +15,7 @@ mod report;
 
 pub(crate) use baseline::{Written, update, write};
 pub(crate) use difference::{
-    DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, union,
+    DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, pairs, union,
 };
 pub(crate) use expectation::{Expectation, read};
 pub(crate) use finding::{FindingKind, Severity};

@@ -22,7 +22,9 @@ pub(crate) use graphs::{Column, ColumnCursor, ColumnWriter, GraphsWriter, Number
 pub use graphs::{Graphs, Iter as GraphsIter};
 
 pub use build::{Built, build};
-pub(crate) use build::{History, TopicCount, Windowed, counts, graphs, made};
+pub(crate) use build::{
+    History, Record, TopicCount, Windowed, counts, graphs, made, traffic, unread,
+};
 pub use per_element::PerElement;
 
 /// A node's place in [`Elements::nodes`].
@@ -82,6 +84,13 @@ pub struct Topic {
     /// The number of publishers that the bag counts but does not name, ≥ 0; `None` if it does not count publishers.
     /// They are not nodes: a picture may show them as one small box.
     pub unknown_publishers: Option<u32>,
+}
+
+impl Topic {
+    /// Whether it is a service: its clients write to it, and its server reads it.
+    pub fn is_service(&self) -> bool {
+        self.types.iter().any(|kind| kind.contains("/srv/"))
+    }
 }
 
 /// A publication or a subscription, over the whole mission.
@@ -158,6 +167,18 @@ pub struct NodeState {
     pub lifecycle: Option<Arc<str>>,
 }
 
+/// What is known of the messages of a topic, or over an edge, in one window besides their number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measures {
+    /// The number of messages that a subscriber lost, as statistics of the middleware count them.
+    pub drops: Option<u64>,
+    /// The standard deviation of the time between messages in seconds; `None` with fewer than three messages.
+    pub jitter_s: Option<f64>,
+    /// The mean time from a message's header stamp to its recording, or to its arrival where statistics say so, in
+    /// seconds; negative where clocks differ.
+    pub age_s: Option<f64>,
+}
+
 /// The state of a topic in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicState {
@@ -177,6 +198,8 @@ pub struct TopicState {
     pub median_period_s: Option<f64>,
     /// The longest time between messages in seconds; `None` with fewer than two messages.
     pub max_gap_s: Option<f64>,
+    /// Further numbers.
+    pub measures: Measures,
 }
 
 /// The state of a publication or subscription in one window.
@@ -192,6 +215,10 @@ pub struct EdgeState {
     pub count: Option<u64>,
     /// The messages per second over this edge; `None` where not known.
     pub hz: Option<f64>,
+    /// The payload bytes of these messages, if known.
+    pub bytes: Option<u64>,
+    /// Further numbers.
+    pub measures: Measures,
 }
 
 /// The computation graph of one window. Each list is sorted by id; an element that does not exist in the window is not
@@ -206,6 +233,70 @@ pub struct Graph {
     pub publishes: Vec<EdgeState>,
     /// Subscriptions in the window.
     pub subscribes: Vec<EdgeState>,
+}
+
+/// How busy a node is in one window: the messages of its topics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct NodeLoad {
+    /// The number of topics that it subscribes to.
+    pub topics_in: u32,
+    /// The number of topics that it publishes.
+    pub topics_out: u32,
+    /// The number of messages on the topics that it subscribes to, whether or not they reached it.
+    pub messages_in: u64,
+    /// The number of messages that it is known to have sent.
+    pub messages_out: u64,
+    /// Their payload bytes, if all are known.
+    pub bytes_in: Option<u64>,
+    /// The payload bytes of the messages that it is known to have sent, if all are known.
+    pub bytes_out: Option<u64>,
+}
+
+impl Graph {
+    /// How busy each node is, in the order of [`Graph::nodes`].
+    pub fn loads(&self, elements: &Elements) -> Vec<NodeLoad> {
+        let idle = NodeLoad {
+            bytes_in: Some(0),
+            bytes_out: Some(0),
+            ..NodeLoad::default()
+        };
+        let mut all = vec![idle; self.nodes.len()];
+        let place = |node: NodeId| self.nodes.binary_search_by_key(&node, |state| state.id);
+        let add = |sum: &mut Option<u64>, more: Option<u64>| {
+            *sum = sum.zip(more).map(|(sum, more)| sum.saturating_add(more));
+        };
+        for state in &self.publishes {
+            let edge = elements.publishes.get(state.id as usize);
+            let load = edge.and_then(|edge| all.get_mut(place(edge.node).ok()?));
+            if let Some(load) = load {
+                load.topics_out += 1;
+                load.messages_out += state.count.unwrap_or(0);
+                let is_none = state.count.is_none_or(|count| count == 0);
+                let bytes = state.bytes.or(is_none.then_some(0));
+                add(&mut load.bytes_out, bytes);
+            }
+        }
+        for state in &self.subscribes {
+            let Some(edge) = elements.subscribes.get(state.id as usize) else {
+                continue;
+            };
+            let Some(load) = place(edge.node).ok().and_then(|at| all.get_mut(at)) else {
+                continue;
+            };
+            let topic = self
+                .topics
+                .binary_search_by_key(&edge.topic, |state| state.id);
+            let topic = topic.ok().and_then(|at| self.topics.get(at));
+            load.topics_in += 1;
+            load.messages_in += topic.map_or(0, |topic| topic.count);
+            add(
+                &mut load.bytes_in,
+                topic.map_or(Some(0), |topic| topic.bytes),
+            );
+        }
+        all
+    }
 }
 
 /// A node, topic or edge of the mission.
@@ -281,6 +372,13 @@ impl Elements {
     pub fn publication(&self, node: NodeId, topic: TopicId) -> Option<EdgeId> {
         let key = |edge: &Edge| (edge.node, edge.topic);
         let at = self.publishes.binary_search_by_key(&(node, topic), key);
+        EdgeId::try_from(at.ok()?).ok()
+    }
+
+    /// The subscription of a topic by a node.
+    pub fn subscription(&self, topic: TopicId, node: NodeId) -> Option<EdgeId> {
+        let key = |edge: &Edge| (edge.topic, edge.node);
+        let at = self.subscribes.binary_search_by_key(&(topic, node), key);
         EdgeId::try_from(at.ok()?).ok()
     }
 

@@ -21,8 +21,37 @@ use crate::base::geometry::{Point, Rect, Size};
 pub enum Outline {
     /// The ellipse inside the box.
     Ellipse,
+    /// The box with its shorter sides rounded to half circles.
+    Pill,
     /// The box itself.
     Box,
+}
+
+impl Outline {
+    /// The distance from the middle of a box of this size to its outline in one direction, `off` beside the middle in the
+    /// other; `along` and `across` are the sides of the box in these directions.
+    fn reach(self, along: f64, across: f64, off: f64) -> f64 {
+        let half = along / 2.0;
+        match self {
+            Self::Box => half,
+            Self::Ellipse => {
+                let off = off / (across / 2.0).max(1e-9);
+                half * (1.0 - off * off).max(0.0).sqrt()
+            }
+            Self::Pill => {
+                let radius = half.min(across / 2.0);
+                let off = (off.abs() - (across / 2.0 - radius)).max(0.0);
+                half - radius + (radius * radius - off * off).max(0.0).sqrt()
+            }
+        }
+    }
+
+    /// Whether a point is inside the outline of a box or on it.
+    fn holds(self, rect: &Rect, p: Point) -> bool {
+        let middle = rect.centre();
+        let (x, y) = ((p.x - middle.x).abs(), (p.y - middle.y).abs());
+        y <= rect.h / 2.0 && x <= self.reach(rect.w, rect.h, y)
+    }
 }
 
 /// A box to place.
@@ -54,6 +83,15 @@ pub struct Cluster {
     pub parent: Option<usize>,
     /// The size of its title, which stands at the top left inside.
     pub title: Size,
+    /// The size of the words that stand at the bottom left inside.
+    pub footer: Size,
+}
+
+impl Cluster {
+    /// The width that its title and the words at its bottom need.
+    fn words(&self) -> f64 {
+        self.title.w.max(self.footer.w)
+    }
 }
 
 /// The input of an engine. The order of vertices and links is the order of names, and part of the input: the same plan
@@ -66,6 +104,8 @@ pub struct Plan {
     pub links: Vec<Link>,
     /// The namespaces; parents before children.
     pub clusters: Vec<Cluster>,
+    /// Whether every label has room of its own beside its edge, so that none is left out and no other edge meets it.
+    pub is_labelled: bool,
 }
 
 /// The direction in which the edges run.
@@ -214,6 +254,7 @@ impl Plan {
         let mut plan = self.clone();
         for (at, cluster) in plan.clusters.iter_mut().enumerate() {
             cluster.title = sane_size(cluster.title);
+            cluster.footer = sane_size(cluster.footer);
             cluster.parent = cluster.parent.filter(|parent| *parent < at);
         }
         plan.flatten();
@@ -303,8 +344,8 @@ impl Cluster {
         Rect::new(
             around.x,
             around.y - self.title.h,
-            around.w.max(self.title.w + 2.0 * padding),
-            around.h + self.title.h,
+            around.w.max(self.words() + 2.0 * padding),
+            around.h + self.title.h + self.footer.h,
         )
     }
 }
@@ -493,6 +534,7 @@ mod tests {
         Cluster {
             parent,
             title: Size::new(40.0, 14.0),
+            footer: Size::default(),
         }
     }
 }

@@ -30,7 +30,7 @@
 //! | station | takes | gives |
 //! |---|---|---|
 //! | `base` | | times, names, errors, notices, words: the nouns that all share |
-//! | [`bag`] | files | connections and messages, told apart by the first bytes |
+//! | [`bag`] | files | connections and messages, distinguished by the first bytes |
 //! | `evidence` | messages | claims: the publishers and subscribers, with the kind and the strength of the evidence |
 //! | `graph` | claims and windows | the computation graph of each window, and the changes |
 //! | `mission` | graphs | the whole sequence, as a value and as JSON; its log and its summary |
@@ -53,6 +53,12 @@
 //! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
 //! every run. The *view* holds *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
 //! every place and colour decided; a *painter* writes it down; an *encoder* makes a file of it.
+//!
+//! Versions. Before 1.0 a minor version (0.2) may change this library: names, fields and signatures may move, and each such
+//! change stands in `CHANGELOG.md`; a patch (0.1.1) changes none of them. Structs and enums that will grow are
+//! `#[non_exhaustive]`. What files of other programs rely on changes no sooner: the exit codes, the JSON of missions (its
+//! `schema` says which; older ones are read), columns of tables (new ones may be added) and the keys of `graph.yaml`.
+//! Pictures may look better in any version. The module `internals` is no part of the library.
 //!
 //! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.
@@ -121,10 +127,12 @@ pub mod values {
     pub use crate::evidence::{Degree, Evidence};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
-        Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Node, NodeId, NodeState,
-        State, Topic, TopicId, TopicState,
+        Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Measures, Node, NodeId,
+        NodeLoad, NodeState, State, Topic, TopicId, TopicState,
     };
-    pub use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Phase};
+    pub use crate::mission::ledger::{
+        Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase,
+    };
     #[cfg(feature = "render")]
     pub use crate::pipeline::{Body, Drawing, Purpose};
     pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};
@@ -157,7 +165,7 @@ pub mod internals;
 ///
 /// # Errors
 /// Where an input cannot be read at all or none holds a message, and for times that make no sense. Damaged data is left
-/// out and told in [`Mission::notices`].
+/// out and reported in [`Mission::notices`].
 pub fn read(reading: &Reading) -> Result<Mission> {
     pipeline::read(reading, &mut pipeline::Unwatched)
 }

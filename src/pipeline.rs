@@ -14,8 +14,12 @@ mod fit;
 #[cfg(feature = "render")]
 pub mod fleet;
 #[cfg(feature = "cli")]
+pub(crate) mod follow;
+#[cfg(feature = "cli")]
 pub(crate) mod gate;
+mod inputs;
 mod phases;
+mod probe;
 #[cfg(feature = "render")]
 mod purpose;
 mod read;
@@ -77,7 +81,7 @@ impl Stage {
     }
 }
 
-/// A watcher of the work, which is told its progress and may stop it.
+/// A watcher of the work, which is informed of its progress and may stop it.
 pub trait Watch {
     /// A new stage begins; the one before is over.
     fn stage(&mut self, _stage: Stage) {}

@@ -1,5 +1,7 @@
 //! The view of a mission: the full graph filtered, grouped and collapsed; the full graph stays as it is.
 
+mod audience;
+mod bundles;
 mod caption;
 mod cluster;
 mod collapse;
@@ -10,6 +12,8 @@ mod frame;
 mod frames;
 mod group;
 mod hidden;
+mod home;
+mod homes;
 mod hubs;
 mod items;
 mod lasting;
@@ -25,12 +29,12 @@ mod select;
 mod settle;
 pub(crate) mod showing;
 mod state;
+mod turn;
 pub(crate) mod union;
 
 use std::sync::Arc;
 
 use crate::base::notice::Notices;
-use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, State};
 use crate::mission::Mission;
@@ -42,13 +46,13 @@ pub(crate) use filtered::filtered;
 pub(crate) use frame::Phrase;
 pub use frame::{Frame, Headline};
 pub(crate) use lasting::Lasting;
-pub(crate) use nothing::nothing;
+pub(crate) use nothing::{nothing, unmatched};
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 pub use showing::Showing;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
-    let viewed = items::Viewed::new(&mission.elements, options);
+    let viewed = items::Viewed::new(mission, options);
     let notices = hidden::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
     let view = View {
@@ -60,13 +64,15 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, to try whether they fit on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
-    let viewed = items::Viewed::new(&mission.elements, options);
+    let viewed = items::Viewed::new(mission, options);
     staged(viewed, options, frames::Frames::default())
 }
 
 fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
-    let (mut list, shown) = (frames.list, (frames.items, frames.arrows));
+    let (mut list, mut shown) = (frames.list, (frames.items, frames.arrows));
     let mut items = viewed.items;
+    let in_words = items.split_off(items.len() - viewed.in_words);
+    let shown_in_words = shown.0.split_off(items.len().min(shown.0.len()));
     let fleets = viewed.fleets.all.iter().map(|fleet| &*fleet.name).collect();
     let mut namespaces = cluster::clusters(&mut items, options.group.namespaces, &fleets);
     let mut drawn = Vec::new();
@@ -82,6 +88,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
         frame.rolls = drawn.iter().map(roll).collect();
     }
     View {
+        also: bundles::also_here(in_words, shown_in_words, &namespaces),
         items,
         arrows: viewed.arrows,
         namespaces,
@@ -145,6 +152,17 @@ pub struct Namespace {
     pub replicas: Vec<Arc<str>>,
 }
 
+/// Nodes that stand as words in a namespace, because no line leads to them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AlsoHere {
+    /// The innermost namespace with a box around them: a place in [`View::namespaces`].
+    pub cluster: Option<usize>,
+    /// The nodes, sorted by name.
+    pub items: Vec<Item>,
+    /// The looks of each, window by window.
+    pub shown: Vec<Showing>,
+}
+
 /// The presence of one of several equal namespaces in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Attendance {
@@ -174,7 +192,7 @@ pub enum ArrowKind {
     Subscribe,
     /// From a node to a node over this topic (mode *nodes only*).
     Direct(Arc<str>),
-    /// From a box to a box, over all topics between them (mode *bundles*).
+    /// Between two boxes, over all topics between them in both directions (mode *bundles*).
     Bundle,
 }
 
@@ -201,17 +219,78 @@ pub struct Arrow {
     pub kind: ArrowKind,
     /// The edges it stands for, sorted.
     pub members: Vec<Element>,
+    /// The names of the topics of a bundle, sorted, with those of an action or a family of images as one; empty for all
+    /// else.
+    pub topics: Vec<Arc<str>>,
 }
 
 impl Arrow {
-    /// The topic that an arrow from node to node carries, or the number of topics of a bundle in a window (`3 topics`);
-    /// `None` for one from or to a topic.
+    /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those with
+    /// the highest rate first; `None` for one from or to a topic.
     pub fn carries(&self, shown: &Shown) -> Option<String> {
-        match &self.kind {
-            ArrowKind::Publish | ArrowKind::Subscribe => None,
-            ArrowKind::Direct(topic) => Some(topic.to_string()),
-            ArrowKind::Bundle => Some(words::count(shown.topics, "topic")),
-        }
+        let topic = match &self.kind {
+            ArrowKind::Publish | ArrowKind::Subscribe => return None,
+            ArrowKind::Direct(topic) => topic,
+            ArrowKind::Bundle => self.topics.get(shown.by_rate().next()?.topic as usize)?,
+        };
+        let more = shown.topics.len().saturating_sub(1);
+        Some(if more > 0 {
+            format!("{topic} +{more}")
+        } else {
+            topic.to_string()
+        })
+    }
+}
+
+impl Arrow {
+    /// The names of the topics that a bundle carries in a window.
+    pub(crate) fn topics_in(&self, shown: &Shown) -> Vec<&str> {
+        let names = shown
+            .topics
+            .iter()
+            .map(|row| self.topics.get(row.topic as usize));
+        names.flatten().map(|name| &**name).collect()
+    }
+}
+
+/// A topic on a line between two boxes in a window, or several that are told as one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopicRow {
+    /// Its place in [`Arrow::topics`].
+    pub topic: u32,
+    /// Whether its messages run along the arrow, and whether they run against it.
+    pub ways: [bool; 2],
+    /// Its state.
+    pub state: State,
+    /// Messages per second in the window, if known.
+    pub hz: Option<f64>,
+    /// The number of messages in the window, if known.
+    pub count: Option<u64>,
+    /// Its change, where that is not the change of the whole line.
+    pub mark: Option<Mark>,
+    /// Messages per second before and after, where its rate changed.
+    pub rates: Option<(f64, f64)>,
+}
+
+/// The properties that tell one topic of a bundle without a mark from another.
+type RowKey = (u32, [bool; 2], State, [Option<u64>; 2]);
+
+impl TopicRow {
+    fn key(&self) -> RowKey {
+        (
+            self.topic,
+            self.ways,
+            self.state,
+            [self.hz.map(f64::to_bits), self.count],
+        )
+    }
+}
+
+/// The sum of two numbers of which one, or both, may be unknown.
+fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Option<T> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(add(a, b)),
+        (a, b) => a.or(b),
     }
 }
 
@@ -283,6 +362,9 @@ pub struct Shown {
     pub hz: Option<f64>,
     /// Messages per second, averaged between the two changes of its rate that this window lies between.
     pub steady_hz: Option<f64>,
+    /// The rate that is written, with its number of messages: that of an earlier window as long as chance alone may make
+    /// the difference.
+    pub held: Option<(f64, Option<u64>)>,
     /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
     /// Whether it is silent or away all through the window, with a beginning and an end in the ledger, or no message
@@ -290,8 +372,8 @@ pub struct Shown {
     pub is_paused: bool,
     /// The headlines behind `mark`, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
-    /// The number of topics a bundle carries; 0 for all else.
-    pub topics: usize,
+    /// The topics that a bundle carries, sorted by their places; empty for all else.
+    pub topics: Vec<TopicRow>,
     /// The number of equal namespaces it stands for in the window; 0 for all else.
     pub each: usize,
     /// The nodes and topics in a folded namespace in the graph of the window; none for all else.
@@ -335,16 +417,29 @@ impl Shown {
             mark: None,
             hz: None,
             steady_hz: None,
+            held: None,
             rates: None,
             is_paused: false,
             entries: Vec::new(),
-            topics: 0,
+            topics: Vec::new(),
             each: 0,
             members: Members::default(),
             inside: None,
             count: None,
             lifecycle: None,
         }
+    }
+
+    /// The topics of a bundle, those that changed first, then those with the highest rate.
+    pub(crate) fn by_rate(&self) -> impl Iterator<Item = &TopicRow> {
+        let mut rows: Vec<&TopicRow> = self.topics.iter().collect();
+        let hz = |row: &TopicRow| row.hz.unwrap_or(0.0);
+        rows.sort_by(|a, b| {
+            let news = b.mark.is_some().cmp(&a.mark.is_some());
+            news.then(hz(b).total_cmp(&hz(a)))
+                .then(a.topic.cmp(&b.topic))
+        });
+        rows.into_iter()
     }
 }
 
@@ -395,6 +490,8 @@ pub struct View {
     pub arrows: Vec<Arrow>,
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
+    /// The nodes that stand as words, by namespace.
+    pub also: Vec<AlsoHere>,
     /// The windows.
     pub frames: Vec<Frame>,
     /// The looks of each item, window by window.
@@ -416,6 +513,11 @@ impl View {
         let whole = last.span.end.since(first.span.start).max(1) as f64;
         let at = self.frames.get(k).map_or(last.span.end, |f| f.span.start);
         at.since(first.span.start) as f64 / whole
+    }
+
+    /// Whether there is time to show: not between two missions that are compared, and not in one window.
+    pub(crate) fn has_time(&self) -> bool {
+        !self.compares && self.frames.len() > 1
     }
 
     /// Whether window `k` shows a change.
@@ -449,7 +551,17 @@ impl View {
             };
             (0..count).map(one).collect()
         };
+        let mut also = self.also;
+        for showing in also.iter_mut().flat_map(|also| &mut also.shown) {
+            // They are there as they were last.
+            let last = showing.looks().last().map(|look| Shown {
+                mark: None,
+                ..look.clone()
+            });
+            *showing = Showing::of(seen.iter().map(|_| last.as_ref()));
+        }
         Self {
+            also,
             items_shown: shown(self.items.len(), |s| &s.items),
             arrows_shown: shown(self.arrows.len(), |s| &s.arrows),
             ..self
@@ -459,7 +571,8 @@ impl View {
     /// Every look of any item or arrow, in no particular order.
     pub fn looks(&self) -> impl Iterator<Item = &Shown> {
         let all = self.items_shown.iter().chain(&self.arrows_shown);
-        all.flat_map(Showing::looks)
+        let also = self.also.iter().flat_map(|also| &also.shown);
+        all.chain(also).flat_map(Showing::looks)
     }
 
     /// The place of the window with most headlines, the first of several; [`View::busiest`] where there are none.

@@ -17,7 +17,7 @@ const STATIONS: &[&str] = &[
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
-        &["budget", "leftovers", "rhythm", "words"],
+        &["budget", "columns", "leftovers", "rhythm", "words"],
         &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],
@@ -25,33 +25,34 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("bag", &[
         &["checksum", "decompress", "model", "unknown"],
         &["source"],
-        &["adapters", "input"],
+        &["adapters", "input", "straight"],
         &["remote"],
         &["object"],
-        &["deferred"],
+        &["deferred", "folder"],
         &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
         &["clock", "message", "spread", "syntax", "texts", "times"],
-        &["claim", "topology"],
+        &["claim", "numbers", "topology"],
         &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],
-        &["restarts"],
         &["conclude"],
     ]),
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "showing"],
+        &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing"],
         &["hubs", "settle"],
         &["union"],
         &["options"],
         &["group", "select"],
+        &["bundles", "homes"],
         &["items"],
         &["frame", "lasting"],
         &["caption", "hidden", "marks", "nothing", "state"],
+        &["turn"],
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
@@ -61,7 +62,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["sequence", "sink"],
         &["check", "encoder"],
         &["spells"],
-        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
     ("gate", &[
@@ -73,13 +74,20 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["baseline", "difference", "report"],
     ]),
     ("pipeline", &[
+        &["inputs"],
         &["collect", "draw", "phases", "purpose"],
-        &["figure", "fit", "unfolded", "verify"],
+        &["figure", "fit", "probe", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["fleet", "gate"],
+        &["fleet", "follow", "gate"],
     ]),
-    ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate", "tables"]]),
+    ("cli", &[
+        &["args", "stop"],
+        &["applies", "look", "reading", "serve", "terminal"],
+        &["extract", "installed", "render", "show", "tables"],
+        &["gate"],
+        &["follow"],
+    ]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -114,6 +122,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "export/tables",
         ],
     ),
+    // Bags are read with it, and the graph is written.
+    ("mcap", &["bag/mcap", "export/mcap"]),
     // Names are filtered as in `rqt_graph`; missions are named by a part of a path.
     ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Times are read and spelled.

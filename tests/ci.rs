@@ -35,15 +35,17 @@ fn commands(job: &str) -> Vec<String> {
 /// Runs a command as a job does; its exit code and what it printed.
 #[cfg(unix)]
 fn run(dir: &Path, command: &str) -> (Option<i32>, String) {
-    let url = "https://github.com/acme/robot/actions/runs/1/artifacts/2";
-    let command = command.replace("${{ steps.player.outputs.artifact-url }}", url);
     assert!(!command.contains("${{"), "{command}");
     let ours = Path::new(env!("CARGO_BIN_EXE_bagreel")).parent().unwrap();
     let path = format!("{}:{}", ours.display(), std::env::var("PATH").unwrap());
     let output = Command::new("sh")
-        .args(["-c", &command])
+        .args(["-c", command])
         .current_dir(dir)
         .env("PATH", path)
+        .env(
+            "PLAYER",
+            "https://github.com/acme/robot/actions/runs/1/artifacts/2",
+        )
         .env("GITHUB_STEP_SUMMARY", dir.join("summary.md"))
         .output()
         .unwrap();
@@ -88,6 +90,11 @@ fn the_commands_of_the_jobs_run_and_write_what_lies_beside_them() {
     );
     same("summary.md", summary.strip_prefix("Built.\n\n").unwrap());
     assert!(here.join("player.html").is_file() && here.join("strip.png").is_file());
+    let comment = commands("comment.yml");
+    assert_eq!(comment.len(), 1);
+    assert_eq!(run(here, &comment[0]).0, Some(1));
+    let report = read("report.md");
+    assert!(report.starts_with("### ❌ Graph check"), "{report}");
     let gitlab = commands("gitlab.yml");
     assert_eq!(gitlab.len(), 2);
     assert_eq!(run(here, &gitlab[0]).0, Some(0));
@@ -117,7 +124,7 @@ fn the_three_expectations_find_what_lies_beside_them() {
 
 #[test]
 fn what_others_made_is_pinned() {
-    for job in ["github.yml", "setup-bagreel/action.yml"] {
+    for job in ["github.yml", "comment.yml", "setup-bagreel/action.yml"] {
         let text = fs::read_to_string(folder().join(job)).unwrap();
         for line in text
             .lines()
@@ -131,7 +138,71 @@ fn what_others_made_is_pinned() {
             assert!(is_pinned || line.starts_with("./"), "{job}: {line}");
         }
     }
+}
+
+/// Runs the script of `setup-bagreel` where a stand-in for `curl` hands out an archive; whether it succeeded, the path it
+/// added, and what it said.
+#[cfg(target_os = "linux")]
+fn set_up(dir: &Path, sha256: &str) -> (bool, String, String) {
+    use std::os::unix::fs::PermissionsExt as _;
     let action = fs::read_to_string(folder().join("setup-bagreel/action.yml")).unwrap();
-    let check = action.find("sha256sum --check").unwrap();
-    assert!(check < action.find("tar --extract").unwrap());
+    let (_, script) = action.split_once("run: |").unwrap();
+    let (_, script) = script.split_once('\n').unwrap();
+    let curl = dir.join("curl");
+    fs::write(
+        &curl,
+        "#!/bin/sh\nfor last; do [ \"$last\" != --output ] || { shift; break; }; shift; done\ncp \"$ARCHIVE\" \"$1\"; echo \"$2\"\n",
+    )
+    .unwrap();
+    fs::set_permissions(&curl, fs::Permissions::from_mode(0o755)).unwrap();
+    fs::write(dir.join("path"), "").unwrap();
+    let output = Command::new("bash")
+        .args(["-c", script])
+        .env(
+            "PATH",
+            format!("{}:{}", dir.display(), std::env::var("PATH").unwrap()),
+        )
+        .env("VERSION", "0.1.0")
+        .env("SHA256", sha256)
+        .env("FROM", "https://example.org")
+        .env("ARCHIVE", dir.join("archive.tar.gz"))
+        .env("RUNNER_TEMP", dir.join("temp"))
+        .env("GITHUB_PATH", dir.join("path"))
+        .output()
+        .unwrap();
+    let path = fs::read_to_string(dir.join("path")).unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (
+        output.status.success(),
+        path,
+        String::from_utf8(said).unwrap(),
+    )
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_action_runs_only_an_archive_with_the_checksum() {
+    let dir = tempfile::tempdir().unwrap();
+    let name = format!("bagreel-{}-unknown-linux-musl", std::env::consts::ARCH);
+    let ours = "mkdir $0 && printf '#!/bin/sh\necho hello from $0' > $0/bagreel && chmod +x $0/bagreel && \
+        tar -czf archive.tar.gz $0 && sha256sum archive.tar.gz";
+    let packed = Command::new("sh")
+        .args(["-c", ours, &name])
+        .current_dir(&dir)
+        .output()
+        .unwrap();
+    let sum = String::from_utf8(packed.stdout).unwrap();
+    let sum = sum.split(' ').next().unwrap();
+    let (done, path, said) = set_up(dir.path(), sum);
+    assert!(done && said.contains("hello from"), "{said}");
+    assert!(
+        said.contains(&format!("https://example.org/v0.1.0/{name}.tar.gz")),
+        "{said}"
+    );
+    assert!(path.ends_with(&format!("/temp/bagreel-0.1.0/{name}\n")));
+    fs::remove_dir_all(dir.path().join("temp")).unwrap();
+    let (done, path, said) = set_up(dir.path(), &"0".repeat(64));
+    assert!(!done && path.is_empty(), "{said}");
+    assert!(!said.contains("hello from"), "{said}");
+    assert!(!dir.path().join("temp/bagreel-0.1.0").join(name).exists());
 }

@@ -103,7 +103,7 @@ fn what_makes_no_sense_is_a_usage_error() {
         dir.path(),
         &["render", WAREHOUSE, "--start", "1h"],
         2,
-        "leave nothing",
+        "select nothing",
         "the bag covers",
     );
     refused(
@@ -267,4 +267,36 @@ fn a_folder_of_bags_is_surveyed_with_the_broken_ones() {
     assert_eq!(rows.len(), 3, "{text}");
     assert!(rows[1].starts_with("broken.bag,") && rows[1].contains("empty"));
     assert!(rows[2].starts_with("w.bag,rosbag1,none,index,true,"));
+}
+
+#[test]
+fn every_command_has_its_manual_page() {
+    let dir = folder();
+    let page = |args: &[&str]| {
+        let output = bagreel(dir.path(), args);
+        assert_eq!(code(&output), Some(0), "{}", errors(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let all = page(&["man"]);
+    let names = all
+        .lines()
+        .filter_map(|line| line.strip_prefix("bagreel\\-")?.strip_suffix("(1)"));
+    let names: Vec<&str> = names.collect();
+    assert!(names.len() >= 10 && names.contains(&"check"), "{names:?}");
+    for name in names {
+        let page = page(&["man", name]);
+        assert!(page.contains(&format!(".TH bagreel-{name} 1")), "{page}");
+        let lines: Vec<&str> = page.lines().collect();
+        for pair in lines.windows(2) {
+            let is_option = pair[0].starts_with("\\fB\\-");
+            assert!(!is_option || !pair[1].is_empty(), "{name}: {}", pair[0]);
+        }
+    }
+    refused(
+        dir.path(),
+        &["man", "no_such"],
+        2,
+        "no command `no_such`",
+        "commands: render,",
+    );
 }

@@ -308,7 +308,7 @@ fn chunks_that_a_lying_summary_does_not_name_are_read() {
     bytes[footer + 16..footer + 20].fill(0);
     let (report, kept) = read_bytes("x.mcap", &bytes);
     assert_eq!(kept.counts(), truth, "{:?}", kept.notices);
-    assert!(report.tier_reason.unwrap().contains("does not name"));
+    assert!(report.tier_reason.unwrap().contains("does not list"));
 }
 
 #[test]
@@ -539,10 +539,10 @@ fn a_bag_named_twice_counts_once_and_is_said() {
     let path = path.to_str().unwrap();
     let (code, told) = bagreel(&["info", path, path]);
     let count = format!("{} messages", recording.messages.len());
-    assert!(code == Some(0) && told.contains("named twice"), "{told}");
+    assert!(code == Some(0) && told.contains("given twice"), "{told}");
     assert!(told.contains(&count), "no `{count}` in {told}");
     let (code, told) = bagreel(&["info", "-", "-"]);
-    assert!(code == Some(2) && told.contains("read once"), "{told}");
+    assert!(code == Some(2) && told.contains("only once"), "{told}");
     let (code, told) = bagreel(&["info", "--verify", "-"]);
     assert!(
         code == Some(2) && told.contains("reads a bag twice"),

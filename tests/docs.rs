@@ -1,16 +1,39 @@
-//! The README tells the truth: its commands run, its tables are the code's tables.
+//! The README and the docs are true: their commands run, their links lead somewhere, and their tables are the code's tables.
 
-use std::path::Path;
-use std::process::Command;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
 use bagreel::internals::evidence::SOURCES;
 use bagreel::internals::export::FORMATS;
 
 const README: &str = include_str!("../README.md");
 
-/// The rows of the README's table that begins under this head: each row's first cell without quotes.
-fn first_cells(head: &str) -> Vec<String> {
-    let table = README.split(head).nth(1).unwrap_or_default();
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The README and every chapter of the docs: path and text.
+fn pages() -> Vec<(PathBuf, String)> {
+    let chapters = fs::read_dir(root().join("docs/src")).unwrap();
+    let chapters = chapters.map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = chapters
+        .filter(|path| path.extension().is_some_and(|e| e == "md"))
+        .collect();
+    paths.push(root().join("README.md"));
+    paths.sort();
+    let read = |path: PathBuf| (path.clone(), fs::read_to_string(path).unwrap());
+    paths.into_iter().map(read).collect()
+}
+
+fn chapter(name: &str) -> String {
+    fs::read_to_string(root().join("docs/src").join(name)).unwrap()
+}
+
+/// The first cell of each row of the table that begins with this head, without quotes.
+fn first_cells(text: &str, head: &str) -> Vec<String> {
+    let table = text.split(head).nth(1).unwrap_or_default();
     let rows = table
         .lines()
         .skip(2)
@@ -25,12 +48,77 @@ fn first_cells(head: &str) -> Vec<String> {
     .collect()
 }
 
+/// The commands of `bagreel` in the shell blocks of a page.
+fn commands(text: &str) -> Vec<&str> {
+    let blocks = text
+        .split("```sh\n")
+        .skip(1)
+        .filter_map(|rest| rest.split("```").next());
+    blocks
+        .flat_map(str::lines)
+        .filter(|line| line.starts_with("bagreel "))
+        .collect()
+}
+
+/// The words of a command line; quotes keep spaces.
+fn words(command: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quote = None;
+    for c in command.chars() {
+        match (c, quote) {
+            ('\'' | '"', None) => quote = Some(c),
+            (c, Some(q)) if c == q => quote = None,
+            (' ', None) => words.push(String::new()),
+            (c, _) => words.last_mut().unwrap().push(c),
+        }
+    }
+    words.into_iter().filter(|word| !word.is_empty()).collect()
+}
+
+/// A folder that holds what the commands of README and docs name: the examples, and an expectations file.
+fn folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let examples = root().join("examples");
+    let copy = |from: &Path, to: &str| {
+        let to = dir.path().join(to);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(from, to).unwrap();
+    };
+    for name in [
+        "run.bag",
+        "good.bag",
+        "warehouse.bag",
+        "examples/warehouse.bag",
+        "bags/day1/a.bag",
+    ] {
+        copy(&examples.join("warehouse.bag"), name);
+    }
+    for name in ["run.mcap", "courier.mcap", "bags/b.mcap"] {
+        copy(&examples.join("courier.mcap"), name);
+    }
+    for name in ["courier_0.db3", "metadata.yaml"] {
+        copy(&examples.join("courier").join(name), &format!("run/{name}"));
+    }
+    let topology = "nodes:\n  /rviz: {subscribes: [/robot1/plan]}\n";
+    fs::write(dir.path().join("topology.yaml"), topology).unwrap();
+    fs::create_dir(dir.path().join("images")).unwrap();
+    dir
+}
+
+fn run(command: &str, dir: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(dir)
+        .args(&words(command)[1..])
+        .output()
+        .unwrap()
+}
+
 #[test]
-fn the_readme_begins_with_the_two_commands() {
-    let block = README.split("```").nth(1).unwrap();
+fn readme_begins_with_the_two_commands() {
+    let block = README.split("```sh\n").nth(1).unwrap();
+    let block = block.split("```").next().unwrap();
     let commands: Vec<&str> = block
         .lines()
-        .skip(1)
         .map(|line| line.split('#').next().unwrap().trim())
         .collect();
     assert_eq!(
@@ -40,59 +128,125 @@ fn the_readme_begins_with_the_two_commands() {
             "cargo test --release"
         ]
     );
+    let words = README.split_whitespace().count();
+    assert!(words <= 900, "the README has {words} words");
 }
 
 #[test]
-fn every_output_format_has_its_row() {
-    let rows = first_cells("| extension | what |");
+fn docs_list_every_output_format_and_every_kind_of_evidence() {
+    let rows = first_cells(&chapter("outputs.md"), "| extension | output |");
     let formats: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
     assert_eq!(rows, formats);
-}
-
-#[test]
-fn every_kind_of_evidence_has_its_row() {
-    let rows = first_cells("| evidence | what it tells |");
+    let rows = first_cells(&chapter("evidence.md"), "| evidence | what it reveals |");
     let sources: Vec<&str> = SOURCES.iter().map(|s| s.word).collect();
     assert_eq!(rows, sources);
+    let counted = format!("[{} kinds of evidence]", SOURCES.len());
+    assert!(README.contains(&counted), "{counted}");
 }
 
 #[test]
-fn every_command_of_the_readme_runs() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let out = tempfile::tempdir().unwrap();
-    let block = README
-        .split("## Use")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .nth(1)
-        .unwrap();
-    let lines: Vec<&str> = block
-        .lines()
-        .filter(|line| line.starts_with("bagreel "))
-        .collect();
-    assert!(lines.len() >= 6);
-    for line in lines {
-        let command = line.split(" #").next().unwrap();
-        let words = command
-            .split_whitespace()
+fn every_command_of_readme_and_docs_runs() {
+    let pages = pages();
+    let mut tried = 0;
+    for (path, text) in &pages {
+        if path.ends_with("gallery.md") {
+            continue;
+        }
+        let dir = folder();
+        for command in commands(text) {
+            let output = run(command, dir.path());
+            let said = String::from_utf8_lossy(&output.stderr);
+            // Equal missions differ in nothing, and a run matches its own baseline.
+            assert_eq!(
+                output.status.code(),
+                Some(0),
+                "{}: {command}: {said}",
+                path.display()
+            );
+            tried += 1;
+        }
+    }
+    assert!(tried > 60, "{tried} commands");
+}
+
+#[test]
+fn links_of_readme_and_docs_lead_to_files() {
+    let mut seen = 0;
+    for (path, text) in pages() {
+        let folder = path.parent().unwrap();
+        // Blocks of code hold examples.
+        let text: String = text.split("```").step_by(2).collect();
+        let targets = text
+            .split("](")
             .skip(1)
-            .map(|word| word.trim_matches('\''));
-        let words = words.map(|word| match word {
-            "run7.bag" => root.join("examples/warehouse.bag").display().to_string(),
-            "run7/" => root.join("examples/courier").display().to_string(),
-            "run7.mcap" => root.join("examples/courier.mcap").display().to_string(),
-            "bags/" => root.join("examples").display().to_string(),
-            "/planner" => "/robot1/planner".to_owned(),
-            "/plan" => "/robot1/plan".to_owned(),
-            other => other.to_owned(),
-        });
+            .filter_map(|rest| rest.split(')').next())
+            .chain(
+                text.split("src=\"")
+                    .skip(1)
+                    .filter_map(|rest| rest.split('"').next()),
+            )
+            .chain(
+                text.split("href=\"")
+                    .skip(1)
+                    .filter_map(|rest| rest.split('"').next()),
+            );
+        for target in targets.filter(|target| !target.starts_with("https://")) {
+            let file = target.split('#').next().unwrap();
+            assert!(folder.join(file).exists(), "{}: {target}", path.display());
+            seen += 1;
+        }
+    }
+    let summary = chapter("SUMMARY.md");
+    for (path, _) in pages() {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let is_listed =
+            ["README.md", "SUMMARY.md"].contains(&name) || summary.contains(&format!("({name})"));
+        assert!(is_listed, "{name} is not in SUMMARY.md");
+    }
+    assert!(seen > 40, "{seen} links");
+}
+
+#[test]
+fn docs_describe_every_option() {
+    let docs: String = pages().into_iter().map(|(_, text)| text).collect();
+    let help = |command: &[&str]| {
         let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-            .current_dir(&out)
-            .args(words)
+            .args(command)
+            .arg("--help")
             .output()
             .unwrap();
-        let said = String::from_utf8_lossy(&run.stderr);
-        assert_eq!(run.status.code(), Some(0), "{command}: {said}");
+        String::from_utf8(run.stdout).unwrap()
+    };
+    let list = help(&[]);
+    let commands = list.lines().skip_while(|l| *l != "Commands:").skip(1);
+    let commands = commands
+        .take_while(|l| !l.is_empty())
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next());
+    let mut options = BTreeSet::new();
+    for command in commands {
+        assert!(
+            docs.contains(&format!("bagreel {command}")) || command == "help",
+            "{command}"
+        );
+        let text = help(&[command]);
+        let words = text
+            .lines()
+            .map(str::trim_start)
+            .filter(|line| line.starts_with('-'));
+        let long = words.filter_map(|line| {
+            let option = line
+                .split_whitespace()
+                .find(|word| word.starts_with("--"))?;
+            Some(option.trim_end_matches(',').to_owned())
+        });
+        options.extend(long);
     }
+    let missing: Vec<&String> = options
+        .iter()
+        .filter(|option| !["--help", "--version"].contains(&option.as_str()))
+        .filter(|option| !docs.contains(option.as_str()))
+        .collect();
+    assert!(options.len() > 60, "{options:?}");
+    assert!(missing.is_empty(), "the docs do not describe {missing:?}");
 }

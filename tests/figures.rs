@@ -13,7 +13,7 @@ fn figure(bag: &Path, flags: &[&str]) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
     let svg = folder.path().join("figure.svg");
     let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-        .args(["render", "--quiet"])
+        .args(["figure", "--quiet"])
         .arg(bag)
         .args(flags)
         .arg("-o")
@@ -36,7 +36,7 @@ fn drawn() -> &'static [String] {
     static DRAWN: OnceLock<Vec<String>> = OnceLock::new();
     DRAWN.get_or_init(|| {
         let draw = |(kind, width, _): &(&str, &str, f64)| {
-            figure(&example(), &["--figure", kind, "--width", width]).unwrap()
+            figure(&example(), &["--kind", kind, "--width", width]).unwrap()
         };
         FIGURES.iter().map(draw).collect()
     })
@@ -53,7 +53,7 @@ fn size_mm(svg: &str) -> (f64, f64) {
 
 #[test]
 fn lives_tell_what_happened_in_words() {
-    let svg = figure(&example(), &["--figure", "lives"]).unwrap();
+    let svg = figure(&example(), &["--kind", "lives"]).unwrap();
     for expected in [
         "8 nodes throughout",
         "lidar_driver restarted, away for 6.8 s",
@@ -70,7 +70,7 @@ const FIGURES: [(&str, &str, f64); 6] = [
     ("map", "88mm", 121.0),
     ("map", "181mm", 99.0),
     ("steps", "88mm", 225.0),
-    ("steps", "181mm", 97.0),
+    ("steps", "181mm", 110.0),
 ];
 
 #[test]
@@ -105,14 +105,14 @@ fn few_topic_names_are_left_out_of_a_map_and_they_are_told() {
 
 #[test]
 fn steps_show_what_was_asked_for_or_say_what_there_is() {
-    let svg = figure(&example(), &["--figure", "steps", "--steps", "3"]).unwrap();
+    let svg = figure(&example(), &["--kind", "steps", "--steps", "3"]).unwrap();
     assert!(svg.contains("2 → 3") && !svg.contains("3 → 4"));
     // The log knows of no hand-over here: the planner went on.
     assert!(!svg.contains("plan: planner → replanner"));
     assert!(svg.contains("5 smaller steps left out"));
-    let last = figure(&example(), &["--figure", "steps", "--steps", "7"]).unwrap();
+    let last = figure(&example(), &["--kind", "steps", "--steps", "7"]).unwrap();
     assert!(last.contains("cmd_vel: controller → dock_controller"));
-    let none = figure(&example(), &["--figure", "steps", "--steps", "8"]).unwrap_err();
+    let none = figure(&example(), &["--kind", "steps", "--steps", "8"]).unwrap_err();
     assert!(none.contains("2 to 7"), "{none}");
 }
 
@@ -120,7 +120,7 @@ fn steps_show_what_was_asked_for_or_say_what_there_is() {
 fn phases_are_named_by_a_file_or_replaced_by_it() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("phases.txt");
-    let flags = ["--figure", "lives", "--phases", file.to_str().unwrap()];
+    let flags = ["--kind", "lives", "--phases", file.to_str().unwrap()];
     std::fs::write(&file, "boot\nnavigation\n").unwrap();
     assert!(
         figure(&example(), &flags)
@@ -138,7 +138,7 @@ fn phases_are_named_by_a_file_or_replaced_by_it() {
             .unwrap_err()
             .contains("more names")
     );
-    let svg = figure(&example(), &["--figure", "lives", "--phases", "none"]).unwrap();
+    let svg = figure(&example(), &["--kind", "lives", "--phases", "none"]).unwrap();
     assert!(!svg.contains("(+4)"), "no phase is told");
 }
 
@@ -190,7 +190,7 @@ fn a_figure_for_latex_says_what_it_shows_and_is_compiled_where_latex_is_at_hand(
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-        .args(["render", "--quiet", "--figure", "lives", "--bare"])
+        .args(["figure", "--quiet", "--kind", "lives", "--bare"])
         .arg(example())
         .arg("-o")
         .arg(at("lives.pdf"))
@@ -273,7 +273,7 @@ fn no_text_is_below_six_points() {
             "{kind} {width}: {smallest}"
         );
     }
-    let svg = figure(&example(), &["--figure", "lives", "--text", "8pt"]).unwrap();
+    let svg = figure(&example(), &["--kind", "lives", "--text", "8pt"]).unwrap();
     let smallest = sizes_pt(&svg).into_iter().fold(f64::MAX, f64::min);
     assert!(smallest >= 6.95, "{smallest}");
 }
@@ -284,7 +284,7 @@ fn no_letter_of_a_pdf_is_below_six_points_on_paper() {
     let pdf = folder.path().join("figure.pdf");
     for (kind, width, _) in FIGURES {
         let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-            .args(["render", "--quiet", "--figure", kind, "--width", width])
+            .args(["figure", "--quiet", "--kind", kind, "--width", width])
             .arg(example())
             .arg("-o")
             .arg(&pdf)
@@ -341,7 +341,7 @@ fn what_is_too_much_for_nodes_is_drawn_in_groups_of_ever_shorter_namespaces() {
     let mission = folder.path().join("large.json");
     std::fs::write(&mission, large().to_string()).unwrap();
     for kind in ["lives", "map", "steps"] {
-        let svg = figure(&mission, &["--figure", kind, "--width", "181mm"]).unwrap();
+        let svg = figure(&mission, &["--kind", kind, "--width", "181mm"]).unwrap();
         let (w, h) = size_mm(&svg);
         assert!((w - 181.0).abs() < 0.1 && h <= 225.0, "{kind}: {w} x {h}");
         let together = ["more</text>", " +", " throughout</text>"];
@@ -355,13 +355,13 @@ fn what_is_too_much_for_nodes_is_drawn_in_groups_of_ever_shorter_namespaces() {
     let Some(huge) = shared("data/graphs/huge.json") else {
         return;
     };
-    let svg = figure(&huge, &["--figure", "lives"]).unwrap();
+    let svg = figure(&huge, &["--kind", "lives"]).unwrap();
     assert!(svg.contains("debug_info_monitor +61"), "of 300 nodes");
 }
 
 #[test]
 fn what_does_not_fit_is_refused_with_what_would() {
-    let narrow = figure(&example(), &["--figure", "lives", "--width", "21mm"]).unwrap_err();
+    let narrow = figure(&example(), &["--kind", "lives", "--width", "21mm"]).unwrap_err();
     let enough = narrow
         .split("--width ")
         .nth(1)
@@ -370,10 +370,10 @@ fn what_does_not_fit_is_refused_with_what_would() {
         .next()
         .unwrap();
     assert!(
-        figure(&example(), &["--figure", "lives", "--width", enough]).is_ok(),
+        figure(&example(), &["--kind", "lives", "--width", enough]).is_ok(),
         "{narrow}"
     );
-    let nothing = figure(&example(), &["--figure", "lives", "--ns-filter", "/nobody"]);
+    let nothing = figure(&example(), &["--kind", "lives", "--ns-filter", "/nobody"]);
     let said = nothing.err().unwrap_or_default();
     assert!(said.contains("nothing is left to draw"), "{said}");
 }
@@ -381,13 +381,39 @@ fn what_does_not_fit_is_refused_with_what_would() {
 #[test]
 fn options_that_say_nothing_to_a_figure_are_refused() {
     for flags in [
-        &["--figure", "lives", "--strip", "3x2"][..],
-        &["--figure", "lives", "--style", "dark"],
-        &["--figure", "lives", "--steps", "3"],
-        &["--rows", "groups"],
-        &["--text", "8pt"],
-        &["--figure", "lives", "--text", "5pt"],
+        &["--kind", "lives", "--strip", "3x2"][..],
+        &["--kind", "lives", "--style", "dark"],
+        &["--kind", "lives", "--steps", "3"],
+        &["--kind", "map", "--rows", "topics"],
+        &["--kind", "lives", "--text", "5pt"],
     ] {
         assert!(figure(&example(), flags).is_err(), "{flags:?}");
     }
+}
+
+#[test]
+fn render_still_draws_figures_and_says_what_to_write_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str], name: &str| {
+        let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(&folder)
+            .args(args)
+            .arg(example())
+            .args(["--bare", "--width", "181mm", "-o", name])
+            .output()
+            .unwrap();
+        assert!(out.status.success());
+        let said = String::from_utf8(out.stderr).unwrap();
+        (
+            std::fs::read_to_string(folder.path().join(name)).unwrap(),
+            said,
+        )
+    };
+    let (old, said) = run(&["render", "--figure", "map"], "a.svg");
+    assert!(
+        said.contains("`bagreel figure --kind map` draws the same"),
+        "{said}"
+    );
+    let (new, said) = run(&["figure", "--kind", "map"], "b.svg");
+    assert!(old == new && !said.contains("removed"), "{said}");
 }

@@ -429,8 +429,8 @@ fn every_exit_code_of_check_means_what_its_help_says() {
     help_begins(
         here,
         "check",
-        "0 kept, 1 broken, 2 could not tell",
-        "3 kept but data was skipped",
+        "0 passed, 1 failed, 2 not checked",
+        "3 passed but data was skipped",
     );
 }
 
@@ -464,8 +464,8 @@ fn every_exit_code_of_diff_and_baseline_means_what_their_help_says() {
     help_begins(
         here,
         "diff",
-        "0 the same, 1 different, 2 could not tell",
-        "3 the same but data was skipped",
+        "0 equal, 1 different, 2 not compared",
+        "3 equal but data was skipped",
     );
     help_begins(
         here,

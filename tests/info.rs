@@ -104,7 +104,7 @@ fn the_figure_that_fits_is_named() {
     let info = told(inputs);
     assert_eq!(info.figures.len(), 1);
     assert!(
-        info.figures[0].shows.contains("no publisher is known"),
+        info.figures[0].shows.contains("without a known publisher"),
         "{:?}",
         info.figures
     );

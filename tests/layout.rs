@@ -35,6 +35,7 @@ fn plans() -> impl Strategy<Value = Plan> {
             .map(|(at, (parent, nested, w))| Cluster {
                 parent: (nested && at > 0).then(|| parent.index(at)),
                 title: Size::new(w, 14.0),
+                footer: Size::new(w / 2.0, 12.0),
             })
             .collect();
         let count = clusters.len();
@@ -68,6 +69,7 @@ fn plans() -> impl Strategy<Value = Plan> {
                 })
                 .collect(),
             clusters: clusters.clone(),
+            is_labelled: clusters.len() % 2 == 1,
         })
     })
 }
@@ -84,6 +86,7 @@ proptest! {
         prop_assert_eq!(found.through, 0, "an edge runs through a foreign box");
         prop_assert_eq!(found.foreign, 0, "a cluster holds what is not its own");
         prop_assert_eq!(found.label_overlaps, 0, "a label covers a box or a label");
+        prop_assert!(!plan.is_labelled || found.crossed == 0, "a line runs through the label of another");
         prop_assert_eq!(layout.orientation, orientation);
         for (link, route) in plan.links.iter().zip(&layout.routes) {
             let end = route.curves.last().unwrap()[2];
@@ -162,6 +165,12 @@ fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
     let (rect, centre) = (layout.boxes[v], layout.boxes[v].centre());
     let within = |by: f64| {
         let rect = rect.grown(by);
+        let (right, down) = ((p.x - centre.x).abs(), (p.y - centre.y).abs());
+        let cap = rect.h.min(rect.w) / 2.0;
+        let (dx, dy) = (
+            (right - rect.w / 2.0 + cap).max(0.0),
+            (down - rect.h / 2.0 + cap).max(0.0),
+        );
         let (x, y) = (
             (p.x - centre.x) / (rect.w / 2.0),
             (p.y - centre.y) / (rect.h / 2.0),
@@ -169,6 +178,7 @@ fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
         match plan.vertices[v].outline {
             Outline::Box => x.abs().max(y.abs()) <= 1.0,
             Outline::Ellipse => x * x + y * y <= 1.0,
+            Outline::Pill => dx * dx + dy * dy <= cap * cap,
         }
     };
     within(1.0) && !within(-1.0)
@@ -198,8 +208,10 @@ fn a_graph_too_large_for_layers_is_laid_out_all_the_same() {
             .map(|c: usize| Cluster {
                 parent: c.checked_sub(1),
                 title: Size::new(40.0, 14.0),
+                footer: Size::default(),
             })
             .collect(),
+        is_labelled: false,
     };
     let layout = laid_out(&plan, None);
     assert_eq!(layout.remarks.len(), 1, "{:?}", layout.remarks);
@@ -243,12 +255,15 @@ fn a_broken_plan_is_laid_out_all_the_same() {
             Cluster {
                 parent: Some(1),
                 title: odd,
+                footer: odd,
             },
             Cluster {
                 parent: Some(5),
                 title: odd,
+                footer: odd,
             },
         ],
+        is_labelled: true,
     };
     for (word, _) in layout::ENGINES {
         let page = layout::LayoutOptions {

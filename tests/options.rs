@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 
 use crate::source;
-use crate::support::{ORIGIN, Recording, rosbag1};
+use crate::support::{ORIGIN, Recording, rosbag1, sqlite3};
 
 /// Command, its arguments, and an option that changes the files or the results.
 #[rustfmt::skip]
@@ -62,15 +62,27 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -p 20 -o out/x.svg", "--strip 0,1"),
     ("render", "r.bag -o out/x.dot", "--dot-profile plain"),
     ("render", "r.bag -o out/x.md", "--link player=https://example.org"),
-    ("render", "r.bag --width 180mm -o out/x.svg", "--figure lives"),
-    ("render", "r.bag --width 180mm --figure lives -o out/x.svg", "--rows topics"),
-    ("render", "r.bag --width 180mm --phases p.txt --figure steps -o out/x.svg", "--steps 2"),
-    ("render", "r.bag --width 180mm --figure lives -o out/x.svg", "--text 9pt"),
     ("render", "r.bag -o out/x.json", "--phases p.txt"),
     ("render", "r.bag -o out/x.json", "--captions c.txt"),
     ("render", "r.bag -o out/x.json", "--cut changes"),
     ("render", "r.bag -o out/x.json", "--json runs"),
     ("render", "r.bag -o out/x.csv", "--runs"),
+    ("figure", "r.bag", "--output out/x.svg"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--kind steps"),
+    ("figure", "r.bag -o out/x.svg", "--width 180mm"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--rows topics"),
+    ("figure", "r.bag --width 180mm --phases p.txt --kind steps -o out/x.svg", "--steps 2"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--text 9pt"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--phases p.txt"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--bare"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--start 20"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--end -20s"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--rate-change 5"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--ns-filter /ns/.*"),
+    ("figure", "r.bag --width 180mm --rows topics -o out/x.svg", "--topic-filter /ns/.*"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--roles"),
+    ("figure", "r.bag --width 180mm --kind map -o out/x.svg", "--topology t.csv"),
+    ("figure", "r.bag --width 180mm --kind map -o out/x.svg", "--infer stamps"),
     ("info", "r.bag", "--format json"),
     ("info", "r.bag", "--why /chat"),
     ("info", "r.bag", "--roles"),
@@ -82,6 +94,8 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("extract", "r.bag", "--output out/y.csv"),
     ("extract", "r.bag -o out/x.csv", "--format parquet"),
     ("extract", "r.bag -o out", "--fields"),
+    ("extract", "own.db3 --fields -o out", "--msg-path msgs"),
+    ("extract", "r.bag --fields -o out", "--nested"),
     ("extract", "r.bag -o out/x.csv", "--topic-filter /chat"),
     ("extract", "r.bag -o out/x.csv", "--start 20"),
     ("extract", "r.bag -o out/x.csv", "--end 20"),
@@ -124,6 +138,11 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("check", "r.bag --expect stamps.yaml", "--infer stamps"),
     ("check", "s.mcap --expect code.yaml", "--source ws"),
     ("check", "s.mcap --expect code.yaml --source ws", "--source-at worktree"),
+    ("follow", "r.bag", "--format ndjson"),
+    ("follow", "r.bag", "--expect all.yaml"),
+    ("follow", "r.bag", "--output out/x.json"),
+    ("follow", "r.bag -o out/x.json", "--period 7s"),
+    ("follow", "r.bag", "--keep 4s"),
     ("diff", "r.bag s.mcap", "--format json"),
     ("diff", "r.bag s.mcap", "--output out/x.json"),
     ("diff", "r.bag s.mcap -o out/x.svg", "--style dark"),
@@ -146,13 +165,16 @@ const SAYS: &[(&str, &str, &str, &str)] = &[
     ("info", "r.bag", "--verify", "a second reader counts the same"),
     ("events", "r.bag", "--verify", "a second reader counts the same"),
     ("events", "s.mcap", "--source ws", "has no times"),
-    ("events", "r.bag", "--period 7s", "the same for all"),
-    ("events", "r.bag", "--step 7s", "the same for all"),
-    ("events", "r.bag", "--align clock", "the same for all"),
-    ("events", "r.bag", "--skip-unchanged", "the same for all"),
-    ("events", "r.bag", "--grace 2", "the same for all"),
-    ("events", "r.bag", "--cut changes", "the same for all"),
-    ("render", "r.bag --figure lives -o out/x.svg", "--period 7s", "the same for all"),
+    ("events", "r.bag", "--period 7s", "does not depend on windows"),
+    ("events", "r.bag", "--step 7s", "does not depend on windows"),
+    ("events", "r.bag", "--align clock", "does not depend on windows"),
+    ("events", "r.bag", "--skip-unchanged", "does not depend on windows"),
+    ("events", "r.bag", "--grace 2", "does not depend on windows"),
+    ("events", "r.bag", "--cut changes", "does not depend on windows"),
+    ("render", "r.bag --figure lives -o out/x.svg", "--period 7s", "does not depend on windows"),
+    ("follow", "r.bag", "--serve 127.0.0.1:0", "the page is at http://127.0.0.1:"),
+    ("follow", "r.bag", "--idle 1ms", "nothing was written for"),
+    ("figure", "r.bag --width 180mm -o out/x.svg", "--verify", "a second reader counts the same"),
     ("tables", "r.bag -o kept", "--skip-existing", "1 there already"),
     ("tables", "gone.bag -o out", "--on-error fail", "error: cannot read `gone.bag`"),
 ];
@@ -183,55 +205,66 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("info", "r.bag --why /chat", "--format json", "cannot be used with"),
     ("info", "r.bag --why /chat", "--verify", "cannot be used with"),
     ("info", "bags", "--why /chat", "hint: name one of the bags"),
-    ("render", "r.bag -o out/x.json", "--style dark", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.dot", "--style dark", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.mmd", "--orientation TB", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.dot", "--layout layout-rs", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.csv", "--layout-from wide.json", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.md", "--size 300x200", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.json", "--fit none", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.json", "--expand /ns", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.json", "--width 88mm", "hint: pictures take it"),
-    ("render", "r.bag -o out/x.json", "--title Hello", "hint: pictures, reports"),
-    ("render", "r.bag -o out/x.html", "--bare", "hint: animations, pages, figures"),
-    ("render", "r.bag -o out/x.dot", "--captions c.txt", "hint: animations, pages"),
-    ("render", "r.bag -o out/x.json", "--mode nodes", "hint: data holds the whole graph"),
-    ("render", "r.bag -o out/x.gexf", "--hide none", "hint: data holds the whole graph"),
-    ("render", "r.bag -o out/x.csv", "--ns-filter /ns/.*", "hint: data holds the whole graph"),
-    ("render", "r.bag -o out/x.gif", "--filtered", "hint: data takes it"),
-    ("render", "r.bag -o out/x.pdf", "--frame-ms 500", "hint: animations take it"),
-    ("render", "r.bag -o out/x.svg", "--tween 2", "hint: animations take it"),
-    ("render", "r.bag -o out/x.html", "--hold-changes 2", "hint: animations take it"),
-    ("render", "r.bag -o out/x.gif", "--strip changes", "hint: pictures of the whole"),
-    ("render", "r.bag -o out/{n}.svg", "--strip changes", "hint: pictures of the whole"),
-    ("render", "r.bag -o out/x.svg", "--max-bytes 1MB", "hint: `x.gif` and"),
-    ("render", "r.bag -o out/x.svg", "--dot-profile plain", "hint: `x.dot` takes it"),
-    ("render", "r.bag -o out/x.gif", "--link a=https://b.c", "hint: reports take it"),
-    ("render", "r.bag -o out/x.gif", "--phases p.txt", "hint: figures and data"),
+    ("render", "r.bag -o out/x.json", "--style dark", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.dot", "--style dark", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.mmd", "--orientation TB", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.dot", "--layout layout-rs", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.csv", "--layout-from wide.json", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.md", "--size 300x200", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.json", "--fit none", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.json", "--expand /ns", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.json", "--width 88mm", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.json", "--title Hello", "hint: it applies to pictures, reports"),
+    ("render", "r.bag -o out/x.html", "--bare", "hint: it applies to animations, pages, figures"),
+    ("render", "r.bag -o out/x.dot", "--captions c.txt", "hint: it applies to pictures, pages"),
+    ("render", "r.bag -o out/x.json", "--mode nodes", "hint: data files contain the whole graph"),
+    ("render", "r.bag -o out/x.gexf", "--hide none", "hint: data files contain the whole graph"),
+    ("render", "r.bag -o out/x.csv", "--ns-filter /ns/.*", "hint: data files contain the whole graph"),
+    ("render", "r.bag -o out/x.gif", "--filtered", "hint: it applies to data"),
+    ("render", "r.bag -o out/x.pdf", "--frame-ms 500", "hint: it applies to animations"),
+    ("render", "r.bag -o out/x.svg", "--tween 2", "hint: it applies to animations"),
+    ("render", "r.bag -o out/x.html", "--hold-changes 2", "hint: it applies to animations"),
+    ("render", "r.bag -o out/x.gif", "--strip changes", "hint: it applies to pictures of the whole"),
+    ("render", "r.bag -o out/{n}.svg", "--strip changes", "hint: it applies to pictures of the whole"),
+    ("render", "r.bag -o out/x.svg", "--max-bytes 1MB", "hint: it applies to `x.gif` and"),
+    ("render", "r.bag -o out/x.svg", "--dot-profile plain", "hint: it applies to `x.dot`"),
+    ("render", "r.bag -o out/x.gif", "--link a=https://b.c", "hint: it applies to reports"),
+    ("render", "r.bag -o out/x.dot", "--phases p.txt", "hint: it applies to pictures, pages"),
+    ("render", "r.bag -o out/x.svg --strip changes", "--style dark", "hint: `--strip 3x2`"),
     ("render", "r.bag -o out/x.gif", "--source-at HEAD", "--source <DIR>"),
+    ("extract", "r.bag -o out/x.parquet", "--nested", "--fields"),
+    ("extract", "r.bag --fields --format csv -o out", "--nested", "write Parquet"),
+    ("extract", "own.db3 -o out/x.csv", "--msg-path msgs", "--fields"),
+    ("extract", "own.db3 --fields -o out", "--msg-path bags", "holds no `.msg` file"),
     ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
     ("tables", "r.bag -o out/t", "--shard 0/3", "`1/8` to `8/8`"),
-    ("diff", "r.bag s.mcap", "--style dark", "hint: pictures take it"),
-    ("diff", "r.bag s.mcap", "--size 300x200", "hint: pictures take it"),
-    ("diff", "r.bag s.mcap", "--source ws", "hint: a picture shows the rest"),
-    ("diff", "r.bag s.mcap", "--infer stamps", "hint: a picture shows the rest"),
-    ("diff", "r.bag s.mcap --source ws -o out/x.svg", "--infer source", "never judged"),
+    ("diff", "r.bag s.mcap", "--style dark", "hint: it applies to pictures"),
+    ("diff", "r.bag s.mcap", "--size 300x200", "hint: it applies to pictures"),
+    ("diff", "r.bag s.mcap", "--source ws", "hint: add a picture"),
+    ("diff", "r.bag s.mcap", "--infer stamps", "hint: add a picture"),
+    ("diff", "r.bag s.mcap --source ws -o out/x.svg", "--infer source", "never checked"),
     ("diff", "r.bag s.mcap", "--source-at HEAD", "--source <DIR>"),
     ("diff", "r.bag old.json", "--start 9", "hint: give the bag itself"),
     ("diff", "r.bag all.yaml", "--rate-change 3", "hint: give two missions"),
     ("baseline", "r.bag", "--only /chat", "--update <FILE>"),
     ("baseline", "r.bag --update few.yaml", "--only /chats", "the nearest is `/chat`"),
-    ("baseline", "r.bag", "--source ws", "hint: give it to `check`"),
-    ("baseline", "r.bag", "--infer stamps", "hint: give it to `check`"),
-    ("baseline", "r.bag --source ws", "--source-at HEAD", "hint: give it to `check`"),
+    ("baseline", "r.bag", "--source ws", "hint: use it with `check`"),
+    ("baseline", "r.bag", "--infer stamps", "hint: use it with `check`"),
+    ("baseline", "r.bag --source ws", "--source-at HEAD", "hint: use it with `check`"),
     ("baseline", "old.json", "--period 9", "hint: give the bag itself"),
-    ("check", "r.bag --source ws --expect all.yaml", "--infer source", "never judged"),
-    ("check", "r.bag --expect all.yaml", "--link a=https://b.c", "hint: Markdown takes it"),
+    ("check", "r.bag --source ws --expect all.yaml", "--infer source", "never checked"),
+    ("check", "r.bag --expect all.yaml", "--link a=https://b.c", "hint: it applies to Markdown"),
+    ("follow", "r.bag", "--bind", "--serve <ADDRESS:PORT>"),
+    ("follow", "r.bag", "--serve 0.0.0.0:0", "hint: serve at 127.0.0.1"),
     ("check", "old.json --expect all.yaml", "--end 9", "hint: give the bag itself"),
     ("check", "r.bag --expect all.yaml", "--explain topic-gap", "cannot be used with"),
-    ("render", "r.bag -o out/x.svg", "--rows nodes", "--figure"),
-    ("render", "r.bag -o out/x.svg", "--steps 2", "--figure"),
-    ("render", "r.bag -o out/x.svg", "--text 9pt", "--figure"),
+    ("figure", "r.bag -o out/x.svg", "--font c.txt", "hint: give `--font` a .ttf"),
+    ("figure", "r.bag -o out/x.json", "--width 88mm", "hint: figures are `.pdf`"),
+    ("figure", "r.bag -o out/{n}.svg", "--width 88mm", "hint: figures are `.pdf`"),
+    ("figure", "r.bag -o out/x.svg", "--steps 2", "hint: it chooses the panels"),
+    ("figure", "r.bag -o out/x.svg", "--source-at HEAD", "--source <DIR>"),
+    ("figure", "old.json -o out/x.svg", "--start 9", "hint: give the bag itself"),
+    ("figure", "old.json -o out/x.svg", "--source ws", "hint: give the bag itself"),
 ];
 
 /// Half a minute in which something happens for every option: a rate that falls, a sender that stops, one that comes
@@ -354,7 +387,12 @@ fn folder() -> TempDir {
     );
     put("c.txt", b"0|here it begins\n");
     put("list.txt", b"bags/a.bag\n");
-    put("p.txt", b"0:00 first\n0:05 second\n0:12 third\n");
+    put("p.txt", b"0:00 first\n0:11 second\n0:16 third\n");
+    put("msgs/my_msgs/msg/Thing.msg", b"string data # words\n");
+    let mut own = Recording::default();
+    let thing = own.publisher("", "/thing", "my_msgs/msg/Thing");
+    own.send(thing, (0, 1000), 100, b"\0\x01\0\0\x03\0\0\0hi\0");
+    sqlite3::write(&own, &folder.path().join("own.db3"));
     let topics = [("/out_late", source::STRING), ("/in", source::STRING)];
     put("s.mcap", &source::bag(&topics, &["/talker_late"]));
     let (package, xml) = source::PACKAGE;
@@ -471,6 +509,11 @@ fn every_option_of_render_changes_something() {
 }
 
 #[test]
+fn every_option_of_figure_changes_something() {
+    changes("figure");
+}
+
+#[test]
 fn every_option_of_info_changes_something() {
     changes("info");
 }
@@ -498,6 +541,11 @@ fn every_option_of_baseline_changes_something() {
 #[test]
 fn every_option_of_diff_changes_something() {
     changes("diff");
+}
+
+#[test]
+fn every_option_of_follow_changes_something() {
+    changes("follow");
 }
 
 #[test]
@@ -549,9 +597,9 @@ fn listed(command: &str) -> BTreeSet<String> {
         let end = long.find(|c: char| c != '-' && !c.is_ascii_lowercase());
         Some(long[..end.unwrap_or(long.len())].to_owned())
     });
-    // These two belong to the command line itself.
+    // These belong to the command line itself.
     options
-        .filter(|o| !["help", "version", "quiet"].contains(&o.as_str()))
+        .filter(|o| !["help", "version", "quiet", "verbose", "color"].contains(&o.as_str()))
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use bagreel::internals::evidence::Degree;
 use bagreel::internals::graph::diff::{apply, diff};
-use bagreel::internals::graph::{EdgeState, Graph, NodeState, State, TopicState};
+use bagreel::internals::graph::{EdgeState, Graph, Measures, NodeState, State, TopicState};
 use std::collections::BTreeSet;
 
 use bagreel::values::{Element, Kind, Length, Period};
@@ -32,6 +32,8 @@ fn edges() -> impl Strategy<Value = Vec<EdgeState>> {
                 degree,
                 count,
                 hz: count.map(|n| n as f64 / 10.0),
+                bytes: None,
+                measures: Measures::default(),
             });
         made.collect()
     })
@@ -62,6 +64,7 @@ fn graph() -> impl Strategy<Value = Graph> {
                 hz: Some(count as f64 / 10.0),
                 median_period_s: None,
                 max_gap_s: None,
+                measures: Measures::default(),
             })
             .collect(),
         publishes,

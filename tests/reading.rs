@@ -466,7 +466,7 @@ fn what_is_no_bag_is_named_with_a_way_out() {
         Ok(InputKind::Json)
     ));
     assert!(matches!(
-        bag::sniff(&Input::Path(dir.path().to_owned())),
+        read(dir.path(), Want::Stamps),
         Err(Error::UnknownBag { .. })
     ));
 }

@@ -677,7 +677,7 @@ fn what_cannot_apply_is_refused() {
             &["info", "run.mcap", "--infer", "source"],
             "`--infer source` has no source code",
         ),
-        (&["info", "x.json", "--source", "ws"], "is an evolution"),
+        (&["info", "x.json", "--source", "ws"], "is a mission's JSON"),
     ] {
         let output = bagreel(folder.path(), words);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

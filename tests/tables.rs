@@ -78,7 +78,7 @@ fn topics_and_times_choose_rows_with_their_sizes() {
         &["extract", WAREHOUSE, "-o", "x.csv", "--start", "1h"],
         2,
     );
-    assert!(said.contains("leave nothing"), "{said}");
+    assert!(said.contains("select nothing"), "{said}");
     assert!(!dir.path().join("x.csv").exists());
     // A name that is mistyped is told.
     let nothing = [
@@ -90,7 +90,7 @@ fn topics_and_times_choose_rows_with_their_sizes() {
         "/robot1/odm",
     ];
     let said = ends(dir.path(), &nothing, 0);
-    assert!(said.contains("a topic that `/robot1/odm` takes"), "{said}");
+    assert!(said.contains("matches `/robot1/odm`"), "{said}");
 }
 
 #[test]
@@ -117,12 +117,7 @@ fn every_field_has_a_column() {
     let head: Vec<&str> = scan[0].iter().map(String::as_str).collect();
     assert_eq!(
         &head[..4],
-        [
-            "time_ns",
-            "header.stamp.sec",
-            "header.stamp.nanosec",
-            "header.frame_id"
-        ]
+        ["time_ns", "publisher", "header.stamp", "header.frame_id"]
     );
     let ranges = head.iter().position(|c| *c == "ranges").unwrap();
     let ranges: Vec<f32> = serde_json::from_str(&scan[1][ranges]).unwrap();
@@ -131,12 +126,30 @@ fn every_field_has_a_column() {
     assert_eq!(frame, "laser");
     // As many rows as messages, and nothing beside the tables.
     ends(dir.path(), &["extract", COURIER, "-o", "m.csv"], 0);
-    let files: Vec<_> = fs::read_dir(dir.path().join("t"))
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
-    let rows: usize = files.iter().map(|path| csv(path).len() - 1).sum();
+    let index = csv(&dir.path().join("t/index.csv"));
+    assert_eq!(index[0], ["topic", "type", "file", "n"]);
+    let is_scan = |row: &&Vec<String>| row[0] == "/scan";
+    let scans = index.iter().find(is_scan).unwrap();
+    assert_eq!(scans[1..3], ["sensor_msgs/msg/LaserScan", "scan.csv"]);
+    let rows = index[1..].iter().map(|row| {
+        let rows = csv(&dir.path().join("t").join(&row[2])).len() - 1;
+        assert_eq!(row[3], rows.to_string());
+        rows
+    });
+    let rows: usize = rows.sum();
     assert_eq!(rows, csv(&dir.path().join("m.csv")).len() - 1);
+    let files = fs::read_dir(dir.path().join("t")).unwrap().count();
+    assert_eq!(files, index.len(), "a table each, and the index");
+    // A stamp is near the log time, in the same unit; who publishes stands in a bag of ROS 1.
+    let number = |text: &String| text.parse::<i64>().unwrap();
+    assert!((number(&scan[1][2]) - number(&scan[1][0])).abs() < 1_000_000_000);
+    let args = [
+        "extract", WAREHOUSE, "-o", "w", "--fields", "--format", "csv",
+    ];
+    let odometry = [&args[..], &["--topic-filter", "/robot1/odom"]].concat();
+    ends(dir.path(), &odometry, 0);
+    let rows = csv(&dir.path().join("w/robot1.odom.csv"));
+    assert!(rows[1][1].starts_with("/robot1/"), "{:?}", rows[1]);
 }
 
 #[test]
@@ -167,12 +180,56 @@ fn what_cannot_be_decoded_is_said() {
     );
     assert!(
         said.contains(
-            "messages of `/known` (std_msgs/String) were left out: they do not have the layout"
+            "messages of `/known` (std_msgs/String) were left out: they do not match its definition"
         ),
         "{said}"
     );
     assert_eq!(csv(&dir.path().join("t/known.csv")).len(), 10 + 1);
     assert!(!dir.path().join("t/unknown.csv").exists());
+}
+
+#[test]
+fn recordings_without_definitions_have_tables_of_common_types_and_of_known_ones() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut bag = crate::support::Recording::default();
+    let known = bag.publisher("", "/point", "geometry_msgs/msg/Point");
+    let numbers = [1.5_f64, 2.5, -3.5].map(f64::to_le_bytes).concat();
+    bag.send(
+        known,
+        (0, 1000),
+        100,
+        &[b"\0\x01\0\0", &numbers[..]].concat(),
+    );
+    let own = bag.publisher("", "/thing", "my_msgs/msg/Thing");
+    bag.send(own, (0, 1000), 100, b"\0\x01\0\0\x03\0\0\0hi\0");
+    crate::support::sqlite3::write(&bag, &dir.path().join("a.db3"));
+    let args = ["extract", "a.db3", "-o", "t", "--fields", "--format", "csv"];
+    let said = ends(dir.path(), &args, 3);
+    assert!(said.contains("holds no definition of its type"), "{said}");
+    let point = csv(&dir.path().join("t/point.csv"));
+    assert_eq!(point.len(), 11);
+    assert!(point[1].ends_with(&["1.5", "2.5", "-3.5"].map(str::to_owned)));
+    // Nothing at all is an error that names what is missing, and leaves no folder.
+    let only = [
+        &args[..3],
+        &["new/er", "--fields", "--topic-filter", "/thing"],
+    ]
+    .concat();
+    let said = ends(dir.path(), &only, 1);
+    assert!(
+        said.contains("my_msgs/msg/Thing") && said.contains("--msg-path"),
+        "{said}"
+    );
+    assert!(!dir.path().join("new").exists());
+    fs::create_dir_all(dir.path().join("ws/my_msgs/msg")).unwrap();
+    fs::write(dir.path().join("ws/my_msgs/msg/Thing.msg"), "string data\n").unwrap();
+    let defined = [&only[..], &["--format", "csv", "--msg-path", "ws"]].concat();
+    ends(dir.path(), &defined, 0);
+    let thing = csv(&dir.path().join("new/er/thing.csv"));
+    assert_eq!(thing[1].last().unwrap(), "hi");
+    let none = [&args[..], &["--topic-filter", "/nothing"]].concat();
+    let said = ends(dir.path(), &none, 1);
+    assert!(said.contains("holds no messages"), "{said}");
 }
 
 #[test]
@@ -184,7 +241,7 @@ fn what_makes_no_sense_is_refused() {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     };
     refused(&["-o", "x.gif"], "`gif` is not a format of tables");
-    refused(&["-o", "x"], "does not say its format");
+    refused(&["-o", "x"], "has no known extension");
     refused(&["-o", "-", "--fields"], "standard output is one");
     refused(&["-o", "{n}.csv"], "a file per window");
     refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
@@ -393,12 +450,22 @@ mod parquet {
             let column = columns.iter().find(|c| c.path().string() == path).unwrap();
             (column.physical_type(), column.max_rep_level())
         };
-        assert_eq!(kind("t/scan.parquet", "header.stamp.sec"), (Type::INT32, 0));
+        assert_eq!(kind("t/scan.parquet", "header.stamp"), (Type::INT64, 0));
         assert_eq!(kind("t/scan.parquet", "range_max"), (Type::FLOAT, 0));
         let ranges = "ranges.list.element";
         assert_eq!(kind("t/scan.parquet", ranges), (Type::FLOAT, 1));
         let x = "transforms.transform.translation.x.list.element";
         assert_eq!(kind("t/tf.parquet", x), (Type::DOUBLE, 1));
+        let nested = ["extract", COURIER, "-o", "n", "--fields", "--nested"];
+        ends(dir.path(), &nested, 0);
+        let x = "transforms.list.element.transform.translation.x";
+        assert_eq!(kind("n/tf.parquet", x), (Type::DOUBLE, 1));
+        assert_eq!(kind("n/scan.parquet", ranges), (Type::FLOAT, 1));
+        let [flat, nested] = ["t", "n"].map(|folder| {
+            let rows = parquet_rows(&dir.path().join(folder).join("tf.parquet"));
+            format!("{:?}", rows[0]).matches("Double(").count()
+        });
+        assert!(flat == nested && flat > 0, "the same values");
         let row = parquet_rows(&dir.path().join("t/scan.parquet")).remove(0);
         let list = row.get_column_iter().find(|(name, _)| *name == "ranges");
         assert!(matches!(list, Some((_, Field::ListInternal(list))) if list.len() > 1));

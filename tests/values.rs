@@ -228,7 +228,7 @@ fn captions_that_cannot_be_are_refused() {
         ],
         b"",
     );
-    assert!(!is_done && error.contains("is an evolution"), "{error}");
+    assert!(!is_done && error.contains("is a mission's JSON"), "{error}");
 }
 
 /// The windows of a mission that is cut, in seconds after its start.

@@ -7,7 +7,7 @@ bag=../warehouse.bag
 # A column is 88 mm wide, the page 180 mm: what --width says is included without scaling, so that 6 pt stay 6 pt.
 # With --bare the legend stands in the caption, which the .tex beside the .pdf holds.
 for figure in lives:88mm map:88mm steps:180mm; do
-    "$bagreel" render "$bag" --figure "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
+    "$bagreel" figure "$bag" --kind "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
         -o "${figure%%:*}.pdf" -o "${figure%%:*}.tex"
 done
 # Twice, for the references.

@@ -1,7 +1,8 @@
 """See how a robot's software reconfigures during a mission, straight from its bag files.
 
-`tables` counts one bag by its index, wherever it lies; `merge` and `finish` make a mission of what was counted. `read`
-reads bags into a mission at once, `render` draws one. Tables are Arrow: pyarrow, pandas, polars and DuckDB take them
+`show` plays a mission in a notebook, `read` reads bags into a `Mission`, `render` draws it. `baseline`, `check` and `diff` judge
+missions, `events` lists what happened, `extract` writes messages as tables. `tables` counts one bag by its index, wherever it
+lies; `merge` and `finish` make a mission of what was counted. Tables are Arrow: pyarrow, pandas, polars and DuckDB take them
 without copying.
 """
 
@@ -9,47 +10,79 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
+import tempfile
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
 
-from . import _bagreel
-from ._bagreel import BagreelError, Mission, StoreError, Table
+from . import _bagreel, _results
+from ._bagreel import BagreelError, Mission, StoreError, Table, __version__
+from ._command import Bags, Paths, given, run, texts
+from ._results import Check, Diff, Rendered, Shown
 
 __all__ = [
     "BagreelError",
+    "Check",
+    "Diff",
     "Mission",
+    "Rendered",
+    "Shown",
     "StoreError",
     "Table",
+    "__version__",
+    "baseline",
+    "check",
+    "diff",
+    "events",
+    "extract",
+    "figure",
     "finish",
     "merge",
     "plan",
     "read",
     "render",
+    "show",
     "tables",
     "to_dict",
 ]
 
-_Paths = str | os.PathLike | Iterable[str | os.PathLike]
+
+def plan(
+    sources: Paths, *, period: str = "10s", align: Literal["clock", "bag"] = "clock", mission: str | None = None
+) -> list[dict[str, Any]]:
+    """Lists the bags of paths, folders, URLs and prefixes of stores (which end in a slash).
+
+    Each is a dict of `uri`, `mission` and `origin_ns`, sorted by mission. `mission` is a regular expression whose first
+    group, or whole match, in the path or URL names the mission.
+    """
+    return _bagreel.plan(texts(sources), period=period, align=align, mission=mission)
 
 
-def _texts(paths: _Paths) -> list[str]:
-    if isinstance(paths, (str, os.PathLike)):
-        paths = [paths]
-    return [os.fspath(path) for path in paths]
+def tables(
+    uri: str | os.PathLike[str],
+    *,
+    period: str = "10s",
+    align: Literal["clock", "bag"] = "clock",
+    mission: str | None = None,
+    origin_ns: int | None = None,
+    tier: Literal["auto", "index", "chunks"] = "auto",
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> dict[str, Table]:
+    """Counts one bag by its index: the tables `counts` (a row per publisher, topic and window) and `bags` (one row).
+
+    A bag that cannot be read has its row in `bags` with an `error`. Only part of the bag's time is counted with
+    `start_ns` and `end_ns` (half-open); `merge` makes the whole of such parts. `mission` is the mission's name;
+    `origin_ns` a moment at which windows begin, as `plan` gives it.
+
+    Raises:
+        StoreError: the store refused or could not be reached; trying again may help.
+        ValueError: an option makes no sense, or `uri` is not one bag.
+    """
+    return _bagreel.tables(os.fspath(uri), **given(locals(), "uri"))
 
 
-def plan(sources: _Paths, *, period="10s", align="clock", mission=None) -> list[dict]:
-    """Lists the bags of paths, folders, URLs and prefixes of stores: `uri`, `mission` and `origin_ns` of each."""
-    return _bagreel.plan(_texts(sources), period=period, align=align, mission=mission)
-
-
-def tables(uri: str | os.PathLike, **options) -> dict[str, Table]:
-    """Counts one bag, or a part of its time: the tables `counts` and `bags`. See the stub for the options."""
-    return _bagreel.tables(os.fspath(uri), **options)
-
-
-def _batches(counts) -> list[Table]:
+def _batches(counts: Any) -> list[Table]:
     """The record batches of a table, or of several."""
     if isinstance(counts, Table):
         return [counts]
@@ -62,45 +95,279 @@ def _batches(counts) -> list[Table]:
     return [batch for one in counts for batch in _batches(one)]
 
 
-def merge(counts) -> Table:
-    """Makes one table `counts` of those of all parts of one or more bags, in any order."""
+def merge(counts: Any) -> Table:
+    """Makes one table `counts` of those of all parts of one or more bags, in any order.
+
+    `counts` is an Arrow table or record batch (of any library), or any number of them. Exact for parts that do not
+    overlap in time.
+    """
     return _bagreel.merge(_batches(counts))
 
 
-def finish(counts) -> Mission:
-    """Makes the mission that the counts of its bags tell of: states, rates, what changed from window to window."""
+def finish(counts: Any) -> Mission:
+    """Makes the mission that the counts of its bags tell of: states, rates, what changed from window to window.
+
+    Raises:
+        ValueError: the counts are of several missions, or of none.
+    """
     return _bagreel.finish(_batches(counts))
 
 
-def read(uris: _Paths, *, period: str | None = None, align: str = "bag") -> Mission:
-    """Reads bags, or a mission's own JSON, as one mission."""
-    return _bagreel.read(_texts(uris), period=period, align=align)
+def read(uris: Paths, *, period: str | None = None, align: Literal["clock", "bag"] = "bag") -> Mission:
+    """Reads bags, or a mission's own JSON, as one mission, with all evidence that payloads hold."""
+    return _bagreel.read(texts(uris), period=period, align=align)
 
 
-def to_dict(mission: Mission) -> dict:
+def to_dict(mission: Mission) -> dict[str, Any]:
     """The mission as `render -o x.json` writes it: `windows`, `ledger`, `phases` and more."""
     return json.loads(mission.to_json())
 
 
-def render(bags: _Paths, outputs: _Paths, **options) -> None:
-    """Draws and writes outputs, as `bagreel render` does.
-
-    Options are those of the command: `period="10s"`, `figure="lives"`, `skip_unchanged=True`, a list for one that may
-    be repeated. It runs in a process of its own, which Ctrl-C ends like any other. Raises `BagreelError` with what the
-    command said.
+def render(
+    bags: Bags,
+    outputs: Paths,
+    *,
+    verify: bool = False,
+    format: str | None = None,  # noqa: A002
+    period: str | None = None,
+    step: str | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    align: str | None = None,
+    skip_unchanged: bool = False,
+    cut: str | None = None,
+    rate_change: float | None = None,
+    grace: int | None = None,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+    source: str | os.PathLike[str] | None = None,
+    source_at: str | None = None,
+    infer: str | None = None,
+    bytes: bool = False,
+    view: str | None = None,
+    mode: str | None = None,
+    ns_filter: str | None = None,
+    topic_filter: str | None = None,
+    hide: str | None = None,
+    group: str | None = None,
+    collapse: Iterable[str] = (),
+    expand: Iterable[str] = (),
+    show_recorder: bool = False,
+    rqt_defaults: bool = False,
+    filtered: bool = False,
+    style: str | os.PathLike[str] | None = None,
+    size: str | None = None,
+    for_: str | None = None,
+    width: str | None = None,
+    fit: str | None = None,
+    orientation: str | None = None,
+    layout: str | None = None,
+    layout_from: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+    bare: bool = False,
+    captions: str | os.PathLike[str] | None = None,
+    font: str | os.PathLike[str] | None = None,
+    frame_ms: int | None = None,
+    tween: int | None = None,
+    hold_changes: int | None = None,
+    strip: str | None = None,
+    max_bytes: str | None = None,
+    poster: str | os.PathLike[str] | None = None,
+    json: str | None = None,
+    runs: bool = False,
+    dot_profile: str | None = None,
+    link: Iterable[str] = (),
+    phases: str | os.PathLike[str] | None = None,
+) -> Rendered:
+    """Draws and writes outputs, as `bagreel render` does; the options are those of the command, a list where one may be
+    repeated. Returns the files, of which a notebook shows the first. Raises `BagreelError` with what the command said.
     """
-    command = [sys.executable, "-m", "bagreel", "--quiet", "render", *_texts(bags)]
-    for output in _texts(outputs):
-        command += ["--output", output]
-    for name, value in options.items():
-        option = "--" + name.rstrip("_").replace("_", "-")
-        values = value if isinstance(value, (list, tuple)) else [value]
-        for one in values:
-            if one is True:
-                command.append(option)
-            elif one is not False and one is not None:
-                command.append(f"{option}={os.fspath(one) if isinstance(one, os.PathLike) else one}")
-    done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
-    # 3: done, but the bag is damaged.
-    if done.returncode not in (0, 3):
-        raise BagreelError(done.stderr.strip() or f"the command ended with {done.returncode}")
+    topology, collapse, expand, link = list(topology), list(collapse), list(expand), list(link)
+    options = given(locals(), "bags", "outputs")
+    outputs = texts(outputs)
+    run("render", bags, output=outputs, **options)
+    return Rendered([path for output in outputs for path in _files(Path(output))])
+
+
+def figure(
+    bags: Bags,
+    outputs: Paths,
+    *,
+    kind: Literal["lives", "map", "steps"] = "lives",
+    width: str | None = None,
+    rows: str | None = None,
+    steps: str | None = None,
+    text: str | None = None,
+    phases: str | os.PathLike[str] | None = None,
+    bare: bool = False,
+    font: str | os.PathLike[str] | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    rate_change: float | None = None,
+    ns_filter: str | None = None,
+    topic_filter: str | None = None,
+    verify: bool = False,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+    source: str | os.PathLike[str] | None = None,
+    source_at: str | None = None,
+    infer: str | None = None,
+) -> Rendered:
+    """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of who talks to whom, or the
+    reconfigurations one by one, as wide as `width` says (88mm).
+    """
+    topology = list(topology)
+    options = given(locals(), "bags", "outputs")
+    outputs = texts(outputs)
+    run("figure", bags, output=outputs, **options)
+    return Rendered([path for output in outputs for path in _files(Path(output))])
+
+
+def _files(output: Path) -> list[Path]:
+    """The files that the command writes for an output."""
+    if "{n}" in output.name:
+        return sorted(output.parent.glob(output.name.replace("{n}", "[0-9]*")))
+    if output.suffix in (".csv", ".parquet"):
+        return sorted(output.parent.glob(f"{output.stem}.*{output.suffix}"))
+    return [output]
+
+
+def show(
+    bags: Bags,
+    *,
+    height: int = 640,
+    period: str | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    view: str | None = None,
+    style: str | None = None,
+    ns_filter: str | None = None,
+    topic_filter: str | None = None,
+    collapse: Iterable[str] = (),
+) -> Shown:
+    """A player of bags, or of a mission, for a notebook; `height` is in pixels.
+
+    Where a viewer removes pages inside pages, as some do that show notebooks of others, a still picture of the whole
+    mission stays.
+    """
+    collapse = list(collapse)
+    options = given(locals(), "bags", "height")
+    with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
+        page, still = Path(folder) / "player.html", Path(folder) / "still.svg"
+        run("render", bags, output=page, **options)
+        once = {} if isinstance(bags, Mission) else {"period": "all"}
+        run("render", bags, output=still, **(options | once))
+        text = page.read_text(encoding="utf-8")
+        return Shown(_results.player(text, _results.image(still), height))
+
+
+def events(
+    bags: Bags,
+    *,
+    rate_change: float | None = None,
+    parts: bool = False,
+    all: bool = False,  # noqa: A002
+    start: str | None = None,
+    end: str | None = None,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+    infer: str | None = None,
+) -> list[dict[str, Any]]:
+    """What started, stopped, restarted, changed rate or hands, and when, in order of time; a dict each.
+
+    `parts` adds what each entry consists of, `all` housekeeping and the recorder.
+    """
+    topology = list(topology)
+    _, text = run("events", bags, format="ndjson", **given(locals(), "bags"))
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def baseline(
+    bags: Paths,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    period: str | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+) -> str:
+    """The expectation that holds in all of these healthy runs, a bag each, as YAML; also written to `output`, if given."""
+    topology = list(topology)
+    _, text = run("baseline", bags, output="-", **given(locals(), "bags", "output"))
+    if output is not None:
+        Path(output).write_text(text, encoding="utf-8")
+    return text
+
+
+def check(
+    bags: Bags,
+    expect: str | os.PathLike[str],
+    *,
+    undecidable: Literal["allow", "error"] = "allow",
+    period: str | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+    source: str | os.PathLike[str] | None = None,
+    infer: str | None = None,
+    link: Iterable[str] = (),
+) -> Check:
+    """Checks a mission against an expectation: `assert bagreel.check("run.bag", "graph.yaml").ok`.
+
+    Raises `BagreelError` where the bag or the expectation cannot be read.
+    """
+    topology, link = list(topology), list(link)
+    options = given(locals(), "bags")
+    with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
+        text, markdown = Path(folder) / "check.txt", Path(folder) / "check.md"
+        code, data = run("check", bags, fine=(0, 1, 2, 3), format="json", output=[text, markdown], **options)
+        return Check(code in (0, 3), json.loads(data), *(_text(path) for path in (text, markdown)))
+
+
+def diff(
+    first: Bags,
+    second: Bags,
+    outputs: Paths = (),
+    *,
+    rate_change: float | None = None,
+    start: str | None = None,
+    end: str | None = None,
+    roles: bool = False,
+    topology: Iterable[str | os.PathLike[str]] = (),
+) -> Diff:
+    """What differs between two missions; `outputs` are reports and pictures of it to write, as `bagreel diff -o` does."""
+    topology = list(topology)
+    options = given(locals(), "first", "second", "outputs")
+    with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
+        text, markdown = Path(folder) / "diff.txt", Path(folder) / "diff.md"
+        output = [text, markdown, *texts(outputs)]
+        code, data = run("diff", first, second, fine=(0, 1, 3), format="json", output=output, **options)
+        differences = json.loads(data)["differences"]
+        return Diff(code != 1, differences, *(_text(path) for path in (text, markdown)))
+
+
+def extract(
+    bags: Paths,
+    output: str | os.PathLike[str],
+    *,
+    format: str | None = None,  # noqa: A002
+    fields: bool = False,
+    nested: bool = False,
+    msg_path: Iterable[str | os.PathLike[str]] = (),
+    topic_filter: str | None = None,
+    start: str | None = None,
+    end: str | None = None,
+) -> Path:
+    """Writes a table with a row per message, or with `fields` a folder with a table per topic; returns its path.
+
+    In a folder the table `index` says which file holds which topic.
+    """
+    msg_path = list(msg_path)
+    run("extract", bags, **given(locals(), "bags"))
+    return Path(output)
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")

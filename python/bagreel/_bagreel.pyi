@@ -9,6 +9,8 @@ class BagreelError(RuntimeError):
 class StoreError(BagreelError):
     """A store refused, or could not be reached: trying again may help."""
 
+__version__: str
+
 @final
 class Table:
     """An Arrow record batch, by the PyCapsule interface."""
@@ -34,6 +36,28 @@ class Mission:
     def tables(self) -> dict[str, Table]:
         """By name: edges, topics, nodes, changes, ledger, phases, bags."""
     def to_json(self) -> str: ...
+    @property
+    def nodes(self) -> list[str]:
+        """The names of its nodes, sorted."""
+    @property
+    def topics(self) -> list[str]:
+        """The names of its topics, sorted."""
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened, in order of time: `kind`, `what`, `name`, `time_ns` and more."""
+    @property
+    def windows(self) -> list[dict[str, Any]]:
+        """Its windows: `index`, `start_ns`, `end_ns`, `partial`, `messages`, `changes`."""
+    @property
+    def duration(self) -> float:
+        """From its first message to its last, in seconds."""
+    @property
+    def messages(self) -> int:
+        """The number of its messages."""
+    @property
+    def bags(self) -> list[str]:
+        """The names of its bags."""
+    def _repr_html_(self) -> str: ...
     def __len__(self) -> int:
         """Windows."""
 

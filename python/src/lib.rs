@@ -5,6 +5,7 @@ mod table;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 
+use bagreel::commands::{LogFormat, LogOptions, log};
 use bagreel::fleet::arrow::{bags_batch, counts_batch, counts_of, mission_batches};
 use bagreel::fleet::{self, CountDetail, PlannedBag, Planning, Tally};
 use bagreel::values::{Align, Length, Period, Span, Stamp};
@@ -233,6 +234,77 @@ impl Mission {
         String::from_utf8(text).map_err(|e| BagreelError::new_err(e.to_string()))
     }
 
+    /// The names of its nodes, sorted.
+    #[getter]
+    fn nodes(&self) -> Vec<&str> {
+        self.0
+            .elements
+            .nodes
+            .iter()
+            .map(|n| n.name.as_str())
+            .collect()
+    }
+
+    /// The names of its topics, sorted.
+    #[getter]
+    fn topics(&self) -> Vec<&str> {
+        self.0
+            .elements
+            .topics
+            .iter()
+            .map(|t| t.name.as_str())
+            .collect()
+    }
+
+    /// What happened, in order of time, as `bagreel events --format ndjson` prints it.
+    #[getter]
+    fn events<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let text = py.detach(|| log(&self.0, LogFormat::Ndjson, LogOptions::default()));
+        let json = py.import("json")?;
+        let lines = text.lines().map(|line| json.call_method1("loads", (line,)));
+        lines.collect()
+    }
+
+    /// Its windows, a dict each: `index`, `start_ns`, `end_ns`, `partial`, `messages`, `changes`.
+    #[getter]
+    fn windows<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let windows = self.0.windows.iter().map(|window| {
+            let row = PyDict::new(py);
+            row.set_item("index", window.index)?;
+            row.set_item("start_ns", window.span.start.0)?;
+            row.set_item("end_ns", window.span.end.0)?;
+            row.set_item("partial", window.partial)?;
+            row.set_item("messages", window.messages)?;
+            row.set_item("changes", window.changes.len())?;
+            Ok(row)
+        });
+        windows.collect()
+    }
+
+    /// From its first message to its last, in seconds.
+    #[getter]
+    fn duration(&self) -> f64 {
+        self.0.span.nanos() as f64 / 1e9
+    }
+
+    /// The number of its messages.
+    #[getter]
+    fn messages(&self) -> u64 {
+        self.0.messages
+    }
+
+    /// The names of its bags.
+    #[getter]
+    fn bags(&self) -> Vec<&str> {
+        self.0.bags.iter().map(|bag| bag.name.as_str()).collect()
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py()
+            .import("bagreel._summary")?
+            .call_method1("html", (slf,))
+    }
+
     /// Windows.
     fn __len__(&self) -> usize {
         self.0.windows.len()
@@ -247,6 +319,9 @@ impl Mission {
 /// The native part of the package `bagreel`.
 #[pymodule]
 mod _bagreel {
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "its name in Python")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
     #[pymodule_export]
     use super::{
         BagreelError, Mission, StoreError, Table, finish, main, merge, plan, read, tables,

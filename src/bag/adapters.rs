@@ -5,6 +5,7 @@ use std::thread;
 
 use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::notice::Notice;
+use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
 /// A sink that lets through only messages inside a range, and notes whether anything was lost.
@@ -29,6 +30,10 @@ impl<'a> Clip<'a> {
 impl Sink for Clip<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         self.sink.connection(connection)
+    }
+
+    fn part(&mut self) {
+        self.sink.part();
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -68,6 +73,12 @@ impl Sink for Clip<'_> {
     }
 }
 
+/// The bytes of `whole` that `done` of `total` equal parts stand for.
+pub(crate) fn share(done: usize, total: usize, whole: u64) -> u64 {
+    let bytes = u128::from(whole) * done as u128 / (total as u128).max(1);
+    u64::try_from(bytes).unwrap_or(whole)
+}
+
 /// Stamps and sizes of single messages, gathered per connection so that a sink gets them in long runs.
 #[derive(Default)]
 pub(crate) struct Gather {
@@ -76,10 +87,15 @@ pub(crate) struct Gather {
     runs: Vec<(Vec<Stamp>, Vec<u32>)>,
     touched: Vec<ConnectionId>,
     held: usize,
+    last: Stamp,
+    /// The numbers of stamps held of each connection where time fell.
+    cuts: Vec<Vec<usize>>,
     /// Whether some stamps had to be handed over early.
     spilled: bool,
 }
 
+/// The most places where time falls that are told of one gathering: with more, messages are simply out of order.
+pub(crate) const MOST_CUTS: usize = 64;
 /// The most stamps that are gathered: 3 MB.
 const MOST_GATHERED: usize = 1 << 18;
 
@@ -90,6 +106,12 @@ impl Gather {
         if self.runs.len() <= at {
             self.runs.resize_with(at + 1, Default::default);
         }
+        if self.last.since(time) > OUT_OF_ORDER_NS && self.cuts.len() < MOST_CUTS {
+            self.cuts
+                .push(self.runs.iter().map(|run| run.0.len()).collect());
+            self.last = time;
+        }
+        self.last = self.last.max(time);
         let run = &mut self.runs[at];
         if run.0.is_empty() {
             self.touched.push(id);
@@ -131,6 +153,7 @@ impl Gather {
         let held = run.0.len();
         run.0.clear();
         run.1.clear();
+        self.cuts.clear();
         self.touched.retain(|touched| *touched != id);
         self.held -= held;
         Some(held as u64)
@@ -140,6 +163,7 @@ impl Gather {
     /// dropped.
     pub(crate) fn retain(&mut self, is_right: impl Fn(Stamp) -> bool) -> u64 {
         let mut gone = 0;
+        self.cuts.clear();
         for id in &self.touched {
             let (stamps, sizes) = &mut self.runs[id.0 as usize];
             let before = stamps.len();
@@ -157,15 +181,27 @@ impl Gather {
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
         self.spilled = false;
+        let mut from = vec![0; self.runs.len()];
+        let whole = self.runs.iter().map(|run| run.0.len()).collect();
+        for to in self.cuts.drain(..).chain([whole]) {
+            sink.part();
+            for id in &self.touched {
+                let at = id.0 as usize;
+                let (stamps, sizes) = &self.runs[at];
+                let part = from[at]..to.get(at).copied().unwrap_or(0);
+                if !part.is_empty() {
+                    let sizes = (!self.sizeless).then(|| &sizes[part.clone()]);
+                    from[at] = part.end;
+                    sink.stamps(*id, &stamps[part], sizes);
+                }
+            }
+        }
         for id in self.touched.drain(..) {
             let (stamps, sizes) = &mut self.runs[id.0 as usize];
-            if stamps.is_empty() {
-                continue;
-            }
-            sink.stamps(id, stamps, (!self.sizeless).then_some(sizes));
             stamps.clear();
             sizes.clear();
         }
+        self.last = Stamp::MIN;
         self.held = 0;
     }
 }
@@ -173,7 +209,8 @@ impl Gather {
 /// The findings of one thread, to be reported to a sink on another.
 #[derive(Default)]
 struct Delivery {
-    runs: Vec<(ConnectionId, usize, bool)>,
+    /// Runs of stamps: the connection, or `None` for the beginning of a part of the file.
+    runs: Vec<(Option<ConnectionId>, usize, bool)>,
     stamps: Vec<Stamp>,
     sizes: Vec<u32>,
     messages: Vec<(ConnectionId, Stamp, usize, u32)>,
@@ -189,6 +226,10 @@ impl Delivery {
     fn tell(&self, sink: &mut dyn Sink) {
         let (mut at, mut size_at, mut byte_at) = (0, 0, 0);
         for (id, count, sized) in &self.runs {
+            let Some(id) = id else {
+                sink.part();
+                continue;
+            };
             let sizes = sized.then(|| &self.sizes[size_at..size_at + count]);
             sink.stamps(*id, &self.stamps[at..at + count], sizes);
             at += count;
@@ -245,10 +286,14 @@ impl Sink for BatchSender {
         Want::Stamps
     }
 
+    fn part(&mut self) {
+        self.batch.runs.push((None, 0, false));
+    }
+
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         self.batch
             .runs
-            .push((connection, stamps.len(), sizes.is_some()));
+            .push((Some(connection), stamps.len(), sizes.is_some()));
         self.batch.stamps.extend_from_slice(stamps);
         self.batch.sizes.extend_from_slice(sizes.unwrap_or(&[]));
         self.flush_if_full();

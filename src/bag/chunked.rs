@@ -6,6 +6,7 @@
 mod check;
 mod chunk;
 mod forward;
+mod growing;
 mod index;
 mod plan;
 mod record;
@@ -17,7 +18,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::bag::adapters::{Clip, GROUP, in_order};
+use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
 use crate::bag::model::{
@@ -26,8 +27,10 @@ use crate::bag::model::{
 use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
+pub(crate) use growing::follow;
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
 use plan::MOST_LOOKED_INTO;
@@ -161,6 +164,12 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
 }
 
 impl<G: Grammar> Reader for Indexed<G> {
+    fn is_straight(&self) -> bool {
+        let plan = self.plan.as_ref().ok();
+        let mut pairs = plan.iter().flat_map(|plan| plan.chunks.windows(2));
+        !pairs.any(|pair| pair[0].last.since(pair[1].first) > OUT_OF_ORDER_NS)
+    }
+
     fn span(&mut self) -> Result<Option<Span>> {
         let Ok(plan) = &self.plan else {
             return Ok(None);
@@ -226,10 +235,10 @@ impl<G: Grammar> Indexed<G> {
             let _ = self.source.expect(&places);
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
-        let total = groups.len() as u64;
+        let whole = self.source.len();
         let threads = threads(chunks.len(), plan.longest_index(), self.source.is_far());
         in_order(groups.len(), threads, &work, sink, |at, sink| {
-            sink.progress(at as u64 + 1, total);
+            sink.progress(share(at + 1, groups.len(), whole), whole);
         });
         let samples = BTreeSet::from([0, chunks.len() / 2, chunks.len().saturating_sub(1)]);
         let samples = samples.into_iter().filter_map(|at| chunks.get(at));

@@ -139,7 +139,7 @@ impl<R: Read> Read for Counted<R> {
 }
 
 /// The error for a bag that spent its [`Allowance`].
-const UNFOLDS: &str = "the bag unfolds to far more than its size";
+const UNFOLDS: &str = "the bag decompresses to far more than its size";
 
 /// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
 const LARGEST_WINDOW: u32 = 23;

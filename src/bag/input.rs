@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::model::{OpenOptions, Reader};
+use super::model::{Growing, OpenOptions, Reader};
 use super::source::{ByteStream, FileSource};
 use super::unknown::elsewhere;
 use crate::base::error::{Error, Result};
@@ -21,7 +21,7 @@ pub enum Input {
     Stdin,
 }
 
-/// The beginnings of URLs, by which they are told apart from paths.
+/// The beginnings of URLs, by which they are distinguished from paths.
 const SCHEMES: &[&str] = &[
     "s3://", "s3a://", "gs://", "az://", "abfs://", "abfss://", "azure://", "https://", "http://",
 ];
@@ -57,7 +57,7 @@ impl Input {
     }
 }
 
-/// A URL as it may be told: that of a web server without a password, and without what stands behind `?`, which may be a
+/// A URL as it may be reported: that of a web server without a password, and without what stands behind `?`, which may be a
 /// signature that opens the file.
 pub(crate) fn told_url(url: &str) -> String {
     let Some((scheme, rest)) = url.split_once("://").filter(|_| url.starts_with("http")) else {
@@ -85,6 +85,9 @@ pub fn size_on_disk(input: &Input) -> Option<u64> {
     })
 }
 
+/// Opens a bag that is still being written.
+pub(crate) type Follow = fn(&Path) -> Result<Box<dyn Growing>>;
+
 /// A row of `FORMATS`.
 pub struct FormatRow {
     /// The format's name in JSON.
@@ -99,6 +102,8 @@ pub struct FormatRow {
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
     /// Makes a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
+    /// Makes a reader of one that is still being written.
+    pub(crate) follow: Option<Follow>,
 }
 
 /// The kind of input that a format is read from.
@@ -163,6 +168,14 @@ pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
             head.map_err(Error::io("read", Path::new(name)))
         }
     }
+}
+
+/// The new name of a bag that is gone under the name it had while it was recorded: a recorder removes `.active` when it
+/// closes a bag.
+pub(crate) fn closed(path: &Path) -> Option<PathBuf> {
+    let is_active = path.extension().is_some_and(|end| end == "active");
+    let closed = path.with_extension("");
+    (is_active && !path.exists() && closed.is_file()).then_some(closed)
 }
 
 /// The last part of a path as text.

@@ -32,6 +32,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     medium: Medium::Stream,
     sniff: |_, head| head.starts_with(MAGIC),
     open: chunked::open::<Mcap>,
+    follow: Some(chunked::follow::<Mcap>),
 };
 
 /// The schemas seen, which channels refer to.

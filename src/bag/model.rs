@@ -1,6 +1,7 @@
 //! The data model of bags: connections, messages, the sink that takes them in, the reader that feeds it.
 
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::base::error::Result;
@@ -98,6 +99,9 @@ pub trait Sink {
     /// Takes a new connection; returns the wanted part of its payloads.
     fn connection(&mut self, connection: &Connection) -> Want;
 
+    /// Notes that all that follows stands in the file behind all that came, as far as stamps go.
+    fn part(&mut self) {}
+
     /// Takes log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the
     /// reader knows them (always if wanted); then it is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
@@ -169,6 +173,11 @@ pub struct Report {
 
 /// An open bag.
 pub trait Reader: Send {
+    /// Whether time never falls from one part of the bag to the next, as far as an index tells.
+    fn is_straight(&self) -> bool {
+        true
+    }
+
     /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index tells it without
     /// reading the bag. `None` when only reading will tell. A big bag with a lying tail may hold stamps outside.
     fn span(&mut self) -> Result<Option<Span>>;
@@ -180,6 +189,30 @@ pub trait Reader: Send {
     /// Fails only where nothing at all can be read. Anything lost on the way is a notice, and `Report::complete` is
     /// false.
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report>;
+}
+
+/// The outcome of one look at a growing recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Growth {
+    /// Nothing new could be read.
+    Same,
+    /// Something new was reported.
+    More,
+    /// The recording is over, and all of it was reported.
+    Ended,
+}
+
+/// A recording that is read while it is written. Every message is reported once, as soon as it can be read; what is
+/// half written is not there yet. What is lost or damaged only shows when the closed recording is read.
+pub(crate) trait Growing: Send {
+    /// Reports to `sink` what has become readable since the last time.
+    ///
+    /// # Errors
+    /// Where the recording is gone, or cannot be read at all.
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth>;
+
+    /// The file or folder, which may have been renamed since.
+    fn path(&self) -> &Path;
 }
 
 /// Options for opening a bag.

@@ -180,7 +180,7 @@ impl Remote {
         }
         let parts = self.object.get(ranges).map_err(|why| {
             let error = why.io();
-            // Only the first one is told.
+            // Only the first one is reported.
             let _ = self.refused.set(why);
             error
         })?;

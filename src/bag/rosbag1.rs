@@ -29,6 +29,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     medium: Medium::Stream,
     sniff: |_, head| head.starts_with(b"#ROSBAG V2.") || head.starts_with(b"#ROSRECORD V"),
     open: chunked::open::<Rosbag1>,
+    follow: Some(chunked::follow::<Rosbag1>),
 };
 
 /// The definitions seen, of which equal ones share one text.
@@ -60,7 +61,7 @@ impl Grammar for Rosbag1 {
         Err(Error::Unsupported {
             path: path.to_owned(),
             what: format!("it is of an old format, `{line}`"),
-            hint: "`rosbag fix old.bag new.bag` of a ROS 1 installation brings it to version 2"
+            hint: "`rosbag fix old.bag new.bag` of a ROS 1 installation converts it to version 2"
                 .to_owned(),
         })
     }

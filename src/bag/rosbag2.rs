@@ -1,5 +1,6 @@
 //! rosbag2 folders: the storage files in them, read as one recording, with `metadata.yaml` as a hint.
 
+mod growing;
 mod metadata;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -7,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::deferred::open_each;
-use crate::bag::input::{BagPlace, FormatRow, Input, Medium, file_name};
+use crate::bag::folder::{only_recording, recordings};
+use crate::bag::input::{BagPlace, FormatRow, Input, Medium, file_name, size_on_disk};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
 };
@@ -22,20 +24,20 @@ use metadata::{Metadata, is_storage};
 /// The format of rosbag2 folders.
 pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag2",
-    what: "ROS 2 recording: a folder with metadata.yaml or storage files",
+    what: "ROS 2 recording: a folder with metadata.yaml, or with the parts of one recording",
     extensions: &[],
     medium: Medium::Folder,
-    sniff: |place, _| match place {
-        BagPlace::Folder(path) => path.join("metadata.yaml").is_file() || holds_storage(path),
-        _ => false,
-    },
+    sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
+    follow: Some(growing::follow),
 };
 
 /// A folder's storage files.
 struct BagFolder {
     name: String,
     parts: Vec<Box<dyn Reader>>,
+    /// The bytes of all files.
+    size: u64,
     metadata: Metadata,
     notices: Vec<Notice>,
 }
@@ -48,9 +50,21 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             hint: String::new(),
         });
     };
+    let (files, links) = storage_and_links(&path);
+    // Where there are only links out of the folder, the words of this format say so.
+    let is_here = links.is_empty() || !files.is_empty();
+    if is_here && !path.join("metadata.yaml").is_file() {
+        let only = only_recording(&path)?;
+        let is_part = only.parent() == Some(&path) && is_storage(&only);
+        if only != path && !is_part {
+            let mut one = open_each([Input::Path(only)], options);
+            return one.next().unwrap_or_else(|| Err(explain(&path, &[], true)));
+        }
+    }
     let mut folder = BagFolder {
         name: file_name(&path),
         parts: Vec::new(),
+        size: 0,
         metadata: Metadata::default(),
         notices: Vec::new(),
     };
@@ -62,7 +76,8 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         ),
     }
     let mut failed = None;
-    let files = folder.files(&path).into_iter().map(Input::Path);
+    let files: Vec<Input> = folder.files(&path).into_iter().map(Input::Path).collect();
+    folder.size = files.iter().filter_map(size_on_disk).sum();
     for part in open_each(files, options) {
         match part {
             Ok(reader) => folder.parts.push(reader),
@@ -90,12 +105,6 @@ fn storage(folder: &Path) -> Vec<PathBuf> {
     });
     files.truncate(FILES);
     files
-}
-
-/// Whether a folder holds storage files, or links to some.
-fn holds_storage(folder: &Path) -> bool {
-    let (files, links) = storage_and_links(folder);
-    !(files.is_empty() && links.is_empty())
 }
 
 /// The storage files in a folder, and links out of it that look like some.
@@ -143,11 +152,17 @@ impl BagFolder {
         if instead {
             return there;
         }
-        for file in there.iter().filter(|f| !known.contains(*f)) {
-            let text = format!(
-                "`{}` is not named in `metadata.yaml` and was left out",
-                file_name(file)
-            );
+        // Without a file of its own, the error says why there is none.
+        if found.is_empty() {
+            return found;
+        }
+        let beside = recordings(path).unwrap_or_default();
+        let beside = beside
+            .iter()
+            .filter(|other| *other != path && !known.contains(*other));
+        for other in beside.take(FILES) {
+            let name = other.strip_prefix(path).unwrap_or(other).display();
+            let text = format!("`{name}` is not named in `metadata.yaml` and was left out");
             self.say(NoticeKind::Note, text);
         }
         found
@@ -166,10 +181,7 @@ impl BagFolder {
         }
         Error::UnknownBag {
             path: path.to_owned(),
-            looks_like: format!(
-                "a folder whose recording is not there ({})",
-                said.join("; ")
-            ),
+            looks_like: format!("a folder without its recording ({})", said.join("; ")),
             hint: "copy the `.db3` or `.mcap` files that `metadata.yaml` names into it".to_owned(),
         }
     }
@@ -198,10 +210,10 @@ impl Reader for BagFolder {
             sink.notice(notice.clone());
         }
         let mut complete = !self.notices.iter().any(|n| n.kind.is_loss());
-        let mut joined = PartsAdapter::new(&self.metadata, sink);
+        let mut joined = PartsAdapter::new(&self.metadata, sink, self.size);
         let mut reports = Vec::new();
         for part in &mut self.parts {
-            joined.part.clear();
+            joined.next();
             match part.read(range, &mut joined) {
                 Ok(report) => reports.push(report),
                 Err(e) => {
@@ -259,16 +271,25 @@ struct PartsAdapter<'a> {
     known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
     /// The ids of this part's connections in the whole.
     part: Vec<ConnectionId>,
+    /// The bytes of the parts before this one, of this part, and of all.
+    sizes: (u64, u64, u64),
 }
 
 impl<'a> PartsAdapter<'a> {
-    fn new(metadata: &'a Metadata, sink: &'a mut dyn Sink) -> Self {
+    fn new(metadata: &'a Metadata, sink: &'a mut dyn Sink, size: u64) -> Self {
         Self {
             metadata,
             sink,
             known: BTreeMap::new(),
             part: Vec::new(),
+            sizes: (0, 0, size),
         }
+    }
+
+    /// The next part begins.
+    fn next(&mut self) {
+        self.part.clear();
+        self.sizes.0 += std::mem::take(&mut self.sizes.1);
     }
 
     fn announce(&mut self, key: ConnectionKey, mut connection: Connection) -> (ConnectionId, Want) {
@@ -342,6 +363,9 @@ impl Sink for PartsAdapter<'_> {
     }
 
     fn progress(&mut self, done: u64, total: u64) {
-        self.sink.progress(done, total);
+        let (before, size, whole) = &mut self.sizes;
+        *size = total;
+        self.sink
+            .progress(*before + done, (*whole).max(*before + total));
     }
 }

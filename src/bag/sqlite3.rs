@@ -3,6 +3,7 @@
 //! The tables: `sqlite_storage.cpp` of `rosbag2_storage_sqlite3`. The files `sqlite3_*.rs` are parts of this one.
 
 mod db;
+mod growing;
 mod place;
 mod rows;
 
@@ -11,7 +12,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::bag::adapters::{Clip, in_order};
+use crate::bag::adapters::{Clip, in_order, share};
 use crate::bag::input::{BagPlace, FormatRow, Medium, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
@@ -33,6 +34,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     medium: Medium::File,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
+    follow: Some(growing::follow),
 };
 
 /// A database with its topics.
@@ -62,10 +64,15 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             });
         }
     };
+    let ready = place::ready(source.path())?;
+    bag(ready, &source, options).map(|bag| Box::new(bag) as Box<dyn Reader>)
+}
+
+/// The topics of a database, and what it says about itself.
+fn bag(mut ready: Ready, source: &FileSource, options: &OpenOptions) -> Result<Sqlite3Bag> {
     let path = source.path().to_owned();
-    let mut ready = place::ready(&path)?;
     let mut notices = Vec::new();
-    if let Some(text) = cut(&source).filter(|_| !ready.is_copy()) {
+    if let Some(text) = cut(source).filter(|_| !ready.is_copy()) {
         notices.push(Notice::new(NoticeKind::Truncated, text));
         ready.damaged = true;
     }
@@ -92,7 +99,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         ready,
     };
     bag.read_topics(&db, &columns).map_err(broken)?;
-    Ok(Box::new(bag))
+    Ok(bag)
 }
 
 /// The database, and the columns of its table of topics.
@@ -305,7 +312,7 @@ fn check(db: &Db, sink: &mut dyn Sink) {
 
 impl Reader for Sqlite3Bag {
     fn span(&mut self) -> Result<Option<Span>> {
-        // What cannot be told now shows when the rows are read.
+        // What cannot be reported now shows when the rows are read.
         Ok(self.ends().unwrap_or(None))
     }
 
@@ -327,9 +334,9 @@ impl Reader for Sqlite3Bag {
         drop(db);
         let threads = if parts.len() > 1 { 8 } else { 1 };
         let work = |at: usize, sink: &mut dyn Sink| rows.read(parts[at], sink);
-        let total = parts.len() as u64;
+        let whole = self.file_bytes;
         in_order(parts.len(), threads, &work, &mut clip, |at, sink| {
-            sink.progress(at as u64 + 1, total);
+            sink.progress(share(at + 1, parts.len(), whole), whole);
         });
         Ok(Report {
             name: file_name(&self.path),

@@ -24,7 +24,7 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
 /// The error for an object where a file is needed, or where objects cannot be read at all.
 pub(crate) fn elsewhere(url: &str) -> Error {
     let hint = if cfg!(feature = "remote") {
-        "this takes files: download the bag"
+        "only files can be read: download the bag"
     } else {
         "download the bag, or build with the feature `remote`: `cargo install bagreel --features remote`"
     };

@@ -23,6 +23,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     medium: Medium::Wrapping,
     sniff: |_, head| head.starts_with(b"\x28\xb5\x2f\xfd"),
     open,
+    follow: None,
 };
 
 /// A reader of the bag inside.
@@ -88,7 +89,7 @@ fn unpack(
     let most = limit.saturating_add(1);
     if io::copy(&mut stream.take(most), &mut file)? > limit {
         return Err(io::Error::other(
-            "it unfolds to more than a thousand times its size",
+            "it decompresses to more than a thousand times its size",
         ));
     }
     Ok(path)

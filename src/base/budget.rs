@@ -132,3 +132,7 @@ impl LaunchWork {
         }
     }
 }
+
+/// The most reports of statistics that are kept (30 MB): an hour of a hundred connections, each with one a second, of which
+/// the rest is counted.
+pub(crate) const MEASUREMENTS: usize = 360_000;

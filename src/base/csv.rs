@@ -21,7 +21,8 @@ impl<W: Write> CsvRows<W> {
         let mut writer = WriterBuilder::new()
             .terminator(Terminator::Any(b'\n'))
             .from_writer(to);
-        writer.write_record(batch.columns.iter().map(|c| c.name.as_bytes()))?;
+        let heads = batch.columns.iter().map(|c| c.name.as_bytes());
+        writer.write_record(heads).map_err(cause)?;
         Ok(Self {
             writer,
             field: Vec::new(),
@@ -36,9 +37,9 @@ impl<W: Write> CsvRows<W> {
                 if column.valid.as_ref().is_none_or(|valid| valid[row]) {
                     field(column, 0, row, &mut self.field)?;
                 }
-                self.writer.write_field(&self.field)?;
+                self.writer.write_field(&self.field).map_err(cause)?;
             }
-            self.writer.write_record(None::<&[u8]>)?;
+            self.writer.write_record(None::<&[u8]>).map_err(cause)?;
         }
         Ok(())
     }
@@ -48,6 +49,14 @@ impl<W: Write> CsvRows<W> {
         self.writer
             .into_inner()
             .map_err(csv::IntoInnerError::into_error)
+    }
+}
+
+/// The system's error inside one of the writer's, so that a closed pipe is known as one.
+fn cause(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(cause) => cause,
+        other => io::Error::other(format!("{other:?}")),
     }
 }
 

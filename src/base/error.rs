@@ -156,7 +156,7 @@ impl Error {
 fn io_hint(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::NotFound => "check the spelling of the path",
-        io::ErrorKind::PermissionDenied => "check who may read or write it",
+        io::ErrorKind::PermissionDenied => "check its permissions",
         io::ErrorKind::StorageFull => "make room or write elsewhere with `-o`",
         _ => "",
     }

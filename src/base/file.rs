@@ -48,7 +48,7 @@ fn bounded(
         return Err(Error::BadFile {
             path: path.to_owned(),
             line: 0,
-            reason: format!("more than {limit} bytes are too many"),
+            reason: format!("more than {limit} bytes are not supported"),
             hint: "give a smaller file".to_owned(),
         });
     }
@@ -80,7 +80,12 @@ mod tests {
         let path = folder.path().join("style.toml");
         std::fs::write(&path, "1234").unwrap();
         assert_eq!(read_text(&path, 4).unwrap(), "1234");
-        assert!(read(&path, 3).unwrap_err().to_string().contains("too many"));
+        assert!(
+            read(&path, 3)
+                .unwrap_err()
+                .to_string()
+                .contains("not supported")
+        );
         #[cfg(unix)]
         assert!(read(Path::new("/dev/zero"), 1 << 20).is_err());
     }

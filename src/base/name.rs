@@ -3,6 +3,11 @@
 use std::fmt;
 use std::sync::Arc;
 
+/// The node that writes `graph.mcap`: its topics are about the robot and not part of it.
+pub(crate) const OWN_NODE: &str = "/_bagreel";
+/// The node that stands for all unknown publishers and subscribers in `graph.mcap`.
+pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
+
 macro_rules! name {
     ($(#[$doc:meta])* $type:ident) => {
         $(#[$doc])*

@@ -38,6 +38,11 @@ impl NoticeKind {
         matches!(self, Self::Damaged | Self::Truncated | Self::ImpossibleTime)
     }
 
+    /// Whether it belongs to a normal run: what the picture leaves out, what was chosen for the user.
+    pub fn is_routine(self) -> bool {
+        matches!(self, Self::Hidden | Self::Chosen | Self::Glyph)
+    }
+
     const ALL: [Self; 11] = [
         Self::Damaged,
         Self::Truncated,
@@ -131,6 +136,14 @@ impl Notices {
             count: *count,
             text: text.clone(),
         })
+    }
+
+    /// All notices but those of one kind.
+    #[must_use]
+    pub fn without(&self, kind: NoticeKind) -> Self {
+        let mut rest = self.clone();
+        rest.0.retain(|(own, _), _| *own != kind);
+        rest
     }
 
     /// Whether any notice says that data was skipped.

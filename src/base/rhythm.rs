@@ -19,6 +19,8 @@ pub(crate) const UNUSUAL: i64 = 3;
 /// The most pauses of a regular sender: one that pauses more often, and for more than a fifth of the time, sends only
 /// when needed.
 pub(crate) const OFTEN: usize = 4;
+/// The length of a silence as a multiple of the longest pause that the same sender made before.
+pub(crate) const LONGER: i64 = 2;
 /// The number of intervals before a silence that show the usual one: enough to hold a pause, few enough to forget an
 /// earlier rate.
 pub(crate) const RECENT: usize = 20;
@@ -27,6 +29,28 @@ pub(crate) const RECENT: usize = 20;
 pub(crate) fn broken_after(usual: i64) -> i64 {
     usual.saturating_mul(BREAK).max(BREAK_NS)
 }
+
+// ---- The clock of the recorder.
+
+/// The longest time by which a message is recorded out of order; 374 of 1,586 public bags have such messages, by
+/// milliseconds.
+pub(crate) const OUT_OF_ORDER_NS: i64 = SECOND;
+/// The share, in per cent, of the connections that speak again whose time falls when a clock is set back. Where a script
+/// wrote one topic behind the other, or by the messages' own stamps, few do.
+pub(crate) const RUN_SHARE: u64 = 80;
+/// The fewest messages behind the fall: fewer are records out of order.
+pub(crate) const RUN_FEWEST: u64 = 10;
+
+/// The share, in per cent, of the senders that should send which fall silent together when nothing is recorded, and the
+/// fewest of them: fewer may have one cause on the robot.
+pub(crate) const PAUSE_SHARE: u64 = 80;
+pub(crate) const PAUSE_FEWEST: u64 = 3;
+
+// ---- Restarts.
+
+/// The largest number in the header of the first message that a recorder gets of a publisher that has just begun: it
+/// connects within a second, and misses a few.
+pub(crate) const BEGUN_AGAIN: u32 = 5;
 
 // ---- The recorder.
 

@@ -161,10 +161,15 @@ impl ColumnValues {
     }
 }
 
+/// Behind the name of a list in a path of names.
+pub(crate) const LIST: &str = "[]";
+
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
+    /// Whether the name is a path of structures with dots between them, where [`LIST`] stands behind lists.
+    pub(crate) is_nested: bool,
     pub(crate) kind: ColumnKind,
     pub(crate) values: ColumnValues,
     /// The end of each list among the lists of the next level, or among the values; the rows' own lists first. Empty
@@ -191,6 +196,7 @@ impl TableColumn {
     ) -> Self {
         Self {
             name: name.into(),
+            is_nested: false,
             kind,
             values: ColumnValues::new(kind),
             lists: vec![Vec::new(); levels],
@@ -236,7 +242,8 @@ impl TableColumn {
         ends + self.values.bytes() + self.valid.as_ref().map_or(0, Vec::len)
     }
 
-    fn push(&mut self, cell: &TableCell<'_>) {
+    /// Adds a cell, unknown where it is of another kind than the column.
+    pub(crate) fn push(&mut self, cell: &TableCell<'_>) {
         let is_known = match (&mut self.values, cell) {
             (ColumnValues::Flag(to), TableCell::Flag(value)) => {
                 to.push(*value);

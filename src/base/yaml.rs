@@ -76,14 +76,75 @@ impl From<Location> for YamlPlace {
     }
 }
 
-/// The parser's words, except for its own limits, whose names mean nothing to users.
+/// What the parser says, and what a user can do about it. What names Rust or the parser's options is never shown.
+const MISTAKES: [(&str, &str); 12] = [
+    ("budget", "it holds too many values, or nests them too deep"),
+    (
+        "tabs disallowed",
+        "a tab indents the line; YAML takes spaces only",
+    ),
+    (
+        "did not find expected key",
+        "the line is indented otherwise than those it belongs to",
+    ),
+    (
+        "expected '-' indicator",
+        "the list ends here; begin the line with `- `, or indent it as its key",
+    ),
+    (
+        "multiple YAML documents",
+        "a second document begins; remove the line `---`",
+    ),
+    (
+        "unknown anchor",
+        "`*` refers to an anchor that is not there; put text that begins with `*` in quotes",
+    ),
+    (
+        "mapping values are not allowed",
+        "a key too many in one line, or wrong indentation; put text that holds `: ` in quotes",
+    ),
+    (
+        "simple key expected ':'",
+        "the line is neither a key with `:` nor part of a list",
+    ),
+    (
+        "unknown escape character",
+        "`\\` begins no known escape; put the text in single quotes",
+    ),
+    ("misplaced bracket", "a bracket closes that was not opened"),
+    (
+        "multiline quoted scalar",
+        "a quote is not closed, or the line after it is not indented",
+    ),
+    ("recursion", "it nests values too deep"),
+];
+
+/// The mistake in words that a user can act on.
 fn reason(error: &serde_saphyr::Error) -> String {
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
-    if first.contains("budget") {
-        return "it holds too many values, or nests them too deep".to_owned();
+    if let Some((_, words)) = MISTAKES.iter().find(|(said, _)| first.contains(said)) {
+        return (*words).to_owned();
     }
-    first.to_owned()
+    // The place is shown already: `error: line 2 column 2: …`.
+    let plain = match first
+        .strip_prefix("error: line ")
+        .and_then(|rest| rest.split_once(": "))
+    {
+        Some((_, plain)) => plain,
+        None => first,
+    };
+    let twice = plain.strip_prefix("duplicate mapping key: ");
+    if let Some((key, _)) = twice.and_then(|rest| rest.rsplit_once(", set ")) {
+        return format!("the key `{key}` stands there twice; keep one of them");
+    }
+    match plain.strip_prefix("unexpected character: `") {
+        Some(c) => format!(
+            "no value begins with `{}`; put it in quotes",
+            c.trim_end_matches('\'')
+        ),
+        None => plain.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -103,6 +164,29 @@ mod tests {
         assert_eq!(parse("a: 9223372036854775807"), Ok(json!({"a": i64::MAX})));
         assert_eq!(parse("a: 18446744073709551615"), Ok(json!({"a": u64::MAX})));
         assert_eq!(parse(""), Ok(Value::Null));
+    }
+
+    #[test]
+    fn mistakes_are_told_in_words_that_help() {
+        let table = [
+            ("a:\n\tb: 1\n", "a tab indents the line"),
+            ("a: 1\na: 2\n", "the key `a` stands there twice"),
+            ("a:\n b: 1\n  c: 2\n", "indent"),
+            ("a: 1\n---\nb: 2\n", "remove the line `---`"),
+            ("a: *x\n", "in quotes"),
+            ("a: @b\n", "no value begins with `@`"),
+            ("a: {b: 1\n", "unclosed bracket '{'"),
+            ("a: \"b\n", "a quote is not closed"),
+        ];
+        for (text, words) in table {
+            let reason = parse(text).unwrap_err().reason;
+            assert!(reason.contains(words), "{text}: {reason}");
+            let is_clean = ["error:", "Options", "from_str", " column "];
+            assert!(
+                !is_clean.iter().any(|word| reason.contains(word)),
+                "{reason}"
+            );
+        }
     }
 
     #[test]

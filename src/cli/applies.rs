@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 
-use super::args::RenderArgs;
+use super::args::render::RenderArgs;
 use crate::base::error::{Error, Result};
 use crate::export::{OneDrawing, Output};
 use crate::graph::window::Length;
@@ -61,7 +61,8 @@ impl Asked<'_> {
 
 /// Whether the output is a figure.
 pub(super) fn is_figure(args: &RenderArgs, output: &Output) -> bool {
-    args.figure.figure.is_some() && output.format.whole != OneDrawing::Never
+    (args.figure.is_some() || args.sequence.draws_steps())
+        && output.format.whole != OneDrawing::Never
 }
 
 /// Whether the output is drawn; a report is written, around a chart of its own.
@@ -95,7 +96,7 @@ const RULES: &[AppliesTo] = &[
             "font",
         ],
         takes: |_, output| is_picture(output),
-        what: "pictures take it, such as `x.gif`",
+        what: "it applies to pictures, such as `x.gif`",
     },
     AppliesTo {
         options: &["title"],
@@ -104,21 +105,19 @@ const RULES: &[AppliesTo] = &[
                 output.format.word == "dot" && asked.args.sequence.dot_profile == "plain";
             output.format.is_drawn || is_plain
         },
-        what: "pictures, reports and `--dot-profile plain` take it, such as `x.gif`",
+        what: "it applies to pictures, reports and `--dot-profile plain`",
     },
     AppliesTo {
         options: &["bare"],
         takes: |asked, output| asked.is_window(output) || is_figure(asked.args, output),
-        what: "animations, pages, figures and single windows take it: `x.gif`, `x.pdf`, `x{n}.svg`",
+        what: "it applies to animations, pages, figures and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
     },
     AppliesTo {
-        options: &["captions"],
-        takes: |asked, output| {
-            let tells = ["json", "csv", "parquet", "html", "svg", "md"];
-            let is_told = tells.contains(&output.format.word);
-            asked.is_window(output) || is_told || is_figure(asked.args, output)
+        options: &["captions", "phases"],
+        takes: |_, output| {
+            output.format.is_drawn || ["json", "csv", "parquet"].contains(&output.format.word)
         },
-        what: "animations, pages, reports, figures and data take them: `x.gif`, `x.html`, `x.json`",
+        what: "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
     },
     AppliesTo {
         options: &[
@@ -132,12 +131,12 @@ const RULES: &[AppliesTo] = &[
             "rqt-defaults",
         ],
         takes: |asked, output| !is_data(output) || asked.args.view.filtered,
-        what: "data holds the whole graph; `--filtered` writes what a picture would show",
+        what: "data files contain the whole graph; `--filtered` writes what a picture would show",
     },
     AppliesTo {
         options: &["filtered"],
         takes: |_, output| is_data(output),
-        what: "data takes it: json, csv, parquet, gexf, graphml; what is drawn is filtered already",
+        what: "it applies to data: json, csv, parquet, gexf, graphml; pictures are already filtered",
     },
     AppliesTo {
         options: &["frame-ms"],
@@ -145,27 +144,27 @@ const RULES: &[AppliesTo] = &[
             let is_animated = output.format.word == "svg" && !asked.is_window(output);
             plays(output) || is_animated && !is_figure(asked.args, output)
         },
-        what: "animations take it: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
+        what: "it applies to animations: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
     },
     AppliesTo {
         options: &["tween", "hold-changes"],
         takes: |_, output| plays(output),
-        what: "animations take it: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
+        what: "it applies to animations: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
     },
     AppliesTo {
         options: &["strip"],
         takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
-        what: "pictures of the whole take it: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
+        what: "it applies to pictures of the whole: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
     },
     AppliesTo {
         options: &["max-bytes"],
         takes: |_, output| output.format.is_limited,
-        what: "`x.gif` and `x.apng` take it",
+        what: "it applies to `x.gif` and `x.apng`",
     },
     AppliesTo {
         options: &["dot-profile"],
         takes: |_, output| output.format.word == "dot",
-        what: "`x.dot` takes it",
+        what: "it applies to `x.dot`",
     },
     AppliesTo {
         options: &["bytes"],
@@ -175,31 +174,75 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: &["link"],
         takes: |_, output| output.format.word == "md",
-        what: "reports take it: `x.md`",
-    },
-    AppliesTo {
-        options: &["phases"],
-        takes: |asked, output| {
-            is_figure(asked.args, output)
-                || ["json", "csv", "parquet"].contains(&output.format.word)
-        },
-        what: "figures and data take them: `--figure lives -o x.pdf`, `x.json`, `x.csv`",
+        what: "it applies to reports: `x.md`",
     },
     AppliesTo {
         options: &["json"],
         takes: |_, output| output.format.word == "json",
-        what: "`x.json` takes it",
+        what: "it applies to `x.json`",
     },
     AppliesTo {
         options: &["runs"],
         takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
-        what: "tables take it: `x.csv`",
+        what: "it applies to tables: `x.csv`",
     },
 ];
+
+/// Options that have no effect on figures.
+const NOT_OF_FIGURES: &[&str] = &[
+    "style",
+    "size",
+    "fit",
+    "orientation",
+    "layout",
+    "layout-from",
+    "mode",
+    "hide",
+    "group",
+    "collapse",
+    "expand",
+    "rqt-defaults",
+    "show-recorder",
+    "title",
+];
+
+/// Options that ask for windows one after the other.
+const OF_FILMS: &[&str] = &[
+    "period",
+    "step",
+    "align",
+    "skip-unchanged",
+    "cut",
+    "frame-ms",
+    "tween",
+    "hold-changes",
+    "max-bytes",
+    "poster",
+    "strip",
+    "figure",
+    "captions",
+    "phases",
+    "format",
+];
+
+/// Whether a mission in which nothing changes may be one picture: the output is left to us, or is one picture already, and
+/// no option asks for a film.
+pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
+    let is_whole = |o: &Output| o.format.whole != OneDrawing::Never && !o.target.is_numbered();
+    let is_left = given.any(&["outputs"]).is_none();
+    given.any(OF_FILMS).is_none() && (is_left || outputs.iter().all(is_whole))
+}
 
 /// Refuses options that apply to none of the outputs.
 pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
     let asked = Asked { args };
+    if args.sequence.draws_steps()
+        && let Some(option) = given.any(NOT_OF_FIGURES)
+    {
+        let what = format!("`--{option}` has no effect on `--strip changes`, which draws steps");
+        let hint = "`--strip 3x2` puts windows side by side, each as a whole";
+        return Err(Error::usage(what, hint));
+    }
     for rule in RULES {
         let is_taken = || outputs.iter().any(|output| (rule.takes)(&asked, output));
         if let Some(option) = given.any(rule.options)
@@ -209,11 +252,26 @@ pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]
                 .iter()
                 .map(|o| format!("`{}`", o.target.path().display()));
             let names: Vec<String> = names.collect();
-            let what = format!("`--{option}` says nothing to {}", names.join(", "));
+            let what = format!("`--{option}` has no effect on {}", names.join(", "));
             return Err(Error::usage(what, rule.what));
         }
     }
     Ok(())
+}
+
+/// Refuses outputs that cannot hold a figure.
+pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
+    let holds = |o: &Output| {
+        let is_one = o.format.whole != OneDrawing::Never && !o.target.is_numbered();
+        is_one || o.format.word == "tex"
+    };
+    match outputs.iter().find(|output| !holds(output)) {
+        None => Ok(()),
+        Some(output) => Err(Error::usage(
+            format!("`{}` cannot hold a figure", output.target.path().display()),
+            "figures are `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include them; `bagreel render` writes the rest",
+        )),
+    }
 }
 
 /// Options that say how bags are read and windows cut: a mission's JSON holds windows already.
@@ -243,7 +301,7 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
         None => Ok(()),
         Some(path) => {
             let what = format!(
-                "`--{option}` is for bags, and `{}` is an evolution",
+                "`--{option}` applies to bags, but `{}` is a mission's JSON",
                 path.display()
             );
             Err(Error::usage(what, "give the bag itself"))
@@ -259,7 +317,7 @@ const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "cut"
 pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
     let option = given.any(OF_WINDOWS)?;
     Some(format!(
-        "`--{option}` is about windows; {what} tells lives in continuous time and is the same for all"
+        "`--{option}` does not affect {what}, which does not depend on windows"
     ))
 }
 
@@ -268,9 +326,10 @@ pub(super) fn check_against(given: &Given) -> Result<()> {
     match given.any(&["style", "size", "rate-change"]) {
         None => Ok(()),
         Some(option) => {
-            let what =
-                format!("`--{option}` says nothing where a mission is held against an expectation");
-            Err(Error::usage(what, "give two missions, or leave it out"))
+            let what = format!(
+                "`--{option}` has no effect when a mission is compared with an expectations file"
+            );
+            Err(Error::usage(what, "give two missions, or omit it"))
         }
     }
 }
@@ -282,19 +341,19 @@ pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> 
         return Ok(());
     }
     if let Some(option) = given.any(&["style", "size"]) {
-        let what = format!("`--{option}` says nothing without a picture");
+        let what = format!("`--{option}` has no effect without a picture");
         return Err(Error::usage(
             what,
-            "pictures take it: `-o d.svg`, `-o d.html`",
+            "it applies to pictures: `-o d.svg`, `-o d.html`",
         ));
     }
     match given.any(&["source", "infer"]) {
         None => Ok(()),
         Some(option) => {
             let what = format!(
-                "`--{option}` says nothing without a picture: what is measured or stated is compared"
+                "`--{option}` has no effect without a picture: only measured and stated elements are compared"
             );
-            Err(Error::usage(what, "a picture shows the rest: `-o d.svg`"))
+            Err(Error::usage(what, "add a picture: `-o d.svg`"))
         }
     }
 }
@@ -305,11 +364,11 @@ pub(super) fn check_baseline(given: &Given) -> Result<()> {
         None => Ok(()),
         Some(option) => {
             let what = format!(
-                "`--{option}` says nothing to a baseline, which holds what was measured or stated"
+                "`--{option}` has no effect on a baseline, which contains what was measured or stated"
             );
             Err(Error::usage(
                 what,
-                "give it to `check`, which asks for less proof",
+                "use it with `check`, which accepts weaker evidence",
             ))
         }
     }
@@ -319,10 +378,10 @@ pub(super) fn check_baseline(given: &Given) -> Result<()> {
 pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> Result<()> {
     check_guesses(infer)?;
     if given.any(&["link"]).is_some() && !formats.contains(&"markdown") {
-        let what = "`--link` says nothing to these formats";
+        let what = "`--link` has no effect on these formats";
         return Err(Error::usage(
             what,
-            "Markdown takes it: `--format markdown`, `-o check.md`",
+            "it applies to Markdown: `--format markdown`, `-o check.md`",
         ));
     }
     Ok(())
@@ -332,10 +391,10 @@ pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> 
 fn check_guesses(infer: &[String]) -> Result<()> {
     if infer.iter().any(|word| word == "source") {
         let what =
-            "`--infer source` adds nodes that the bag does not name, and they are never judged";
+            "`--infer source` adds nodes that the bag does not name, which are never checked";
         return Err(Error::usage(
             what,
-            "`render` draws them; `--source DIR` alone adds what is sure",
+            "`render` draws them; `--source DIR` alone adds what is certain",
         ));
     }
     Ok(())

@@ -18,13 +18,14 @@ pub(super) fn extract(
     terminal: &mut Terminal,
 ) -> Result<(Notices, u64), Error> {
     let job = job(args, inputs)?;
+    if job.target == Target::Stdout {
+        terminal.make_room();
+    }
     let done = pipeline::extract(&job, terminal)?;
     terminal.notices(&done.notices);
     if let Some(filter) = args.topic_filter.as_ref().filter(|_| done.rows == 0) {
         let filter = visible(filter);
-        terminal.say(&format!(
-            "no message in that time is of a topic that `{filter}` takes"
-        ));
+        terminal.say(&format!("no message in that time matches `{filter}`"));
     }
     if job.target != Target::Stdout {
         let tables = match (job.fields, done.tables) {
@@ -50,12 +51,21 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
             "name a folder: `-o tables/`",
         ));
     }
+    let format = format(args, &target)?;
+    if args.nested && format == TableFormat::Csv {
+        return Err(Error::usage(
+            "CSV has no structures for `--nested`",
+            "leave `--nested` out, or write Parquet",
+        ));
+    }
     Ok(Extract {
         inputs,
-        format: format(args, &target)?,
+        format,
         target,
         fields: args.fields,
+        nested: args.nested,
         topics: NameFilter::parse(args.topic_filter.as_deref().unwrap_or_default())?,
+        msg_paths: args.msg_path.clone(),
         start: args.start,
         end: args.end,
     })
@@ -68,8 +78,8 @@ fn format(args: &ExtractArgs, target: &Target) -> Result<TableFormat, Error> {
         (None, _) if args.fields => Ok(*TableFormat::ALL.last().unwrap_or(&TableFormat::Csv)),
         (None, Some(word)) => TableFormat::parse(&word),
         (None, None) => Err(Error::usage(
-            format!("`{}` does not say its format", args.output),
-            "say it with `--format`: csv, parquet",
+            format!("`{}` has no known extension", args.output),
+            "choose one with `--format`: csv, parquet",
         )),
     }
 }

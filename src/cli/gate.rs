@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use super::applies::{self, Given};
 use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use super::reading::reading;
+use super::render::summary;
 use super::terminal::Terminal;
-use super::{DONE, FAILED, SKIPPED, USAGE, code, look, reading, summary};
+use super::{DONE, FAILED, SKIPPED, USAGE, code, look};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::words;
@@ -102,8 +104,8 @@ fn picture(output: &OsStr) -> Result<Output> {
     }
     let name = output.to_string_lossy();
     Err(Error::usage(
-        format!("`{name}` would hold one mission, and two are compared"),
-        "what differs can be written as `d.txt`, `d.json`, `d.md`, or drawn: `d.svg`, `d.html`, `d.gif`",
+        format!("`{name}` cannot represent a comparison"),
+        "write differences as `d.txt`, `d.json` or `d.md`, or draw them: `d.svg`, `d.html`, `d.gif`",
     ))
 }
 
@@ -155,6 +157,9 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     for run in &job.runs {
         applies::check_inputs(given, run)?;
     }
+    if job.output == Target::Stdout {
+        terminal.make_room();
+    }
     let done = gate::baseline(&job, terminal)?;
     for mission in &done.missions {
         terminal.notices(&mission.notices);
@@ -162,7 +167,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     if done.left_out > 0 {
         let names = words::count(done.left_out, "name");
         terminal.note(&format!(
-            "{names} found no room in the expectation: there are too many, or they are too long"
+            "{names} do not fit in the expectations file: there are too many, or they are too long"
         ));
     }
     if let Some(path) = &args.update {
@@ -194,6 +199,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     };
     let job = Check {
         reading: judged(&args.inputs(), &args.time, &args.graph)?,
+        tracked: tracked(&expect),
         expect,
         reports: args
             .outputs
@@ -209,9 +215,37 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     let formats: Vec<&str> = formats.chain([args.format.word]).collect();
     applies::check_check(given, &args.graph.infer, &formats)?;
     applies::check_inputs(given, &job.reading)?;
-    let done = gate::check(&job, terminal)?;
+    verdict(&job, Some(args.format), terminal)
+}
+
+/// Checks the closed recording that was followed as `what`; prints the findings where a format is given.
+pub(super) fn judge_closed(
+    reading: Reading,
+    what: &Path,
+    expect: &Path,
+    format: Option<&'static Format>,
+    terminal: &mut Terminal,
+) -> Result<u8> {
+    let job = Check {
+        reading,
+        tracked: tracked(expect),
+        expect: expect.to_owned(),
+        reports: Vec::new(),
+        bags: vec![what.display().to_string()],
+        links: Vec::new(),
+        is_strict: false,
+        append_to: None,
+    };
+    verdict(&job, format, terminal)
+}
+
+/// Judges, prints the findings where a format is given, and returns the exit code.
+fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Result<u8> {
+    let done = gate::check(job, terminal)?;
     let subject = job.subject(&done.mission);
-    terminal.results(&(args.format.write)(&subject, &done.verdict))?;
+    if let Some(format) = format {
+        terminal.results(&(format.write)(&subject, &done.verdict))?;
+    }
     terminal.notices(&done.mission.notices);
     let verdict = &done.verdict;
     Ok(match code(&done.mission) {
@@ -222,13 +256,36 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     })
 }
 
+/// A path from the root of its repository, with slashes: the checkout of a job of GitHub's or GitLab's, else the nearest
+/// folder with `.git`. As typed where it is in none of them.
+fn tracked(path: &Path) -> String {
+    let typed = || {
+        let typed = path.display().to_string();
+        typed.trim_start_matches("./").to_owned()
+    };
+    let Ok(whole) = path.canonicalize() else {
+        return typed();
+    };
+    let checkouts = ["GITHUB_WORKSPACE", "CI_PROJECT_DIR"];
+    let named = checkouts.iter().filter_map(std::env::var_os);
+    let named = named.filter_map(|root| PathBuf::from(root).canonicalize().ok());
+    let found = whole.ancestors().skip(1);
+    let found = found.filter(|folder| folder.join(".git").exists());
+    let mut roots = named.chain(found.map(Path::to_owned));
+    let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) else {
+        return typed();
+    };
+    let parts = below.iter().map(|part| part.to_string_lossy());
+    parts.collect::<Vec<_>>().join("/")
+}
+
 fn unknown_kind(word: &str) -> Error {
     let words = || crate::gate::FindingKind::words();
     let near = crate::base::nearest::nearest(word, words());
     let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
     let all: Vec<&str> = words().collect();
     Error::usage(
-        format!("no finding is called `{word}`{near}"),
+        format!("there is no finding `{word}`{near}"),
         format!("they are {}", all.join(", ")),
     )
 }
@@ -269,7 +326,7 @@ fn report(output: &OsStr) -> Result<ReportJob> {
     };
     let unknown = || {
         Error::usage(
-            format!("the name `{name}` tells no format"),
+            format!("`{name}` has no known extension"),
             "end it in .md, .xml, .json, .sarif or .txt, or write the format before it: `gitlab:FILE`",
         )
     };

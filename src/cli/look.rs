@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::args::{FigureArgs, LookArgs, RenderArgs, SequenceArgs, ViewArgs};
+use super::args::figure::FigureForm;
+use super::args::render::{LookArgs, RenderArgs, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
@@ -92,7 +93,8 @@ pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
 }
 
 pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> {
-    let strip = args.strip.as_deref().map(options::Choice::parse);
+    let strip = args.strip.as_deref().filter(|_| !args.draws_steps());
+    let strip = strip.map(options::Choice::parse);
     Ok(options::SequenceOptions {
         frame_ms: args.frame_ms,
         tween: args.tween,
@@ -130,8 +132,8 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
     let graph = typed.iter().find(|(_, is)| *is).map(|(flag, _)| *flag);
     match (view.view.as_deref(), graph) {
         (Some("board"), Some(flag)) => Err(Error::usage(
-            format!("`{flag}` says nothing to a board of topics"),
-            "leave it out, or `--view graph`",
+            format!("`{flag}` has no effect on a topic timeline"),
+            "omit it, or use `--view graph`",
         )),
         (Some("board"), None) => Ok(Body::Board),
         (None, None) => Ok(Body::Auto),
@@ -139,36 +141,62 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
     }
 }
 
-/// The figure that was asked for.
-pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<FigureOptions>> {
-    let Some(word) = &args.figure else {
-        return Ok(None);
-    };
+/// The figure that was asked for, with its width on paper in millimetres.
+pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Result<FigureOptions> {
     let kind = FigureKind::parse(word)?;
-    let steps = args.steps.iter().map(|s| usize::from(*s)).collect();
-    if kind != FigureKind::Steps && !args.steps.is_empty() {
+    let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
+    let has_steps = matches!(kind, FigureKind::Steps | FigureKind::Changes);
+    if !has_steps && !form.steps.is_empty() {
         return Err(Error::usage(
-            format!("`--steps` says nothing to `--figure {word}`"),
-            "it chooses the panels of `--figure steps`",
+            format!("`--steps` has no effect on `{word}`"),
+            "it chooses the panels of `--kind steps` and `changes`",
         ));
     }
-    let rows = args.rows.as_deref().map(RowKind::parse).transpose()?;
+    let rows = form.rows.as_deref().map(RowKind::parse).transpose()?;
     if kind != FigureKind::Lives && rows == Some(RowKind::Topics) {
         return Err(Error::usage(
-            format!("`--figure {word}` has no rows of topics"),
+            format!("`{word}` has no rows of topics"),
             "`--rows nodes` or `--rows groups`; topics are arrows",
         ));
     }
     let default = FigureOptions::default();
-    Ok(Some(FigureOptions {
+    Ok(FigureOptions {
         kind,
-        width_mm: look.width.unwrap_or(default.width_mm),
-        text_pt: args.text,
+        width_mm: width.unwrap_or(default.width_mm),
+        text_pt: form.text.unwrap_or(default.text_pt),
         rows,
         steps,
-        is_bare: look.bare,
-        is_named: false,
-    }))
+        ..default
+    })
+}
+
+/// The width of the steps that `--strip changes` draws, in millimetres, unless one is asked for.
+const STEPS_MM: f64 = 181.0;
+
+/// The figure in the options of `render`, which are those of `bagreel figure`; for `--strip changes`, the steps.
+pub(super) fn old_figure(args: &RenderArgs) -> Result<Option<FigureOptions>> {
+    let form = &args.form;
+    let typed = [
+        ("--rows", form.rows.is_some()),
+        ("--steps", !form.steps.is_empty()),
+        ("--text", form.text.is_some()),
+    ];
+    match (&args.figure, typed.iter().find(|(_, is)| *is)) {
+        (Some(word), _) => {
+            let figure = figure(word, form, args.look.width)?;
+            let is_bare = args.look.bare;
+            Ok(Some(FigureOptions { is_bare, ..figure }))
+        }
+        (None, Some((flag, _))) => Err(Error::usage(
+            format!("`{flag}` is an option of figures"),
+            "`bagreel figure BAG -o fig.pdf` draws one",
+        )),
+        (None, None) => Ok(args.sequence.draws_steps().then(|| FigureOptions {
+            kind: FigureKind::Steps,
+            width_mm: args.look.width.unwrap_or(STEPS_MM),
+            ..FigureOptions::default()
+        })),
+    }
 }
 
 /// The source of phases.
@@ -179,8 +207,8 @@ pub(super) fn phases(word: &str, captions: Option<&str>) -> Result<Phases> {
         ("none", None) => Ok(Phases::None),
         (file, None) => Ok(Phases::File(file.into())),
         (_, Some(_)) => Err(Error::usage(
-            "`--captions` and `--phases` both tell the phases",
-            "give one of them",
+            "`--captions` and `--phases` both set the phases",
+            "use one of them",
         )),
     }
 }
@@ -191,7 +219,7 @@ fn link(text: &str) -> Result<(String, String)> {
         .filter(|(name, url)| !name.is_empty() && !url.is_empty());
     let (name, url) = parts.ok_or_else(|| {
         Error::usage(
-            format!("`--link {text}` is not a name with an address"),
+            format!("`--link {text}` is not a name and an address"),
             "write `--link player=https://…`",
         )
     })?;
@@ -203,7 +231,7 @@ fn link(text: &str) -> Result<(String, String)> {
     let scheme = scheme.filter(|s| s.chars().all(is_word));
     if scheme.is_some_and(|s| !matches!(s.as_str(), "http" | "https")) {
         return Err(Error::usage(
-            format!("`--link {text}` leads to nothing that can be looked at"),
+            format!("`--link {text}` is not an address that can be opened"),
             "write `--link player=https://…`, or a path",
         ));
     }

@@ -1,7 +1,7 @@
 //! Signals: the first asks the work to end, and the process ends soon after where the work does not.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -19,6 +19,8 @@ const BY_SIGNAL: u8 = 128;
 #[derive(Clone, Debug)]
 pub(super) struct Stop {
     signal: Arc<AtomicU8>,
+    /// Whether the first signal only asks, and the work ends when it is done.
+    pub(super) is_noted: Arc<AtomicBool>,
     /// The function that tells why the process ends.
     say: fn(),
 }
@@ -28,7 +30,12 @@ impl Stop {
     /// why the process ends, should that become necessary.
     pub(super) fn listen(say: fn()) -> Self {
         let signal = Arc::new(AtomicU8::new(0));
-        let stop = Self { signal, say };
+        let is_noted = Arc::default();
+        let stop = Self {
+            signal,
+            is_noted,
+            say,
+        };
         listen(&stop);
         stop
     }
@@ -41,11 +48,19 @@ impl Stop {
         }
     }
 
+    /// Whether a signal came, which is forgotten.
+    pub(super) fn take(&self) -> bool {
+        self.signal.swap(0, Ordering::Relaxed) != 0
+    }
+
     /// Takes in a signal: the first asks the work to end, a second ends the process at once.
     fn hear(&self, signal: u8) {
         let say = self.say;
         if self.signal.swap(signal, Ordering::Relaxed) != 0 {
             end(signal, say);
+        }
+        if self.is_noted.load(Ordering::Relaxed) {
+            return;
         }
         thread::spawn(move || {
             thread::sleep(GRACE);

@@ -40,7 +40,7 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     })
 }
 
-/// So many refusals are told one by one: a store that is down refuses every bag of a fleet.
+/// So many refusals are reported one by one: a store that is down refuses every bag of a fleet.
 const MOST_TOLD: usize = 8;
 
 /// `12 bags (1 unreadable, 3 there already), 4711 messages`.
@@ -73,7 +73,7 @@ fn listed(manifest: &Path) -> Result<Vec<String>> {
     } else {
         file::read(manifest, budget::MANIFEST)?
     };
-    // A name that is no UTF-8 is told, and found, by what is left of it.
+    // A name that is no UTF-8 is reported, and found, by what is left of it.
     let text = String::from_utf8_lossy(&bytes);
     let between = if text.contains('\0') { '\0' } else { '\n' };
     let lines = text.split(between).map(|line| line.trim_end_matches('\r'));

@@ -1,51 +1,68 @@
-//! The output for people: progress, notices, errors and hints; the only file that prints or measures time.
+//! The output for people: results, notices, errors and hints; the only file that prints.
 
-use std::collections::BTreeMap;
+mod progress;
+
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
+use super::args::{Colour, Typed};
 use super::stop::Stop;
 use crate::base::error::{Error, Result};
-use crate::base::notice::Notices;
-use crate::base::words::visible;
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words::{self, visible};
+use crate::mission::events::LogLine;
+use crate::mission::ledger::Kind;
 use crate::pipeline::{Stage, Watch};
+use progress::Progress;
 
 /// Standard error and output, as the user set them up.
 #[derive(Debug)]
 pub(crate) struct Terminal {
     quiet: bool,
-    colour: bool,
-    bar: Option<ProgressBar>,
-    stage: Option<(Stage, Instant)>,
-    spent: BTreeMap<Stage, Duration>,
-    /// The shares of the time of each stage, in words.
-    shares: BTreeMap<Stage, String>,
-    begun: Instant,
+    verbose: bool,
+    /// Whether messages have colours, and whether results have.
+    colours: (bool, bool),
+    progress: Progress,
     stop: Stop,
 }
 
 impl Terminal {
-    /// A terminal that prints only errors if `quiet`. Colours only where standard error is a terminal and `no_colour`
-    /// is false; progress only on a terminal.
-    pub(crate) fn new(quiet: bool, no_colour: bool) -> Self {
+    /// A terminal as the options of every command have it. Colours only where the stream is a terminal and `NO_COLOR`
+    /// is not set, unless `--color` says otherwise.
+    pub(super) fn new(typed: &Typed) -> Self {
+        let is_asked = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        let colour = |is_terminal: bool| match typed.color {
+            Colour::Auto => is_terminal && is_asked,
+            Colour::Always => true,
+            Colour::Never => false,
+        };
         Self {
-            quiet,
-            colour: io::stderr().is_terminal() && !no_colour,
-            bar: None,
-            stage: None,
-            spent: BTreeMap::new(),
-            shares: BTreeMap::new(),
-            begun: Instant::now(),
+            quiet: typed.quiet,
+            verbose: typed.verbose,
+            colours: (
+                colour(io::stderr().is_terminal()),
+                colour(io::stdout().is_terminal()),
+            ),
+            progress: Progress::new(!typed.quiet),
             stop: Stop::listen(last_words),
         }
     }
 
+    /// The columns of the terminal that results are printed on; `None` where they go elsewhere.
+    #[expect(
+        clippy::unused_self,
+        reason = "whoever holds the terminal may measure it"
+    )]
+    pub(crate) fn width(&self) -> Option<usize> {
+        let size = terminal_size::terminal_size_of(io::stdout());
+        size.map(|(width, _)| usize::from(width.0).max(LEAST_WIDTH))
+    }
+
     /// Prints an error and its hint.
     pub(crate) fn error(&mut self, error: &Error) {
-        self.end_stage();
+        self.progress.end();
         self.line("31", "error", &error.to_string());
         let hint = error.hint();
         if !hint.is_empty() {
@@ -56,32 +73,43 @@ impl Terminal {
     /// Prints one of several errors that did not end the run, as only tables have them.
     #[cfg(feature = "parquet")]
     pub(crate) fn failed(&mut self, why: &str) {
-        self.end_stage();
+        self.progress.end();
         self.line("31", "error", why);
     }
 
-    /// Prints notices, one line each.
+    /// Prints notices, one line each; several about what was left out or chosen are one line, unless all are asked for.
     pub(crate) fn notices(&mut self, notices: &Notices) {
+        self.progress.end();
         if self.quiet {
             return;
         }
-        for notice in notices.iter() {
-            let (colour, label) = if notice.kind.is_loss() {
-                ("33", "warning")
-            } else {
-                ("36", "note")
-            };
-            let times = if notice.count > 1 {
-                format!(" ({} times)", notice.count)
-            } else {
-                String::new()
-            };
-            self.line(colour, label, &format!("{}{times}", notice.text));
+        let is_routine = |notice: &Notice| notice.kind.is_routine();
+        let (routine, rest): (Vec<Notice>, Vec<Notice>) = notices.iter().partition(is_routine);
+        for notice in &rest {
+            self.notice(notice);
         }
+        match &routine[..] {
+            several if several.len() > 1 && !self.verbose => self.note(&summary(several)),
+            all => all.iter().for_each(|notice| self.notice(notice)),
+        }
+    }
+
+    fn notice(&self, notice: &Notice) {
+        let (colour, label) = if notice.kind.is_loss() {
+            ("33", "warning")
+        } else {
+            ("36", "note")
+        };
+        let times = match notice.count {
+            0 | 1 => String::new(),
+            n => format!(" ({n} times)"),
+        };
+        self.line(colour, label, &format!("{}{times}", notice.text));
     }
 
     /// Prints a line on standard error unless quiet.
     pub(crate) fn say(&mut self, text: &str) {
+        self.progress.end();
         if !self.quiet {
             // A closed standard error is nobody to tell.
             let _ = writeln!(io::stderr(), "{}", visible(text));
@@ -92,12 +120,9 @@ impl Terminal {
     ///
     /// # Errors
     /// [`Error::Io`] where not all of it could be written.
-    #[expect(
-        clippy::unused_self,
-        reason = "whoever holds the terminal may print and wait"
-    )]
     pub(crate) fn results(&mut self, text: &str) -> Result<()> {
-        print(printable(text).as_bytes())
+        self.progress.end();
+        print(printable(text).as_bytes()).map(drop)
     }
 
     /// As [`Terminal::results`], of a table: bytes that are not text are printed as they are.
@@ -105,9 +130,67 @@ impl Terminal {
     /// # Errors
     /// As [`Terminal::results`].
     pub(crate) fn table(&mut self, table: &[u8]) -> Result<()> {
+        self.progress.end();
         match std::str::from_utf8(table) {
             Ok(text) => self.results(text),
-            Err(_) => print(table),
+            Err(_) => print(table).map(drop),
+        }
+    }
+
+    /// Prints lines on standard output; false if nobody reads them any more.
+    ///
+    /// # Errors
+    /// As [`Terminal::results`].
+    pub(crate) fn lines(&mut self, lines: &[String]) -> Result<bool> {
+        self.progress.end();
+        let text = lines
+            .iter()
+            .flat_map(|line| [line.as_str(), "\n"])
+            .collect::<String>();
+        print(printable(&text).as_bytes())
+    }
+
+    /// Whether a signal that comes from now on is only noted, until [`Terminal::take_signal`] asks; a second one still
+    /// ends the process.
+    pub(crate) fn note_signals(&self, on: bool) {
+        self.stop.is_noted.store(on, Ordering::Relaxed);
+    }
+
+    /// Whether a signal came, which is forgotten: the work ends as asked.
+    pub(crate) fn take_signal(&self) -> bool {
+        self.stop.take()
+    }
+
+    /// As [`Terminal::results`], of a log: each line with a hanging indent, in the colour of its kind.
+    ///
+    /// # Errors
+    /// As [`Terminal::results`].
+    pub(crate) fn log(&mut self, lines: &[LogLine]) -> Result<()> {
+        self.progress.end();
+        let width = self.width();
+        let (_, is_coloured) = self.colours;
+        let mut text = String::new();
+        for line in lines {
+            let colour = line.kind.map_or("1", colour);
+            let shown = printable(&line.text(width));
+            if is_coloured {
+                let start = line.lead().len().min(shown.len());
+                let end = shown[start..]
+                    .find([':', '\n'])
+                    .map_or(shown.len(), |at| start + at);
+                let (lead, head, rest) = (&shown[..start], &shown[start..end], &shown[end..]);
+                text.extend([lead, "\u{1b}[", colour, "m", head, "\u{1b}[0m", rest]);
+            } else {
+                text.push_str(&shown);
+            }
+        }
+        print(text.as_bytes()).map(drop)
+    }
+
+    /// Makes room for results that something else writes to standard output, if that is the terminal: no bar from now on.
+    pub(crate) fn make_room(&mut self) {
+        if io::stdout().is_terminal() {
+            self.progress.hide();
         }
     }
 
@@ -117,9 +200,9 @@ impl Terminal {
     }
 
     /// Prints a note unless quiet.
-    pub(crate) fn note(&mut self, text: &str) {
+    pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
-            self.line("36", "note", text);
+            self.progress.aside(|| self.line("36", "note", text));
         }
     }
 
@@ -134,77 +217,78 @@ impl Terminal {
 
     /// Seconds since the command began.
     pub(crate) fn seconds(&self) -> f64 {
-        self.begun.elapsed().as_secs_f64()
+        self.progress.seconds()
     }
 
     /// Prints the time of each stage, and its largest steps.
     pub(crate) fn timings(&mut self) {
-        self.end_stage();
-        let lines: Vec<String> = self
-            .spent
-            .iter()
-            .map(|(stage, time)| {
-                let shares = self.shares.get(stage).map_or("", String::as_str);
-                format!("{:>9.3} s  {}{shares}", time.as_secs_f64(), stage.word())
-            })
-            .collect();
-        for line in &lines {
-            self.say(line);
+        self.progress.end();
+        for line in self.progress.timings() {
+            self.say(&line);
         }
     }
 
     fn line(&self, colour: &str, label: &str, text: &str) {
         let text = visible(text);
-        let _ = if self.colour {
-            writeln!(io::stderr(), "\u{1b}[1;{colour}m{label}\u{1b}[0m: {text}")
-        } else {
-            writeln!(io::stderr(), "{label}: {text}")
+        let label = match self.colours {
+            (true, _) => format!("\u{1b}[1;{colour}m{label}\u{1b}[0m"),
+            (false, _) => label.to_owned(),
         };
+        let _ = writeln!(io::stderr(), "{label}: {text}");
     }
+}
 
-    fn end_stage(&mut self) {
-        if let Some(bar) = self.bar.take() {
-            bar.finish_and_clear();
-        }
-        if let Some((stage, since)) = self.stage.take() {
-            *self.spent.entry(stage).or_default() += since.elapsed();
-        }
+/// The width below which results are not fitted: a terminal that is dragged to nothing shows nothing anyway.
+const LEAST_WIDTH: usize = 40;
+
+/// The colour of an event: green for what comes, red for what goes, yellow for what is away for a while, magenta for a
+/// handover, cyan for every other change.
+fn colour(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Started | Kind::Appeared => "32",
+        Kind::Stopped | Kind::Vanished => "31",
+        Kind::Restarted | Kind::Silent => "33",
+        Kind::HandedOver => "35",
+        _ => "36",
     }
+}
+
+/// Several notices about what was left out or chosen as one line.
+fn summary(notices: &[Notice]) -> String {
+    let of = |kind: NoticeKind| notices.iter().filter(move |notice| notice.kind == kind);
+    let hidden: u64 = of(NoticeKind::Hidden).map(|notice| notice.count).sum();
+    let hidden = usize::try_from(hidden).unwrap_or(usize::MAX);
+    let parts = [
+        (hidden, "element", " left out or collapsed"),
+        (of(NoticeKind::Chosen).count(), "setting", " chosen for you"),
+        (
+            of(NoticeKind::Glyph).count(),
+            "font",
+            " that lacks characters",
+        ),
+    ];
+    let parts = parts.iter().filter(|(count, ..)| *count > 0);
+    let parts: Vec<String> = parts
+        .map(|(count, what, how)| words::count(*count, what) + how)
+        .collect();
+    format!("{}; `-v` tells which", parts.join(", "))
 }
 
 impl Watch for Terminal {
     fn stage(&mut self, stage: Stage) {
-        self.end_stage();
-        self.stage = Some((stage, Instant::now()));
-        if !self.quiet && io::stderr().is_terminal() {
-            self.bar = Some(bar(stage));
-        }
+        self.progress.begin(stage);
     }
 
     fn progress(&mut self, done: u64, total: u64) {
-        if let Some(bar) = &self.bar {
-            bar.set_length(total.max(done));
-            bar.set_position(done);
-        }
+        self.progress.set(done, total);
     }
 
     fn note(&mut self, text: &str) {
-        self.end_stage();
         Self::note(self, text);
     }
 
     fn shares(&mut self, shares: &[(&'static str, f64)]) {
-        let Some((stage, _)) = self.stage else {
-            return;
-        };
-        let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
-        let words: Vec<String> = shares
-            .map(|(word, share)| format!("{word} {:.0} %", share * 100.0))
-            .collect();
-        if !words.is_empty() {
-            self.shares
-                .insert(stage, format!(" ({})", words.join(", ")));
-        }
+        self.progress.share(shares);
     }
 
     fn stopped(&self) -> bool {
@@ -212,31 +296,19 @@ impl Watch for Terminal {
     }
 }
 
-fn bar(stage: Stage) -> ProgressBar {
-    let template = match stage {
-        Stage::Read | Stage::Verify => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
-        Stage::Draw => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
-        _ => "{msg:>9} [{bar:40}] {pos}/{len}",
-    };
-    let style =
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-    bar.set_style(style.progress_chars("=> "));
-    bar.set_message(stage.word());
-    bar
-}
-
 /// Prints why the process ends, on a line of its own.
 fn last_words() {
     let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
 }
 
-/// Writes to standard output. A closed pipe is not an error.
-fn print(bytes: &[u8]) -> Result<()> {
+/// Writes to standard output; false if that is a closed pipe, which is not an error.
+fn print(bytes: &[u8]) -> Result<bool> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.map_err(Error::io("write", Path::new("standard output"))),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        other => other
+            .map(|()| true)
+            .map_err(Error::io("write", Path::new("standard output"))),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
 use crate::graph::{Element, NodeId};
-use crate::view::View;
+use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing: for small text of at least 9 pixels, and
 /// for text not larger than titles.
@@ -64,14 +64,6 @@ pub struct Overview {
     pub color: Color,
     /// The title of the picture.
     pub title: String,
-}
-
-impl Overview {
-    /// One measure of the head in every window, to a tenth of a pixel, joined by `between`.
-    pub(crate) fn heads_list(&self, of: fn(&Rect) -> f64, between: &str) -> String {
-        let all: Vec<String> = self.heads.iter().map(|h| format!("{:.1}", of(h))).collect();
-        all.join(between)
-    }
 }
 
 impl<'a> Board<'a> {
@@ -131,7 +123,7 @@ impl<'a> Board<'a> {
         if self.left_out > 0 {
             let many = words::count(self.left_out, "topic");
             remarks.push(format!(
-                "{many} with the fewest messages have no room on the board; `--topic-filter` or a larger `--size` shows them"
+                "{many} with the fewest messages do not fit; show them with `--topic-filter` or a larger `--size`"
             ));
         }
         remarks
@@ -148,10 +140,10 @@ impl<'a> Board<'a> {
             let phase = self.options.phases.get(k).map_or("", String::as_str);
             scene.groups.extend(self.title.words(frame, phase));
         }
-        let mut span = frame.span;
+        let mut span = frame.shown();
         if let Some(before) = k.checked_sub(1).and_then(|k| self.view.frames.get(k)) {
-            span.start = between(before.span.start.0, span.start.0, phase);
-            span.end = between(before.span.end.0, span.end.0, phase);
+            span.start = between(before.shown().start.0, span.start.0, phase);
+            span.end = between(before.shown().end.0, span.end.0, phase);
         }
         let window = self.windows.get(k).copied().unwrap_or(0);
         scene.groups.extend(self.now(window, span));
@@ -177,6 +169,14 @@ impl<'a> Board<'a> {
         self.rates(&mut canvas, &|track| track.hz.map(words::rate));
         canvas.begin("nodes");
         self.nodes(&mut canvas, &|_| true);
+        if !self.options.bare {
+            let span = self.source.span();
+            let topics = words::count(self.lives.tracks.len(), "topic");
+            let mut whole = Frame::empty(0, span);
+            whole.messages = self.source.mission.messages;
+            whole.note = format!("{topics} over {}", words::duration(span.nanos()));
+            scene.groups.extend(self.title.words(&whole, ""));
+        }
         scene.groups.extend(self.painted(canvas));
         scene.title = format!("Topics over time of {}", self.options.title());
         let heads = self
@@ -228,11 +228,11 @@ impl<'a> Board<'a> {
     fn why(&self) -> String {
         let elements = &self.source.mission.elements;
         let why = if self.source.knows_publishers() {
-            "topics over time; --view graph draws who talks to whom".to_owned()
+            "a timeline of topics; --view graph draws the graph".to_owned()
         } else if elements.publishes.is_empty() {
-            "no message says who publishes or subscribes: topics over time; --topology FILE adds it, bagreel info says what would have told".to_owned()
+            "the bag names no publishers or subscribers; add them with --topology FILE; bagreel info lists what would have recorded them".to_owned()
         } else {
-            "of most messages nobody knows the publisher: topics over time; --topology FILE adds it, --view graph draws what is known".to_owned()
+            "most publishers are unknown; add them with --topology FILE, or draw what is known with --view graph".to_owned()
         };
         let left_out = match self.left_out {
             0 => String::new(),

@@ -46,14 +46,17 @@ pub enum FigureKind {
     Map,
     /// A panel per change of phase, with only the differences.
     Steps,
+    /// A map per phase, all at the same places, with the changes of the phase in colour.
+    Changes,
 }
 
 impl FigureKind {
     /// The figures by the words of the command line.
-    pub const ALL: [(&'static str, Self); 3] = [
+    pub const ALL: [(&'static str, Self); 4] = [
         ("lives", Self::Lives),
         ("map", Self::Map),
         ("steps", Self::Steps),
+        ("changes", Self::Changes),
     ];
 
     /// The figure of this word.
@@ -65,7 +68,7 @@ impl FigureKind {
         found.map(|(_, kind)| *kind).ok_or_else(|| {
             Error::usage(
                 format!("`{word}` is not a figure"),
-                "figures: lives, map, steps",
+                "figures: lives, map, steps, changes",
             )
         })
     }
@@ -101,7 +104,7 @@ impl RowKind {
             "groups" => Ok(Self::Groups),
             "topics" => Ok(Self::Topics),
             _ => {
-                let what = format!("`{word}` is not what rows can be");
+                let what = format!("`{word}` cannot be a row");
                 Err(Error::usage(what, "rows: nodes, groups, topics"))
             }
         }

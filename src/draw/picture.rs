@@ -1,5 +1,6 @@
 //! The picture: a view, a layout and a style become one scene per window, with everything at the same place in each.
 
+mod also;
 mod arrows;
 mod badge;
 mod boxes;
@@ -15,6 +16,7 @@ mod replicas;
 mod room;
 mod timeline;
 pub(crate) mod title;
+mod topics;
 mod tween;
 mod union;
 
@@ -36,7 +38,7 @@ use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, SeenWindow, View};
+use crate::view::{Arrow, ArrowKind, Frame, Item, SeenWindow, View};
 
 /// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,9 +59,9 @@ pub struct PageOptions {
     pub unit: Option<f64>,
     /// Whether there is a legend of the signs.
     pub has_legend: bool,
-    /// The life lines for the strip at the bottom; without them the strip shows messages per second.
-    pub course: Option<Course>,
-    /// The least relative change of a rate that is told, for the legend.
+    /// The phases and rows of the strip at the bottom; without rows it shows messages per second.
+    pub course: Course,
+    /// The least relative change of a rate that is reported, for the legend.
     pub rate_change: f64,
 }
 
@@ -74,7 +76,7 @@ impl Default for PageOptions {
             phases: Vec::new(),
             unit: None,
             has_legend: true,
-            course: None,
+            course: Course::default(),
             rate_change: 0.25,
         }
     }
@@ -109,7 +111,7 @@ impl<'a> Measured<'a> {
         } else {
             Vec::new()
         };
-        let page = PageFrame::new(style, &options, legend.len(), !view.compares);
+        let page = PageFrame::new(style, &options, legend.len(), view.has_time());
         Self {
             view,
             style,
@@ -139,13 +141,18 @@ impl<'a> Measured<'a> {
     pub fn text_px(&self, layout: &Layout) -> f64 {
         let (style, graph) = (self.style, &self.graph);
         let mut smallest = style.topic.size.min(style.node.size);
-        if graph.rated.contains(&true) {
+        if graph.rated.contains(&true) || !graph.footers.is_empty() {
             smallest = smallest.min(style.edge.size);
         }
         if graph.labels.iter().any(|l| l.second) {
             smallest = smallest.min(style.node.small).min(style.topic.small);
         }
         smallest * self.page.fit(layout.size).scale
+    }
+
+    /// The scale of the graph if it is laid out like this.
+    pub(crate) fn scale(&self, layout: &Layout) -> f64 {
+        self.page.fit(layout.size).scale
     }
 
     /// The picture with this layout, which must be one of [`Measured::plan`].
@@ -201,7 +208,7 @@ impl<'a> Picture<'a> {
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
-            timeline: Timeline::new(style, fonts, page, view).with(measured.options.course.clone()),
+            timeline: Timeline::new(style, fonts, page, view, &measured.options),
             ground: Vec::new(),
             measured,
             layout,
@@ -226,6 +233,11 @@ impl<'a> Picture<'a> {
         &self.layout
     }
 
+    /// The name of the phase of the window at place `k`, if phases have names.
+    pub fn phase(&self, k: usize) -> Option<&str> {
+        self.measured.options.phases.get(k).map(String::as_str)
+    }
+
     /// The smallest text of the graph in pixels.
     pub fn text_px(&self) -> f64 {
         self.measured.text_px(&self.layout)
@@ -244,7 +256,7 @@ impl<'a> Picture<'a> {
         let Some(frame) = measured.view.frames.get(k) else {
             return scene;
         };
-        self.graph(frame, &measured.view.seen(k), &mut scene.groups);
+        self.graph((k, frame), &measured.view.seen(k), &mut scene.groups);
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
@@ -278,27 +290,26 @@ impl<'a> Picture<'a> {
                 let (legend, style) = (&measured.legend, measured.style);
                 groups.push(legend::legend(legend, style, &measured.page));
             }
-            if !measured.view.compares {
-                groups.extend(self.timeline.ground(measured.view));
+            if measured.view.has_time() {
+                groups.extend(self.timeline.ground());
             }
         }
         groups
     }
 
     fn furniture(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
+        // The timeline names the phase, if there is one.
+        let is_named = !self.measured.options.course.phases.is_empty();
         let phase = self
-            .measured
-            .options
-            .phases
-            .get(k)
-            .map_or("", String::as_str);
-        groups.extend(self.title.words(frame, phase));
-        if !self.measured.view.compares {
+            .phase(k)
+            .filter(|_| !is_named || !self.measured.view.has_time());
+        groups.extend(self.title.words(frame, phase.unwrap_or("")));
+        if self.measured.view.has_time() {
             groups.extend(self.timeline.head(k, frame));
         }
     }
 
-    fn graph(&self, frame: &Frame, seen: &SeenWindow, groups: &mut Vec<Group>) {
+    fn graph(&self, (k, frame): (usize, &Frame), seen: &SeenWindow, groups: &mut Vec<Group>) {
         let view = self.measured.view;
         let boxes = self.boxes();
         let full = self.inhabited(seen);
@@ -310,10 +321,24 @@ impl<'a> Picture<'a> {
             let roll = (!space.replicas.is_empty()).then(|| rolls.next()).flatten();
             let now = view.place_in_time(frame.index);
             let roll = roll.map(|who| boxes.roll(space, *place, &id, (now, who)));
-            let mut space = boxes.space(space, *place, &id, !full[at]);
+            let empty = (!full[at]).then(|| {
+                if self.measured.graph.first_seen[at] > frame.index {
+                    "not on yet"
+                } else {
+                    "off"
+                }
+            });
+            let mut space = boxes.space(space, *place, &id, empty);
             titles.push(boxes.title_of(&mut space));
             titles.extend(roll.filter(|roll| !roll.pieces.is_empty()));
             groups.push(space);
+        }
+        for (footer, also) in self.measured.graph.footers.iter().zip(&view.also) {
+            let place = match footer.cluster {
+                Some(at) => self.layout.clusters.get(at),
+                None => self.layout.boxes.get(view.items.len()),
+            };
+            titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, k)));
         }
         let arrows = Arrows {
             style: self.measured.style,
@@ -384,10 +409,9 @@ fn places(
 ) -> (Vec<ItemBox>, Vec<ArrowPath>) {
     let mut cards = cards(measured, layout, fit);
     let mut tracks = tracks(measured, layout, fit);
-    let kinds: Vec<ItemKind> = measured.view.items.iter().map(|item| item.kind).collect();
     // A hair beyond the badge's edge.
     let radius = measured.style.badge.radius * fit.pen + 1.0;
-    room::place_badges((&kinds, &mut cards), &mut tracks, radius, fit.scale);
+    room::place_badges(&mut cards, &mut tracks, radius, fit.scale);
     (cards, tracks)
 }
 
@@ -420,7 +444,9 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
         .map(|(at, (arrow, link))| {
             let ends = [arrow.from, arrow.to].map(|id| name(id).to_owned());
             let route = layout.routes.get(at).unwrap_or(&empty);
-            ArrowPath::new(arrow_id(arrow, &ends), ends, route, link.label, fit)
+            let mut path = ArrowPath::new(arrow_id(arrow, &ends), ends, route, link.label, fit);
+            path.topics.clone_from(&measured.graph.topics[at]);
+            path
         })
         .collect()
 }
@@ -432,7 +458,7 @@ pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
     let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
     let some = words::some_of(&spelled.collect::<Vec<_>>(), 3);
     let text = format!(
-        "names hold characters that the font lacks; they are drawn as {some}; `--font FILE` adds a font"
+        "names contain characters that the font lacks, drawn as {some}; add a font with `--font FILE`"
     );
     (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
 }

@@ -7,7 +7,7 @@ use crate::draw::style::Color;
 use crate::draw::text::Weight;
 
 /// A page.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// The size of the page in pixels.
     pub size: Size,

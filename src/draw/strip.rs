@@ -234,11 +234,12 @@ impl<'a> StripSource<'a> {
         panel.shape(Shape::line(Form::Rect(border, 0.0), line));
         let start = self.mission.span.start;
         let time = |at: time::Stamp| words::offset(at.since(start));
+        let mut times = format!("{}–{}", time(frame.span.start), time(frame.span.end));
+        if let Some(phase) = self.picture.phase(window) {
+            times = format!("{times} {phase}");
+        }
         let lines = [
-            (
-                format!("{}–{}", time(frame.span.start), time(frame.span.end)),
-                Weight::SemiBold,
-            ),
+            (times, Weight::SemiBold),
             (self.caption(frame, page), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {

@@ -163,6 +163,11 @@ impl Style {
 }
 
 impl Body {
+    /// Whether nodes are pills; ellipses, as in `rqt_graph`, where the corners of other boxes are not rounded either.
+    pub(crate) fn is_pill(&self) -> bool {
+        self.radius > 0.0
+    }
+
     /// The weight of its names.
     pub(crate) fn weight(&self) -> Weight {
         if self.bold {
@@ -196,7 +201,7 @@ impl Style {
                 .and_then(|text| complete(text, path))
                 .map_err(|e| file.bad(&["base"], e.to_string()))?,
             Some(_) => {
-                return Err(file.bad(&["base"], "`base` is not the name of a style".to_owned()));
+                return Err(file.bad(&["base"], "`base` does not name a style".to_owned()));
             }
         };
         file.overlay(&mut keys)?;

@@ -185,7 +185,7 @@ impl Fonts {
         }
         let chars: Vec<char> = text.chars().collect();
         let short = |keep: usize| -> String {
-            // A name is told by its end rather than by its beginning.
+            // A name is reported by its end rather than by its beginning.
             let head = keep * 2 / 5;
             let tail = &chars[chars.len() - (keep - head)..];
             chars[..head].iter().chain(&['…']).chain(tail).collect()

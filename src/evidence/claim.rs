@@ -8,7 +8,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::budget;
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
@@ -89,6 +89,15 @@ pub(crate) enum Claim {
     SaysSubscribe(Name, Name),
     /// This logger logs from this source file (its own name, no folder).
     LogsFrom(Name, Name),
+    /// A log text of this logger says that a subscriber of this topic of its node gets nothing, by this policy of the
+    /// quality of service.
+    Starves(Name, Name, Name),
+    /// This node, or logger, gets nothing from a publisher of this topic, by this policy.
+    Starved(Name, Name, Name),
+    /// Two nodes have this name.
+    Duplicate(Name),
+    /// The recorder lost so many messages of this topic.
+    Lost(Name, Name),
     /// A snapshot was taken: claims that the source made in an earlier snapshot of the same name and not in this one
     /// have ended.
     Snapshot(Name),
@@ -102,6 +111,7 @@ impl Claim {
             | Self::NodeGone(a)
             | Self::Topic(a)
             | Self::Appears(a)
+            | Self::Duplicate(a)
             | Self::Snapshot(a) => [Some(a), None],
             Self::Publish(a, b)
             | Self::Subscribe(a, b)
@@ -119,7 +129,10 @@ impl Claim {
             | Self::Quality(a, b)
             | Self::SaysPublish(a, b)
             | Self::SaysSubscribe(a, b)
-            | Self::LogsFrom(a, b) => [Some(a), Some(b)],
+            | Self::LogsFrom(a, b)
+            | Self::Starves(a, b, _)
+            | Self::Starved(a, b, _)
+            | Self::Lost(a, b) => [Some(a), Some(b)],
         }
     }
 
@@ -147,6 +160,10 @@ impl Claim {
             Self::SaysPublish(a, b) => Self::SaysPublish(to(a), to(b)),
             Self::SaysSubscribe(a, b) => Self::SaysSubscribe(to(a), to(b)),
             Self::LogsFrom(a, b) => Self::LogsFrom(to(a), to(b)),
+            Self::Starves(a, b, c) => Self::Starves(to(a), to(b), to(c)),
+            Self::Starved(a, b, c) => Self::Starved(to(a), to(b), to(c)),
+            Self::Duplicate(a) => Self::Duplicate(to(a)),
+            Self::Lost(a, b) => Self::Lost(to(a), to(b)),
             Self::Snapshot(a) => Self::Snapshot(to(a)),
         }
     }
@@ -180,16 +197,36 @@ pub struct EvidenceLine {
     pub text: String,
 }
 
+/// What statistics say of the messages of a topic in an interval: over one connection, or at one end of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Measurement {
+    pub(crate) topic: Name,
+    pub(crate) publisher: Option<Name>,
+    pub(crate) subscriber: Option<Name>,
+    /// The interval, half-open.
+    pub(crate) span: Span,
+    /// The number of messages that jitter and age are computed from.
+    pub(crate) count: u64,
+    pub(crate) drops: Option<u64>,
+    pub(crate) bytes: Option<u64>,
+    /// The standard deviation of the time between messages in nanoseconds.
+    pub(crate) jitter_ns: Option<i64>,
+    /// The mean age in nanoseconds.
+    pub(crate) age_ns: Option<i64>,
+}
+
 /// All claims of a mission.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Claims {
     /// The names that [`EvidenceLine`]s are kept for; if empty, none are kept.
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
-    /// The sequence numbers of streams, by the streams' places; kept as if they were sizes.
-    pub(crate) sequences: BTreeMap<usize, SeriesId>,
     /// The header stamps of streams, by the streams' places; log times are kept as if they were sizes.
     pub(crate) headers: BTreeMap<usize, SeriesId>,
+    /// The ages of messages by their header stamps, by the streams' places; kept as if they were sizes ([`age_of`]).
+    pub(crate) ages: BTreeMap<usize, SeriesId>,
+    /// What statistics say, in the order in which it was read.
+    pub(crate) measured: Vec<Measurement>,
     /// The hashes of payloads, by the streams' places; kept as if they were sizes.
     pub(crate) payloads: BTreeMap<usize, SeriesId>,
     /// The number of publishers that each stream was offered by, by the streams' places.
@@ -211,6 +248,17 @@ pub(crate) struct Claims {
 }
 
 impl Claims {
+    /// The same claims with times of their own, to which more can be added.
+    ///
+    /// # Errors
+    /// As [`Stamps::since`].
+    pub(crate) fn copy(&self) -> io::Result<Self> {
+        Ok(Self {
+            times: Arc::new(self.times.since(Stamp(i64::MIN))?),
+            ..self.clone()
+        })
+    }
+
     /// The name of a text; the overflow name if there is no room.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         if let Some(name) = self.ids.get(text) {
@@ -280,14 +328,26 @@ impl Claims {
         !self.watched.is_empty() && self.watched.iter().all(about)
     }
 
-    /// Adds a sequence number of the stream at `place`.
-    pub(crate) fn sequence(&mut self, place: usize, time: Stamp, number: u32) {
-        note(&mut self.times, &mut self.sequences, place, (time, number));
-    }
-
     /// Adds a header stamp of the stream at `place`.
     pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
         note(&mut self.times, &mut self.headers, place, (stamp, log_time));
+    }
+
+    /// Adds the age of a message of the stream at `place`; one of more than half an hour is none.
+    pub(crate) fn age(&mut self, place: usize, time: Stamp, stamp: Stamp) {
+        let micros = time.since(stamp).div_euclid(1000).saturating_add(AGE_0);
+        if let Ok(age) = u32::try_from(micros) {
+            note(&mut self.times, &mut self.ages, place, (time, age));
+        }
+    }
+
+    /// Adds what a statistic says, as long as there is room.
+    pub(crate) fn measure(&mut self, measurement: Measurement) {
+        if self.measured.len() < budget::MEASUREMENTS {
+            self.measured.push(measurement);
+        } else {
+            self.dropped += 1;
+        }
     }
 
     /// Adds the hash of a payload of the stream at `place`.
@@ -358,6 +418,11 @@ impl Claims {
             fact.claim = fact.claim.renamed(&to);
             fact.snapshot = fact.snapshot.map(to);
         }
+        for measured in &mut self.measured {
+            measured.topic = to(measured.topic);
+            measured.publisher = measured.publisher.map(to);
+            measured.subscriber = measured.subscriber.map(to);
+        }
         let keys = self.list.iter().map(|f| (f.claim, f.source, f.snapshot));
         self.places = keys.zip(0..).collect();
         new
@@ -372,6 +437,14 @@ impl Claims {
     pub(crate) fn times(&self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
         self.times.times(fact.times)
     }
+}
+
+/// The number that stands for an age of 0, in microseconds: clocks may differ either way.
+const AGE_0: i64 = 1 << 31;
+
+/// The age of a number that [`Claims::age`] kept, in nanoseconds.
+pub(crate) fn age_of(kept: u32) -> i64 {
+    (i64::from(kept) - AGE_0) * 1000
 }
 
 /// Adds a time with its number to the series of a place.

@@ -2,12 +2,13 @@
 
 mod services;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::clock::{Belief, believed};
 pub use services::Service;
 
+use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -16,6 +17,7 @@ use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claims, SourceId};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
+use crate::evidence::numbers::{Numbers, is_numbered};
 use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::publishers;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
@@ -102,8 +104,12 @@ pub struct Collector {
     readers: Vec<Vec<(SourceId, Read)>>,
     /// Whether the header stamps of each stream are wanted.
     stamped: Vec<bool>,
+    /// Whether the messages of each stream begin with a header, so that they have an age.
+    aged: Vec<bool>,
     /// The schema for taking the messages of each stream apart, where they hold words or numbers.
     schemas: Vec<Option<MessageSchema>>,
+    /// The numbers in the headers of each stream, by place; only of those that have any.
+    numbers: BTreeMap<usize, Numbers>,
     /// The number of payload bytes compared so far.
     compared: u64,
     /// Whether the messages of each stream are texts that are kept.
@@ -112,7 +118,8 @@ pub struct Collector {
     messages: Stamps,
     facts: Claims,
     notices: Notices,
-    bags: usize,
+    /// The stream of each connection of each bag.
+    bags: Vec<Vec<usize>>,
     /// The bags of which payloads are read for more than comparisons.
     read: BTreeSet<usize>,
 }
@@ -128,13 +135,55 @@ impl Collector {
 
     /// The sink for the next bag; `progress` gets the reader's progress (bytes done, bytes in all).
     pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
-        self.bags += 1;
+        self.bags.push(Vec::new());
+        self.on(progress)
+    }
+
+    /// The sink for more of the last bag.
+    pub(crate) fn on<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
         BagSink {
-            streams: Vec::new(),
-            bag: self.bags - 1,
+            bag: self.bags.len().saturating_sub(1),
             collector: self,
             progress,
         }
+    }
+
+    /// Everything collected so far, with the times of messages from about `from` on. More may be collected then.
+    ///
+    /// # Errors
+    /// As [`Collector::finish`].
+    pub(crate) fn so_far(&self, from: Stamp) -> Result<Recorded> {
+        let copy = Self {
+            options: self.options.clone(),
+            streams: self.streams.clone(),
+            numbers: self.numbers.clone(),
+            texts: self.texts.clone(),
+            messages: self.messages.since(from).map_err(spool_error)?,
+            facts: self.facts.copy().map_err(spool_error)?,
+            notices: self.notices.clone(),
+            read: self.read.clone(),
+            ..Self::default()
+        };
+        copy.finish()
+    }
+
+    /// Forgets the times of messages before about `from`.
+    ///
+    /// # Errors
+    /// As [`Collector::finish`].
+    pub(crate) fn forget(&mut self, from: Stamp) -> Result<()> {
+        self.messages = self.messages.since(from).map_err(spool_error)?;
+        Ok(())
+    }
+
+    /// The times of the first and the last message that are kept, and the number of messages; `None` if there is none.
+    pub(crate) fn extent(&self) -> Option<(Stamp, Stamp, u64)> {
+        self.messages.extent()
+    }
+
+    /// The number of connections and claims: it grows with everything that was not known before.
+    pub(crate) fn known(&self) -> usize {
+        self.streams.len() + self.facts.list.len()
     }
 
     /// Lets every source read the announcement of the newest stream.
@@ -157,6 +206,9 @@ impl Collector {
 
     /// Lets the sources that know its layout read a message.
     fn read(&mut self, place: usize, message: &Message<'_>) {
+        if let Some(numbers) = self.numbers.get_mut(&place) {
+            numbers.add(message.time, message.data);
+        }
         let stream = &self.streams[place];
         if self.stamped[place] {
             let mut heard = SourceContext {
@@ -218,6 +270,9 @@ impl Collector {
             time: Some(message.time),
         };
         payload::hear(&mut heard, beginning, message.size);
+        if self.aged[place] {
+            equal_stamps::age(&mut heard, beginning);
+        }
         if let Some(schema) = &self.schemas[place]
             && beginning.len() == message.size as usize
         {
@@ -230,8 +285,10 @@ impl Collector {
     fn forget_payloads(&mut self) {
         if !self.options.compares_all() {
             let (streams, read) = (&self.streams, &self.read);
-            let payloads = &mut self.facts.payloads;
-            payloads.retain(|at, _| read.contains(&streams[*at].bag));
+            let facts = &mut self.facts;
+            for kept in [&mut facts.payloads, &mut facts.ages] {
+                kept.retain(|at, _| read.contains(&streams[*at].bag));
+            }
         }
     }
 
@@ -262,8 +319,10 @@ impl Collector {
             texts: self.texts,
             streams: self.streams,
             messages: self.messages,
+            numbers: self.numbers,
             facts: self.facts,
             notices: self.notices,
+            falls: Vec::new(),
             believed: span,
             span: None,
         };
@@ -303,13 +362,12 @@ pub struct BagSink<'a> {
     collector: &'a mut Collector,
     progress: &'a mut dyn FnMut(u64, u64),
     bag: usize,
-    /// The stream of each connection of this bag.
-    streams: Vec<usize>,
 }
 
 impl BagSink<'_> {
     fn stream(&self, connection: ConnectionId) -> Option<usize> {
-        self.streams.get(connection.0 as usize).copied()
+        let streams = self.collector.bags.get(self.bag)?;
+        streams.get(connection.0 as usize).copied()
     }
 }
 
@@ -333,17 +391,24 @@ impl Sink for BagSink<'_> {
             all.notices
                 .add(undecodable(&stream, "its definition is not the known one"));
         }
-        let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
+        let aged = equal_stamps::is_stamped(connection);
+        let stamped = all.options.infer_stamps && aged;
         let compared = all.options.payload_bytes > 0;
         let told = all.options.keeps_texts_of(connection);
         let want = all.options.want(!readers.is_empty() || told, stamped);
         if want == Want::Payload || stamped {
             all.read.insert(self.bag);
         }
-        self.streams.push(all.streams.len());
+        if is_numbered(connection) {
+            all.numbers.insert(all.streams.len(), Numbers::default());
+        }
+        if let Some(streams) = all.bags.get_mut(self.bag) {
+            streams.push(all.streams.len());
+        }
         all.streams.push(stream);
         all.readers.push(readers);
         all.stamped.push(stamped);
+        all.aged.push(aged);
         all.told.push(told);
         let definition = connection.definition.as_deref();
         let schema = echo::schema(&connection.type_name, definition);
@@ -379,11 +444,15 @@ impl Sink for BagSink<'_> {
 pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
     pub(crate) messages: Stamps,
+    /// The numbers in the headers of streams, by place, as far as they were read.
+    pub(crate) numbers: BTreeMap<usize, Numbers>,
     pub(crate) facts: Claims,
     /// The texts of the topic that was asked for, sorted by time.
     pub texts: Vec<(Stamp, String)>,
     /// Problems that did not stop the reading.
     pub notices: Notices,
+    /// The places where a recorder's clock went back, sorted by time.
+    pub(crate) falls: Vec<ClockFall>,
     /// The credible times; `None` if all of them are.
     pub(crate) believed: Option<Span>,
     /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is

@@ -1,4 +1,4 @@
-//! Conclusions from everything recorded: the proofs of all sources and of the user's files, stated values, restarts.
+//! Conclusions from everything recorded: the proofs of all sources and of the user's files, stated values.
 //! Made once, for any windows.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -6,17 +6,16 @@ use std::io;
 use std::sync::Arc;
 
 use super::collector::{Recorded, spool_error};
-use super::restarts::{Restarts, restarts};
 use super::values::StatedValues;
 use crate::base::error::Result;
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claims, Name};
+use crate::evidence::claim::{Claims, Measurement, Name};
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Stream, Validity, offers};
+use crate::evidence::proof::{Conclusions, ElementKey, Incident, Proof, Stream, Validity, offers};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
@@ -43,8 +42,12 @@ pub struct Findings {
     pub(crate) streams: Vec<Stream>,
     /// Every proof of an element.
     pub(crate) proofs: Vec<Proof>,
-    /// The restarts of nodes under the same name.
-    pub(crate) restarts: Restarts,
+    /// Statements besides who is in the graph.
+    pub(crate) incidents: Vec<Incident>,
+    /// Publications, as node and topic, whose messages are byte-for-byte copies of another topic's.
+    pub(crate) copies: BTreeSet<(Name, Name)>,
+    /// What statistics say of the messages of topics and edges.
+    pub(crate) measured: Vec<Measurement>,
     /// Stated values of elements: types, states, quality of service.
     pub(crate) values: StatedValues,
     /// The number of publishers that the bags count on each topic.
@@ -84,6 +87,8 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     let Conclusions {
         mut facts,
         mut proofs,
+        mut incidents,
+        copies,
         ..
     } = known;
     let roles = if options.roles {
@@ -99,6 +104,10 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     }
     let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
     let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
+    for incident in &mut incidents {
+        let renamed = incident.what.renamed(&to);
+        incident.what = renamed.with_node(&mut |name| role(name));
+    }
     let renamed = |stream: &Stream| {
         let publisher = stream.publisher.map(to);
         Stream {
@@ -112,14 +121,24 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     let mut lines = std::mem::take(&mut facts.pieces);
     lines.sort_unstable();
     lines.dedup();
+    let mut measured = std::mem::take(&mut facts.measured);
+    for one in &mut measured {
+        one.publisher = one.publisher.map(role);
+        one.subscriber = one.subscriber.map(role);
+    }
     Ok(Findings {
         mission,
-        restarts: restarts(recorded, &streams, &proofs)?,
+        copies: copies
+            .into_iter()
+            .map(|(n, t)| (role(to(n)), to(t)))
+            .collect(),
         values: StatedValues::new(&facts, role)?,
         offers: offers(&facts.offers, &streams),
         names: facts.into_texts(),
         streams,
         proofs,
+        incidents,
+        measured,
         lines,
         notices,
         undrawn,

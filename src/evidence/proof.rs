@@ -2,17 +2,21 @@
 
 mod at_word;
 mod closed;
+mod incident;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
+use crate::base::name::OWN_NODE;
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId};
 use crate::evidence::proof::closed::Closed;
 use crate::evidence::times::SeriesId;
+
+pub(crate) use incident::{Incident, IncidentKind};
 
 /// A connection of one of the bags.
 #[derive(Clone, Debug)]
@@ -31,6 +35,14 @@ pub(crate) struct Stream {
     pub(crate) trust: Reliability,
     /// The log times of its messages.
     pub(crate) times: SeriesId,
+}
+
+impl Stream {
+    /// Whether it is about the robot, written by this program, and no part of it.
+    pub(crate) fn is_about(&self) -> bool {
+        let node = self.connection.publisher.as_ref();
+        node.is_some_and(|node| node.as_str() == OWN_NODE)
+    }
 }
 
 /// The reliability of the publisher that a header names.
@@ -77,7 +89,7 @@ impl ElementKey {
     }
 
     /// The same element with its names renumbered.
-    fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
+    pub(crate) fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),
             Self::Topic(a) => Self::Topic(to(a)),
@@ -135,6 +147,8 @@ pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Claims,
     pub(crate) proofs: Vec<Proof>,
+    /// Statements besides who is in the graph, by time for each element.
+    pub(crate) incidents: Vec<Incident>,
     /// Proofs that were explained by their source, while `why` asks for them.
     pub(crate) worded: BTreeSet<(ElementKey, SourceId)>,
     /// Publications whose messages are byte-for-byte copies of another topic's.
@@ -166,6 +180,7 @@ impl<'a> Conclusions<'a> {
             streams,
             facts,
             proofs: Vec::new(),
+            incidents: Vec::new(),
             worded: BTreeSet::new(),
             copies: BTreeSet::new(),
             failed: None,

@@ -8,12 +8,14 @@ pub(crate) mod connection;
 pub(crate) mod contract;
 pub(crate) mod diagnostics;
 pub(crate) mod discovery;
+pub(crate) mod duplicate;
 pub(crate) mod dynamic_reconfigure;
 pub(crate) mod echo;
 pub(crate) mod equal_stamps;
 pub(crate) mod lifecycle;
 pub(crate) mod links;
 pub(crate) mod log_text;
+pub(crate) mod messages_lost;
 pub(crate) mod metrics;
 pub(crate) mod only_publisher;
 pub(crate) mod parameter_events;
@@ -33,9 +35,9 @@ pub(crate) mod statistics;
 pub(crate) mod tf_pair;
 pub(crate) mod topic_statistics;
 
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
+use crate::evidence::claim::{Claim, Claims, Degree, Measurement, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{LayoutFit, MessageLayout};
 use crate::evidence::proof::{Conclusions, Stream};
@@ -50,6 +52,8 @@ pub struct Source {
     pub(crate) reads: &'static [(MessageLayout, Read)],
     /// Whether nodes make these claims about themselves, so that the node was there at that time.
     pub(crate) own: bool,
+    /// Whether each of its snapshots holds until the next one: they are made whenever something changes.
+    pub(crate) holds: bool,
     /// Reads the announcement of a connection.
     pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
     /// Conclusions from the whole mission; run in the order of the rows.
@@ -65,6 +69,7 @@ pub(crate) const NOTHING: Source = Source {
     about: "",
     reads: &[],
     own: false,
+    holds: false,
     announced: None,
     conclude: &[],
 };
@@ -86,11 +91,19 @@ impl SourceContext<'_> {
         self.facts.name(text)
     }
 
-    /// Adds the sequence number of a message, which falls back when its publisher restarts.
-    pub(crate) fn sequence(&mut self, number: u32) {
-        if let Some(time) = self.time {
-            self.facts.sequence(self.place, time, number);
-        }
+    /// Adds what a statistic says of an interval, which ends now if it has no length.
+    pub(crate) fn measure(&mut self, measurement: Measurement) {
+        let now = self.time.unwrap_or(measurement.span.end);
+        let nanos = measurement.span.nanos().clamp(1, 3_600_000_000_000);
+        // Intervals count on the node's clock: what matters is how long they are.
+        let span = Span {
+            start: now.plus(-nanos),
+            end: now,
+        };
+        self.facts.measure(Measurement {
+            span,
+            ..measurement
+        });
     }
 
     /// Adds a claim, made now, with its explanation.

@@ -48,6 +48,15 @@ struct OpenSeries {
     bounds: Option<(Stamp, Stamp)>,
 }
 
+impl OpenSeries {
+    /// Adds a block.
+    fn hold(&mut self, block: StampBlock) {
+        let (from, to) = self.bounds.unwrap_or((block.first, block.last));
+        self.bounds = Some((from.min(block.first), to.max(block.last)));
+        self.blocks.push(block);
+    }
+}
+
 /// Any number of sequences of times, each message with its size where that is known.
 #[derive(Debug)]
 pub(crate) struct Stamps {
@@ -116,6 +125,56 @@ impl Stamps {
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
         self.open = 0;
+    }
+
+    /// The same sequences with the times from about `from` on, and the last of each; days keep their counts.
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read or written.
+    pub(crate) fn since(&self, from: Stamp) -> io::Result<Self> {
+        let mut new = Self {
+            days: self.days.clone(),
+            ..Self::default()
+        };
+        for old in &self.series {
+            let open = || old.open.iter().copied();
+            let open_last = open().map(|(time, _)| time).max();
+            let last = old.bounds.map(|(_, last)| last).max(open_last);
+            let from = last.map_or(from, |last| from.min(last));
+            let mut series = OpenSeries {
+                open: open().filter(|(time, _)| *time >= from).collect(),
+                size_unknown: old.size_unknown,
+                ..OpenSeries::default()
+            };
+            series.count = series.open.len() as u64;
+            new.open += series.open.len();
+            for block in old.blocks.iter().filter(|block| block.last >= from) {
+                let bytes = self.bytes(block)?;
+                let spool = new.spool.get_mut();
+                let spool = spool.unwrap_or_else(PoisonError::into_inner);
+                spool.seek(SeekFrom::Start(new.written))?;
+                spool.write_all(&bytes)?;
+                series.hold(StampBlock {
+                    at: new.written,
+                    ..block.clone()
+                });
+                series.count += u64::from(block.count);
+                new.written += bytes.len() as u64;
+            }
+            new.series.push(series);
+        }
+        Ok(new)
+    }
+
+    /// The first and the last of all times, and their number; `None` if there is none.
+    pub(crate) fn extent(&self) -> Option<(Stamp, Stamp, u64)> {
+        let open = |series: &OpenSeries| {
+            let times = || series.open.iter().map(|(time, _)| *time);
+            Some((times().min()?, times().max()?))
+        };
+        let ends = self.series.iter().flat_map(|s| [s.bounds, open(s)]);
+        let (first, last) = ends.flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        Some((first, last, self.series.iter().map(|s| s.count).sum()))
     }
 
     /// Ends the adding of times.
@@ -199,12 +258,16 @@ impl Stamps {
     }
 
     fn load(&self, block: &StampBlock) -> io::Result<Vec<(Stamp, u32)>> {
+        let bytes = self.bytes(block)?;
+        Ok(block::decode(&bytes, block.count as usize))
+    }
+
+    fn bytes(&self, block: &StampBlock) -> io::Result<Vec<u8>> {
         let mut bytes = vec![0; block.bytes as usize];
         let mut spool = self.spool();
         spool.seek(SeekFrom::Start(block.at))?;
         spool.read_exact(&mut bytes)?;
-        drop(spool);
-        Ok(block::decode(&bytes, block.count as usize))
+        Ok(bytes)
     }
 }
 
@@ -227,15 +290,13 @@ fn close(
         *days.entry(run[0].0.0.div_euclid(DAY)).or_default() += run.len() as u64;
     }
     let bytes = block::encode(&open);
-    series.blocks.push(StampBlock {
+    series.hold(StampBlock {
         first,
         last,
         at: *written,
         bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
         count: u32::try_from(open.len()).unwrap_or(u32::MAX),
     });
-    let (from, to) = series.bounds.unwrap_or((first, last));
-    series.bounds = Some((from.min(first), to.max(last)));
     spool.seek(SeekFrom::Start(*written))?;
     spool.write_all(&bytes)?;
     *written += bytes.len() as u64;
@@ -292,6 +353,26 @@ mod tests {
         assert!(all.sized(id) && all.sized(rest));
         assert_eq!((all.count(id), all.count(rest)), (1, 3));
         assert_eq!(all.days().values().sum::<u64>(), 4);
+    }
+
+    #[test]
+    fn a_copy_of_the_newest_times_leaves_out_whole_blocks_and_keeps_the_last_of_all() {
+        let mut all = Stamps::default();
+        let id = all.series();
+        all.add(id, &stamps(0..5000), None);
+        let new = all.since(Stamp(2500));
+        let mut new = new.unwrap();
+        assert_eq!(new.extent(), Some((Stamp(2048), Stamp(4999), 2952)));
+        new.add(id, &stamps([6000]), None);
+        new.finish().unwrap();
+        assert_eq!(new.times(id).unwrap(), stamps((2048..5000).chain([6000])));
+        assert_eq!(all.extent(), Some((Stamp(0), Stamp(4999), 5000)));
+        let latched = all.series();
+        all.add(latched, &stamps([1, 7]), None);
+        let mut new = all.since(Stamp(9000)).unwrap();
+        new.finish().unwrap();
+        assert_eq!(new.times(latched).unwrap(), stamps([7]));
+        assert_eq!(new.count(id), 1);
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub struct Topology {
     pub files: Vec<PathBuf>,
 }
 
-/// Reads a file of any of the forms, told apart by its name's ending and its content.
+/// Reads a file of any of the forms, distinguished by its name's ending and its content.
 ///
 /// # Errors
 /// [`Error::BadFile`] with the line of the mistake.

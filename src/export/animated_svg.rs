@@ -2,10 +2,8 @@
 
 use super::{AtOnce, Encoder};
 use crate::base::error::Result;
-use crate::base::geometry::Rect;
-use crate::draw::paint::animated;
-use crate::draw::paint::svg;
-use crate::export::sequence::{Overview, Sequence};
+use crate::draw::paint::animated::AnimatedScenes;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::target::Target;
 use crate::view::View;
 
@@ -22,47 +20,15 @@ pub(crate) fn start<'a>(
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
     AtOnce::start(target, move || {
-        let Some(whole) = sequence.picture.graph() else {
-            let overview = sequence.picture.overview();
-            let played = overview.map(|o| played(&o, sequence.options.frame_ms));
-            return (played.unwrap_or_default(), Vec::new());
-        };
         let remarks = remark(sequence.view).into_iter().collect();
-        let frame_ms = sequence.options.frame_ms;
-        let svg = animated::write(
-            sequence.view,
-            &sequence.mission.ledger.phases,
-            (&whole.union, whole.style),
-            sequence.picture.title().unwrap_or_default(),
-            frame_ms,
-        );
-        (svg, remarks)
+        let times = sequence.frame_times();
+        let busiest = sequence.view.busiest();
+        let still = times.iter().rposition(|time| time.window <= busiest);
+        let scene = |time: &FrameTime| (sequence.picture.scene(time.window, 1.0), time.ms);
+        let scenes = AnimatedScenes::new(times.iter().filter(|t| t.is_settled()).map(scene));
+        let title = sequence.picture.title().unwrap_or_default();
+        (scenes.write(title, still.unwrap_or(0)), remarks)
     })
-}
-
-/// The SVG text of an overview over time with a head that goes from window to window.
-fn played(overview: &Overview, frame_ms: u32) -> String {
-    let list = |of: fn(&Rect) -> f64| overview.heads_list(of, ";");
-    let seconds = overview.heads.len() as f64 * f64::from(frame_ms) / 1e3;
-    let head = overview.heads.first().copied().unwrap_or_default();
-    let turn = |name: &str, values: String| {
-        format!(
-            "<animate attributeName=\"{name}\" calcMode=\"discrete\" dur=\"{seconds}s\" repeatCount=\"indefinite\" values=\"{values}\"/>"
-        )
-    };
-    let head = format!(
-        "<rect id=\"playhead\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\">{}{}</rect>\n</svg>\n",
-        head.x,
-        head.y,
-        head.w,
-        head.h,
-        overview.color,
-        turn("x", list(|h| h.x)),
-        turn("width", list(|h| h.w)),
-    );
-    let still = svg::write(&overview.scene);
-    let open = still.trim_end().strip_suffix("</svg>").unwrap_or(&still);
-    open.to_owned() + &head
 }
 
 fn remark(view: &View) -> Option<String> {

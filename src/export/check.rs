@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::FORMATS;
 use super::sink::probe;
 use super::target::{NUMBER, Target, folder_of, is_special, same_file};
+use crate::bag;
 use crate::base::error::{Error, Result};
 
 /// Checks every file to be written before the inputs are read: no two the same, none that the user keeps, every folder
@@ -90,13 +91,17 @@ fn existing(target: &Target) -> Vec<PathBuf> {
     files.filter(|file| target.may_be(file)).collect()
 }
 
-/// Whether `file` is there, inside `folder`, and does not end like an output of ours.
+/// Whether `file` is there, inside `folder`, and ends like a bag or not like an output of ours.
 fn is_kept_in(folder: &Path, file: &Path) -> bool {
     let (Ok(folder), Ok(file)) = (folder.canonicalize(), file.canonicalize()) else {
         return false;
     };
     let ending = file.extension().unwrap_or_default().to_string_lossy();
-    file.starts_with(folder) && !FORMATS.iter().any(|f| ending.eq_ignore_ascii_case(f.word))
+    let is_ending = |word: &str| ending.eq_ignore_ascii_case(word.trim_start_matches('.'));
+    let is_output = FORMATS.iter().any(|f| is_ending(f.word));
+    // MCAP is both.
+    let mut bags = bag::FORMATS.iter().flat_map(|f| f.extensions);
+    file.starts_with(folder) && (bags.any(|word| is_ending(word)) || !is_output)
 }
 
 fn check_place(target: &Target) -> Result<()> {

@@ -63,7 +63,7 @@ impl Encoder for Gif {
         let (Ok(w), Ok(h)) = (u16::try_from(width), u16::try_from(height)) else {
             return Err(Error::Output {
                 path: self.target.path().to_owned(),
-                reason: format!("{width} by {height} pixels are more than GIF can say"),
+                reason: format!("{width} by {height} pixels exceed GIF's limit"),
                 hint: "give a `--size` below 65,536 pixels, or write `.apng`".to_owned(),
             });
         };

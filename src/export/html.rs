@@ -11,12 +11,11 @@ mod table;
 use std::fmt::Write as _;
 
 use crate::base::digest;
-use crate::base::geometry::Rect;
 use crate::base::notice::NoticeKind;
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::board::Overview;
-use crate::draw::paint::classes::{self, ClassDetail, Classes, ElementLook};
+use crate::draw::paint::classes::{self, Classes, ElementLook};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
@@ -41,6 +40,9 @@ const SCRIPT: [&str; 9] = [
     include_str!("html/player/save.js"),
     include_str!("html/player/keys.js"),
 ];
+
+/// The part of the script that only a page has that is served while its recording grows.
+const LIVE: &str = include_str!("html/player/live.js");
 
 /// The parts of a page.
 pub(crate) struct HtmlPage<'a> {
@@ -87,15 +89,20 @@ impl<'a> PageGraph<'a> {
 }
 
 impl HtmlPage<'_> {
-    /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
+    /// The page: UTF-8, without a single request unless it is served, its scripts and styles named by digest in its policy.
     pub(crate) fn write(&self) -> String {
         let still = self.whole.view.busiest_change();
         let fonts = fonts();
         let look = self.look();
-        let script = SCRIPT.map(squeezed).join("\n");
+        let mut script = SCRIPT.map(squeezed).join("\n");
+        let mut requests = "";
+        if self.sequence.options.is_live {
+            script = script + "\n" + &squeezed(LIVE);
+            requests = "connect-src 'self';";
+        }
         let (data, data_type) = data::packed(&data::json(self, still));
         let policy = format!(
-            "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
+            "default-src 'none';{requests}script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
             digest::policy(&script),
             digest::policy(&fonts),
             digest::policy(&look),
@@ -106,7 +113,13 @@ impl HtmlPage<'_> {
             "normal"
         };
         let view = self.whole.view;
-        let kind = if view.compares { "compares" } else { "" };
+        let is_paired = self.sequence.options.pairs.is_some();
+        let kind = match self.overview {
+            Some(_) => "board",
+            None if view.compares && is_paired => "compares paired",
+            None if view.compares => "compares",
+            None => "",
+        };
         let mut title = Xml::default();
         title.text(&visible(self.title));
         let title = title.finish();
@@ -164,9 +177,14 @@ impl HtmlPage<'_> {
     }
 
     fn legend(&self) -> String {
-        let views: Vec<&View> = self.drawn().map(|d| d.view).collect();
+        // The timeline of topics has no boxes and lines.
+        let views: Vec<&View> = match self.overview {
+            Some(_) => Vec::new(),
+            None => self.drawn().map(|d| d.view).collect(),
+        };
         let change = self.sequence.unfolded.map_or(0.25, |u| u.rate_change);
-        signs::legend(&views, change)
+        let lives = self.sequence.unfolded.and_then(|u| u.lives);
+        signs::legend(&views, change) + &signs::timeline(lives)
     }
 
     /// The notices of what the picture leaves out and what went wrong, a line each.
@@ -207,11 +225,7 @@ impl HtmlPage<'_> {
         (id, is_hidden): (&str, bool),
         still: usize,
     ) {
-        let detail = ClassDetail {
-            is_fine: true,
-            has_names: true,
-        };
-        let graph = Classes::new(drawn.view, &drawn.union, self.style, detail);
+        let graph = Classes::new(drawn.view, &drawn.union);
         let runs = &drawn.runs;
         let window = u32::try_from(still).unwrap_or(0);
         // A margin, and room around a small graph: three boxes as large as the screen are hard to read.
@@ -279,30 +293,17 @@ impl HtmlPage<'_> {
     }
 }
 
-/// The board of topics, with a head that the player moves.
+/// The board of topics, for readers without scripts: the player draws it as its timeline.
 fn board(overview: &Overview) -> String {
     let still = svg::write(&overview.scene);
     let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
     let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);
     // The page has ids of its own.
     let inside = inside.replace(" id=\"", " data-part=\"");
-    let list = |of: fn(&Rect) -> f64| overview.heads_list(of, " ");
-    let (size, head) = (
-        overview.scene.size,
-        overview.heads.first().copied().unwrap_or_default(),
-    );
+    let size = overview.scene.size;
     format!(
-        "<svg id=\"graph\" class=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}\
-         <rect id=\"boardhead\" data-x=\"{}\" data-width=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/></svg>",
-        size.w,
-        size.h,
-        list(|h| h.x),
-        list(|h| h.w),
-        head.x,
-        head.y,
-        head.w,
-        head.h,
-        overview.color,
+        "<svg id=\"graph\" class=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}</svg>",
+        size.w, size.h,
     )
 }
 
@@ -385,11 +386,11 @@ mod tests {
         let kib = |text: &str| text.len() as f64 / 1024.0;
         let script = SCRIPT.map(squeezed).join("\n");
         assert!(
-            kib(&script) <= 46.0,
+            kib(&script) <= 52.0,
             "the script has {:.2} KiB",
             kib(&script)
         );
         let look = squeezed(LOOK);
-        assert!(kib(&look) <= 10.5, "the look has {:.2} KiB", kib(&look));
+        assert!(kib(&look) <= 13.5, "the look has {:.2} KiB", kib(&look));
     }
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::base::error::{Error, Result};
 pub use crate::draw::figure::FigureOptions;
+use crate::draw::figure::course::LifeLines;
 pub use crate::draw::strip::Choice;
 pub use crate::mission::JsonForm;
 
@@ -35,8 +36,12 @@ pub struct SequenceOptions {
     pub strip: Option<Choice>,
     /// The figure, if one was asked for: it stands where a strip would.
     pub figure: Option<FigureOptions>,
+    /// The life lines of two missions that are compared, in place of the mission's own.
+    pub pairs: Option<LifeLines>,
     /// Links for the report: name and address.
     pub links: Vec<(String, String)>,
+    /// Whether a page asks its server for newer ones, and takes their place.
+    pub is_live: bool,
     /// A file that reports are appended to, where all others are written anew.
     pub append_to: Option<PathBuf>,
 }
@@ -56,7 +61,9 @@ impl Default for SequenceOptions {
             has_runs: false,
             strip: None,
             figure: None,
+            pairs: None,
             links: Vec::new(),
+            is_live: false,
             append_to: None,
         }
     }

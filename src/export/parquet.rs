@@ -19,7 +19,7 @@ use ::parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPro
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn, TextColumn, span};
 
 /// The largest number of rows in a group, as other writers have it.
 const MOST_ROWS: usize = 1 << 20;
@@ -119,7 +119,7 @@ impl<W: Write + Send> Rows<W> {
 
 /// Chooses how a column is written where the usual way, a dictionary of its values, does not fit it.
 fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterPropertiesBuilder {
-    let path = || ColumnPath::from(column.name.as_ref());
+    let path = || ColumnPath::new(path(column).into_iter().map(str::to_owned).collect());
     match &column.values {
         // Times and counts differ little from row to row and are seldom equal; they stand as differences, which every
         // reader of Parquet 2 knows.
@@ -135,40 +135,82 @@ fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterP
 }
 
 fn schema(batch: &Batch) -> ParquetResult<TypePtr> {
-    let fields = batch.columns.iter().map(field).collect::<Result<_, _>>()?;
-    let root = Type::group_type_builder("schema").with_fields(fields);
+    let columns = batch.columns.iter();
+    let columns: Vec<PathOf<'_>> = columns.map(|c| (path(c), c)).collect();
+    let root = Type::group_type_builder("schema").with_fields(fields(&columns, 0)?);
     root.build().map(Arc::new)
 }
 
-/// A column as the file has it.
-fn field(column: &TableColumn) -> ParquetResult<TypePtr> {
-    let mut levels = column.lists.len();
-    let name = |levels: usize| match levels {
-        0 => column.name.as_ref(),
-        _ => "element",
-    };
+/// A column behind its path: the names of the structures around it, then its own.
+type PathOf<'a> = (Vec<&'a str>, &'a TableColumn);
+
+fn path(column: &TableColumn) -> Vec<&str> {
+    if column.is_nested {
+        column.name.split('.').collect()
+    } else {
+        vec![column.name.as_ref()]
+    }
+}
+
+/// The fields of a structure `depth` names deep, which holds all of these columns.
+fn fields(columns: &[PathOf<'_>], depth: usize) -> ParquetResult<Vec<TypePtr>> {
+    let groups = columns.chunk_by(|(a, _), (b, _)| {
+        a.get(depth) == b.get(depth) && a.len() > depth + 1 && b.len() > depth + 1
+    });
+    let fields = groups.map(|group| {
+        let (path, column) = &group[0];
+        let name = path.get(depth).copied().unwrap_or_default();
+        let plain = name.trim_end_matches(LIST);
+        let is_list = plain != name;
+        if path.len() == depth + 1 {
+            let levels = if column.is_nested {
+                usize::from(is_list)
+            } else {
+                column.lists.len()
+            };
+            return field(column, plain, levels);
+        }
+        let own = if is_list { "element" } else { plain };
+        let inner = Type::group_type_builder(own)
+            .with_repetition(Repetition::REQUIRED)
+            .with_fields(fields(group, depth + 1)?);
+        let inner = Arc::new(inner.build()?);
+        if is_list {
+            list(plain, inner)
+        } else {
+            Ok(inner)
+        }
+    });
+    fields.collect()
+}
+
+/// A list of these elements.
+fn list(name: &str, element: TypePtr) -> ParquetResult<TypePtr> {
+    let list = Type::group_type_builder("list")
+        .with_repetition(Repetition::REPEATED)
+        .with_fields(vec![element]);
+    let outer = Type::group_type_builder(name)
+        .with_repetition(Repetition::REQUIRED)
+        .with_logical_type(Some(LogicalType::List))
+        .with_fields(vec![Arc::new(list.build()?)]);
+    outer.build().map(Arc::new)
+}
+
+/// A column as the file has it, inside `levels` lists of its own.
+fn field(column: &TableColumn, name: &str, levels: usize) -> ParquetResult<TypePtr> {
+    let own = |levels: usize| if levels == 0 { name } else { "element" };
     let optional = column.valid.is_some() && levels == 0;
     let (physical, logical) = kind(column.kind);
-    let value = Type::primitive_type_builder(name(levels), physical)
+    let value = Type::primitive_type_builder(own(levels), physical)
         .with_logical_type(logical)
         .with_repetition(if optional {
             Repetition::OPTIONAL
         } else {
             Repetition::REQUIRED
         });
-    let mut field = Arc::new(value.build()?);
-    while levels > 0 {
-        levels -= 1;
-        let list = Type::group_type_builder("list")
-            .with_repetition(Repetition::REPEATED)
-            .with_fields(vec![field]);
-        let outer = Type::group_type_builder(name(levels))
-            .with_repetition(Repetition::REQUIRED)
-            .with_logical_type(Some(LogicalType::List))
-            .with_fields(vec![Arc::new(list.build()?)]);
-        field = Arc::new(outer.build()?);
-    }
-    Ok(field)
+    let value = Arc::new(value.build()?);
+    let mut levels = (0..levels).rev();
+    levels.try_fold(value, |element, level| list(own(level), element))
 }
 
 fn kind(kind: ColumnKind) -> (Physical, Option<LogicalType>) {

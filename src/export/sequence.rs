@@ -13,7 +13,7 @@ use crate::draw::scene::Scene;
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::mission::{Mission, Places};
-use crate::view::View;
+use crate::view::{Frame, View};
 
 /// The drawings of the windows of a sequence.
 pub trait Drawings: Sync {
@@ -82,7 +82,7 @@ pub struct Unfolded<'a> {
     pub picture: Option<&'a dyn Drawings>,
     /// The life lines of the mission, if an output needs them.
     pub lives: Option<&'a LifeLines>,
-    /// The least relative change of a rate that is told.
+    /// The least relative change of a rate that is reported.
     pub rate_change: f64,
 }
 
@@ -138,12 +138,14 @@ const STAGED_MS: (u32, u32) = (20, 100);
 
 impl Sequence<'_> {
     /// The frames in order. The whole time stays the same: staged frames take theirs from their window, and a window
-    /// that is left out gives its time to the one before.
+    /// that is left out gives its time to the one before. A long time without a message is one frame, as long as any other.
     pub fn frame_times(&self) -> Vec<FrameTime> {
-        let changed: Vec<bool> = (0..self.view.frames.len())
-            .map(|k| self.view.is_changed(k))
-            .collect();
-        frame_times(&changed, &self.options)
+        let frames = &self.view.frames;
+        let changed: Vec<bool> = frames.iter().map(Frame::is_changed).collect();
+        let mut times = frame_times(&changed, &self.options);
+        let empty = |time: &FrameTime| frames[time.window].empty;
+        times.dedup_by(|later, before| empty(later).is_some() && empty(later) == empty(before));
+        times
     }
 }
 

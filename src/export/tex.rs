@@ -23,6 +23,6 @@ pub(crate) fn start<'a>(
 pub(crate) fn needs_figure(target: &Target) -> Error {
     Error::usage(
         format!("`{}` puts a figure into LaTeX", target.path().display()),
-        "say which: `--figure lives`, `map` or `steps`, with `-o fig.pdf` beside it",
+        "`bagreel figure BAG -o fig.pdf -o fig.tex` draws one",
     )
 }

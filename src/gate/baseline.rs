@@ -44,7 +44,8 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     let nodes = room.section("nodes", nodes);
     // Who found no room is not unexpected.
     let others = if room.left_out == 0 { "warn" } else { "allow" };
-    let topics = draft.topics.iter().map(|(name, line)| (name, line.text()));
+    let topics = draft.topics.iter();
+    let topics = topics.map(|(name, line)| (name, line.text() + &line.comment()));
     let topics = room.section("topics", topics);
     let note = match room.left_out {
         0 => String::new(),

@@ -2,12 +2,14 @@
 
 mod elements;
 mod happened;
+mod pairs;
 mod report;
 mod union;
 
 use super::facts::Facts;
 use crate::mission::Mission;
 
+pub(crate) use pairs::pairs;
 pub(crate) use report::{DIFF_FORMATS, DiffFormat, DiffSubject};
 pub(crate) use union::{Side, union};
 

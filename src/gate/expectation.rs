@@ -5,10 +5,12 @@ mod parse;
 
 use std::path::PathBuf;
 
+use super::finding::FindingKind;
 use super::pattern::Pattern;
 use super::range::{During, Range};
 use crate::base::time::{Period, Stamp};
 pub(crate) use crate::base::yaml::YamlPlace;
+use crate::mission::ledger::Kind;
 
 pub(crate) use parse::read;
 
@@ -55,7 +57,20 @@ pub(crate) struct Policy {
     pub(crate) topics: Unlisted,
     /// The policy for publishers of topics whose publishers are listed.
     pub(crate) publishers: Unlisted,
+    /// The policy for remarks of the event log, in the order of [`REMARKS`].
+    pub(crate) remarks: [Unlisted; REMARKS.len()],
 }
+
+/// The remarks of the event log that are findings: the key of their policy, their kind there and here.
+pub(crate) const REMARKS: [(&str, Kind, FindingKind); 3] = [
+    ("starved", Kind::Starved, FindingKind::Starved),
+    (
+        "duplicate_names",
+        Kind::Duplicate,
+        FindingKind::DuplicateName,
+    ),
+    ("messages_lost", Kind::Lost, FindingKind::MessagesLost),
+];
 
 /// The severity of something that is not named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

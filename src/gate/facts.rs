@@ -221,7 +221,7 @@ impl<'a> Facts<'a> {
         .collect()
     }
 
-    /// Whether a tool rewrote the bag: senders that it merged cannot be told apart.
+    /// Whether a tool rewrote the bag: senders that it merged cannot be distinguished.
     pub(crate) fn is_rewritten(&self) -> bool {
         self.is_rewritten
     }
@@ -352,18 +352,16 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The time at which a role was last there, if that is before the mission is closed down, and whether that is known to
-    /// within a few seconds.
-    pub(crate) fn ended(&self, nodes: &[NodeId]) -> Option<(Stamp, bool)> {
+    /// The time at which a role was last there, if that is before the mission is closed down, and the uncertainty of that
+    /// time in nanoseconds.
+    pub(crate) fn ended(&self, nodes: &[NodeId]) -> Option<(Stamp, i64)> {
         let end = self.lives(nodes).last()?.end;
         if self.mission.span.end.since(end) <= CLOSING_NS {
             return None;
         }
         let stopped = self.entries(nodes, Kind::Stopped);
-        let vague = stopped
-            .last()
-            .is_some_and(|e| e.latest.since(e.earliest) > CLOSING_NS);
-        Some((end, !vague))
+        let doubt = stopped.last().map_or(0, |e| e.latest.since(e.earliest));
+        Some((end, doubt))
     }
 
     /// Whether a role is known by its log alone: nothing else of it was recorded, and nothing lists the nodes.

@@ -34,6 +34,9 @@ pub(crate) enum FindingKind {
     TooManyChanges,
     UnexpectedNode,
     UnexpectedTopic,
+    Starved,
+    DuplicateName,
+    MessagesLost,
     AllowUnused,
 }
 
@@ -42,7 +45,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::NodeMissing,
         "node-missing",
-        "A node that is expected is not in the bag.",
+        "An expected node is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
          folded). Undecidable in a bag that names no node at all or only those that wrote a log, in one whose senders a tool \
          has merged, of nodes with `known_by: log`, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
@@ -51,7 +54,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::NodeForbidden,
         "node-forbidden",
-        "A node is in the bag that must not be there.",
+        "A forbidden node is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.",
     ),
     (
@@ -84,14 +87,14 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::TopicMissing,
         "topic-missing",
-        "A topic that is expected is not in the bag.",
+        "An expected topic is not in the bag.",
         "A topic is there if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
          messages. `optional: true` asks for nothing.",
     ),
     (
         FindingKind::TopicForbidden,
         "topic-forbidden",
-        "A topic is in the bag that must not be there.",
+        "A forbidden topic is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern.",
     ),
     (
@@ -143,7 +146,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::PublisherMissing,
         "publisher-missing",
-        "A node does not publish a topic that it should.",
+        "A node does not publish an expected topic.",
         "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.",
     ),
     (
@@ -156,7 +159,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::SubscriberMissing,
         "subscriber-missing",
-        "A node does not subscribe a topic that it should.",
+        "A node does not subscribe to an expected topic.",
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
          discovery, or this node's log of its connections.",
     ),
@@ -169,7 +172,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::ReactionMissing,
         "reaction-missing",
-        "Something did not happen that should follow something else.",
+        "An expected reaction did not happen.",
         "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
          must follow; times count as uncertain as they are known.",
     ),
@@ -182,14 +185,32 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::UnexpectedNode,
         "unexpected-node",
-        "A node is in the bag that the file does not name.",
+        "A node in the bag is not in the file.",
         "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.",
     ),
     (
         FindingKind::UnexpectedTopic,
         "unexpected-topic",
-        "A topic is in the bag that the file does not name.",
+        "A topic in the bag is not in the file.",
         "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.",
+    ),
+    (
+        FindingKind::Starved,
+        "starved",
+        "A subscriber gets nothing, since its quality of service asks for more than is offered.",
+        "A warning wherever a log or `/rosgraph` says so; `policy: {starved: error}` or `allow`.",
+    ),
+    (
+        FindingKind::DuplicateName,
+        "duplicate-name",
+        "Two nodes have the same name.",
+        "A warning wherever a log or `/rosgraph` says so; `policy: {duplicate_names: error}` or `allow`.",
+    ),
+    (
+        FindingKind::MessagesLost,
+        "messages-lost",
+        "The recorder lost messages, so that gaps and low rates may be its own.",
+        "A warning wherever the recorder says so; `policy: {messages_lost: error}` or `allow`.",
     ),
     (
         FindingKind::AllowUnused,

@@ -143,7 +143,7 @@ struct Judge<'a> {
     told: Cell<usize>,
 }
 
-/// The largest number of missing names for which the nearest one is told; with more the file is of another robot.
+/// The largest number of missing names for which the nearest one is reported; with more the file is of another robot.
 const NEAR: usize = 50;
 
 impl Judge<'_> {

@@ -24,6 +24,8 @@ pub(crate) struct Subject<'a> {
     pub(crate) bags: Vec<String>,
     /// The expectation, as it was typed.
     pub(crate) file: String,
+    /// The expectation from the root of its repository, as services compare it with changed files.
+    pub(crate) tracked: String,
     /// Names and addresses of links in the report.
     pub(crate) links: Vec<(String, String)>,
 }

@@ -4,8 +4,11 @@
 pub(crate) mod assemble;
 pub(crate) mod history;
 pub(crate) mod liveness;
+pub(crate) mod measures;
 pub(crate) mod merged;
 pub(crate) mod rates;
+pub(crate) mod recordings;
+pub(crate) mod restarts;
 pub(crate) mod senders;
 pub(crate) mod settle;
 pub(crate) mod tempo;
@@ -22,8 +25,10 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::{self, conclude};
 
 pub(crate) use assemble::{Windowed, graphs};
-pub(crate) use history::{History, made};
+pub(crate) use history::{History, Record, made};
 pub(crate) use rates::{TopicCount, counts};
+pub(crate) use restarts::unread;
+pub(crate) use senders::traffic;
 
 /// The result of building all graphs for one division of time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,7 +61,8 @@ pub fn build(
     grace: usize,
 ) -> Result<Built> {
     let findings = conclude(recorded, options)?;
-    let history = made(recorded, &findings)?;
+    let traffic = traffic(recorded, &findings)?;
+    let history = made(recorded, &findings, &traffic)?;
     let windowed = graphs(recorded, &findings, &history, windows, grace)?;
     Ok(Built {
         lives: PerElement::new(&history.elements, |what| {

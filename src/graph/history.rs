@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 
 use super::{EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
-use crate::base::rhythm::{FEWEST, OFTEN, SAME_RATE, broken_after};
+use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, broken_after};
 use crate::base::time::{Span, Stamp};
 
 /// A moment with its uncertainty.
@@ -213,10 +213,13 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
         let own: Vec<&Stretch> = stretches.iter().filter(inside).collect();
+        let mut longest = 0;
         for (at, stretch) in own.iter().enumerate() {
             let next = own.get(at + 1).map(|next| next.first);
             let silence = next.unwrap_or(life.end).since(stretch.last);
-            let long = silence > broken_after(stretch.period);
+            let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest));
+            let long = silence > usual;
+            longest = longest.max(silence);
             if stretch.is_even && stretch.count >= FEWEST && long {
                 found.push((stretch.last, next));
             }

@@ -116,7 +116,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     }
     Err(Error::usage(
         format!(
-            "`--start` and `--end` leave nothing of the {} of this bag",
+            "`--start` and `--end` select nothing of this bag's {}",
             words::period(bag.nanos())
         ),
         format!("the bag covers {} to {}", bag.start, bag.end),
@@ -370,7 +370,7 @@ mod tests {
         assert_eq!(cut(Some("30"), Some("-30s")).unwrap(), secs(130, 170));
         assert_eq!(
             cut(None, Some("0")).unwrap_err().to_string(),
-            "`--start` and `--end` leave nothing of the 100 s of this bag"
+            "`--start` and `--end` select nothing of this bag's 100 s"
         );
     }
 }

@@ -56,7 +56,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         routes,
         clusters,
         remarks: vec![
-            "too large for layers: packed by namespace, edges may run across boxes".to_owned(),
+            "too large for layers: packed by namespace; edges may cross boxes".to_owned(),
         ],
     }
 }
@@ -82,6 +82,7 @@ mod tests {
             vertices: vec![vertex(Some(1)), vertex(None), vertex(Some(0))],
             links: vec![link(0, 1)],
             clusters: vec![cluster(None), cluster(Some(0))],
+            ..Plan::default()
         };
         let page = Size::new(800.0, 450.0);
         let layout = lay_out(

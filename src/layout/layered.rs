@@ -126,6 +126,10 @@ struct Ordering {
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
 fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Ordering> {
     let mut ways = rankings(part, options);
+    if plan.is_labelled {
+        // Labels stand in layers between those of the boxes.
+        ways.iter_mut().flatten().for_each(|rank| *rank *= 2);
+    }
     ways.retain(|rank| items(part, rank) <= MOST);
     let mut lanes = vec![Lane::Inside];
     if part.ends.len() <= MANY && !part.clusters.is_empty() {
@@ -365,7 +369,10 @@ fn block(
         .map(|v| Rect::around(sheet.centre(v), room.size[v]))
         .collect();
     let clusters = room.frames(&boxes, &across, &columns);
-    let routes = sheet.routes(&part.ends);
+    let mut routes = sheet.routes(&part.ends);
+    for (route, chain) in routes.iter_mut().zip(&layers.chains) {
+        route.label = room.label_of(chain, &across, &columns);
+    }
     PlacedPart {
         size: Size::default(),
         crossings: ordering.crossings,

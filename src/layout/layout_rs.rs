@@ -41,7 +41,7 @@ impl Engine for LayoutRs {
         let hint = "use `--layout layered`, or show fewer elements";
         if plan.vertices.len() > MOST {
             return Err(Error::usage(
-                format!("layout-rs takes too long for more than {MOST} elements"),
+                format!("layout-rs is too slow for more than {MOST} elements"),
                 hint,
             ));
         }
@@ -81,12 +81,8 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
         .iter()
         .map(|part| block(&flat, options, part, orientation))
         .collect();
-    let blocks = blocks.ok_or_else(|| {
-        Error::usage(
-            "layout-rs put boxes on top of each other",
-            "use `--layout layered`",
-        )
-    })?;
+    let blocks = blocks
+        .ok_or_else(|| Error::usage("layout-rs overlapped boxes", "use `--layout layered`"))?;
     let (_, mut layout) = assembled(&flat, options, &parts, blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
     labels::place(&flat, &mut layout);

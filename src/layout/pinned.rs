@@ -201,6 +201,7 @@ mod tests {
             vertices: vec![vertex(None), vertex(Some(0)), vertex(Some(0))],
             links: vec![link(0, 2)],
             clusters: vec![cluster(None)],
+            ..Plan::default()
         };
         let known = [
             Some(Rect::new(20.0, 40.0, 80.0, 30.0)),

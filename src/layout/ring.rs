@@ -3,7 +3,7 @@
 //! Layers would lead most of such edges past most of the boxes. On a rim no box lies between two others.
 
 use super::layered::labels;
-use super::{Engine, Layout, LayoutOptions, Orientation, Outline, Plan, Route, Vertex};
+use super::{Engine, Layout, LayoutOptions, Orientation, Plan, Route, Vertex};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 
@@ -26,7 +26,7 @@ impl Engine for Ring {
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         if plan.vertices.len() > MOST {
             return Err(Error::usage(
-                format!("a ring holds at most {MOST} boxes"),
+                format!("a ring has at most {MOST} boxes"),
                 "use `--layout layered`, or show fewer elements",
             ));
         }
@@ -125,10 +125,7 @@ fn route(places: [usize; 2], ends: [&Vertex; 2], boxes: &[Rect]) -> Route {
     };
     let curves = BENDS.map(|bend| swung(from.centre(), to.centre(), bend));
     let curve = curves.iter().find(|c| is_clear(c)).unwrap_or(&curves[0]);
-    let inside = |rect: &Rect, vertex: &Vertex, p: Point| match vertex.outline {
-        Outline::Box => holds(rect, p),
-        Outline::Ellipse => in_ellipse(rect, p),
-    };
+    let inside = |rect: &Rect, vertex: &Vertex, p: Point| vertex.outline.holds(rect, p);
     let start = border(|t| inside(&from, ends[0], on(curve, t)));
     let end = 1.0 - border(|t| inside(&to, ends[1], on(curve, 1.0 - t)));
     let [a, b, c, d] = part(curve, start, end.max(start + 1e-3));
@@ -160,15 +157,6 @@ fn swung(a: Point, b: Point, bend: f64) -> [Point; 4] {
 
 fn holds(rect: &Rect, p: Point) -> bool {
     p.x > rect.x && p.x < rect.right() && p.y > rect.y && p.y < rect.bottom()
-}
-
-fn in_ellipse(rect: &Rect, p: Point) -> bool {
-    let middle = rect.centre();
-    let (x, y) = (
-        (p.x - middle.x) / (rect.w / 2.0).max(1e-6),
-        (p.y - middle.y) / (rect.h / 2.0).max(1e-6),
-    );
-    x * x + y * y < 1.0
 }
 
 /// The place, from 0 to about a half, at which a curve leaves its box: the last one that is inside.

@@ -71,14 +71,7 @@ impl RoutingPlane<'_> {
 
     /// The reach of a vertex's outline across from its middle, at a distance along.
     fn rise(&self, v: usize, along: f64) -> f64 {
-        let half = self.size[v].h / 2.0;
-        match self.outline[v] {
-            Outline::Box => half,
-            Outline::Ellipse => {
-                let off = along / (self.size[v].w / 2.0).max(1e-9);
-                half * (1.0 - off * off).max(0.0).sqrt()
-            }
-        }
+        self.outline[v].reach(self.size[v].h, self.size[v].w, along)
     }
 
     /// The places across at which each chain leaves its first vertex and enters its last.
@@ -119,14 +112,7 @@ impl RoutingPlane<'_> {
 
     /// The reach of a vertex's outline along from its middle, at a place across.
     fn reach(&self, v: usize, across: f64) -> f64 {
-        let half = self.size[v].w / 2.0;
-        match self.outline[v] {
-            Outline::Box => half,
-            Outline::Ellipse => {
-                let off = (across - self.across[v]) / (self.size[v].h / 2.0).max(1e-9);
-                half * (1.0 - off * off).max(0.0).sqrt()
-            }
-        }
+        self.outline[v].reach(self.size[v].w, self.size[v].h, across - self.across[v])
     }
 
     fn route(&self, chain: &[usize], (leave, enter): (f64, f64)) -> Route {

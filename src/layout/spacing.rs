@@ -2,7 +2,9 @@
 //!
 //! Here x runs along the edges and y across; [`turned`] brings sizes there and back.
 
-use crate::base::geometry::{Rect, Size};
+use std::collections::BTreeMap;
+
+use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{Component, LayerItem, LayerRows, Layers, LayoutOptions, Orientation, Plan};
 
 /// The room between boxes side by side, between edges side by side, and between an edge and anything else.
@@ -18,6 +20,21 @@ const LABEL_GAP: f64 = 12.0;
 /// The room that the first self loop takes beside its vertex, and each further one.
 const LOOP: (f64, f64) = (14.0, 6.0);
 
+/// The room between a label and its edge.
+const ASIDE: f64 = 4.0;
+/// The room that edges need to bend where they bend twice, as a part of the room for once.
+const TWICE: f64 = 0.45;
+
+/// The bend beside which the label of an edge stands: about the middle one, in a layer without boxes.
+fn label_bend(plan: &Plan, layers: &Layers, chain: &[usize]) -> Option<usize> {
+    let is_free = |item: &&usize| layers.rank[**item] % 2 == 1;
+    let bends = chain.get(1..chain.len().checked_sub(1)?)?;
+    let free: Vec<usize> = bends.iter().filter(is_free).copied().collect();
+    free.get(free.len() / 2)
+        .copied()
+        .filter(|_| plan.is_labelled)
+}
+
 /// The sizes of one part, seen in one orientation.
 pub(crate) struct Spacing<'a> {
     layers: &'a Layers,
@@ -28,8 +45,12 @@ pub(crate) struct Spacing<'a> {
     loops: Vec<usize>,
     /// The longest label along that stands between a layer and the next.
     label: Vec<f64>,
+    /// The size of the label that stands beside each bend, if there is one.
+    worded: BTreeMap<usize, Size>,
     /// The size of each cluster's title; the first stands for the outside.
     title: Vec<Size>,
+    /// The room for the words at the end of each cluster: along, across.
+    footer: Vec<(f64, f64)>,
     /// The room below a title that stands across the edges.
     below_title: f64,
 }
@@ -47,21 +68,38 @@ impl<'a> Spacing<'a> {
             loops[from] += 1;
         }
         let mut label = vec![0.0_f64; layers.ranks];
+        let mut worded = BTreeMap::new();
         for (&i, chain) in part.links.iter().zip(&layers.chains) {
+            if let (Some(size), Some(bend)) = (plan.links[i].label, label_bend(plan, layers, chain))
+            {
+                worded.insert(bend, turned(size, orientation));
+                continue;
+            }
             if let (Some(size), &[first, _]) = (plan.links[i].label, chain.as_slice()) {
                 let label = &mut label[layers.rank[first]];
                 *label = label.max(turned(size, orientation).w);
             }
         }
         let size = |&v: &usize| turned(plan.vertices[v].size, orientation);
-        let title = |&c: &usize| turned(plan.clusters[c].title, orientation);
+        let title = |&c: &usize| {
+            let cluster = &plan.clusters[c];
+            turned(Size::new(cluster.words(), cluster.title.h), orientation)
+        };
+        let footer = |&c: &usize| match orientation {
+            Orientation::LeftRight => (0.0, plan.clusters[c].footer.h),
+            Orientation::TopBottom => (plan.clusters[c].footer.h, 0.0),
+        };
         Self {
             layers,
             orientation,
             size: part.vertices.iter().map(size).collect(),
             loops,
             label,
+            worded,
             below_title: if options.is_tight { 0.0 } else { HEAD },
+            footer: std::iter::once((0.0, 0.0))
+                .chain(part.clusters.iter().map(footer))
+                .collect(),
             title: std::iter::once(Size::default())
                 .chain(part.clusters.iter().map(title))
                 .collect(),
@@ -100,9 +138,43 @@ impl<'a> Spacing<'a> {
                 PADDING + self.title[self.layers.home[item]].h
             }
             (LayerItem::Top, Orientation::TopBottom) if onwards => PADDING,
-            (LayerItem::Bottom, _) if !onwards => PADDING,
+            (LayerItem::Bottom, _) if !onwards => PADDING + self.footer[self.layers.home[item]].1,
+            (LayerItem::Bend, _) if onwards == self.is_label_onwards() => {
+                self.worded.get(&item).map_or(0.0, |size| size.h + ASIDE)
+            }
             _ => 0.0,
         }
+    }
+
+    /// Whether labels stand on the later side of their edges: to the right of upright ones, and above level ones.
+    fn is_label_onwards(&self) -> bool {
+        self.orientation == Orientation::TopBottom
+    }
+
+    /// The middle of the label of an edge that has room of its own.
+    pub(crate) fn label_of(
+        &self,
+        chain: &[usize],
+        across: &[f64],
+        columns: &[(f64, f64)],
+    ) -> Option<Point> {
+        let bend = chain.iter().find(|item| self.worded.contains_key(item))?;
+        let (start, end) = columns[self.layers.rank[*bend]];
+        Some(Point::new(
+            f64::midpoint(start, end),
+            self.beside(*bend, across),
+        ))
+    }
+
+    /// The middle across of the label beside a bend.
+    fn beside(&self, bend: usize, across: &[f64]) -> f64 {
+        let aside = self.worded[&bend].h / 2.0 + ASIDE;
+        across[bend]
+            + if self.is_label_onwards() {
+                aside
+            } else {
+                -aside
+            }
     }
 
     fn gap(&self, a: usize, b: usize) -> f64 {
@@ -182,7 +254,8 @@ impl<'a> Spacing<'a> {
 
     fn widths(&self) -> Vec<f64> {
         let mut width = vec![0.0_f64; self.layers.ranks];
-        for (v, size) in self.size.iter().enumerate() {
+        let labels = self.worded.iter().map(|(&bend, size)| (bend, size));
+        for (v, size) in self.size.iter().enumerate().chain(labels) {
             let width = &mut width[self.layers.rank[v]];
             *width = width.max(size.w);
         }
@@ -220,7 +293,7 @@ impl<'a> Spacing<'a> {
                 before += self.lead(cluster);
             }
             if high == rank {
-                after += PADDING;
+                after += PADDING + self.footer[cluster].0;
             }
             cluster = self.layers.parent[cluster];
         }
@@ -255,7 +328,13 @@ impl<'a> Spacing<'a> {
                 steepest = steepest.max(rise(v, u));
             }
         }
-        20.0 + (edges * 0.4_f64).min(11.0) + (steepest * 0.04).min(16.0)
+        let room = 20.0 + (edges * 0.4_f64).min(11.0) + (steepest * 0.04).min(16.0);
+        // Between two layers of boxes edges then bend twice.
+        if self.worded.is_empty() {
+            room
+        } else {
+            room * TWICE
+        }
     }
 
     /// A box around each cluster, children inside their parents, all in their borders.
@@ -273,6 +352,14 @@ impl<'a> Spacing<'a> {
             let room = self.loop_room(v);
             let rect = Rect::new(rect.x, rect.y - room, rect.w, rect.h + 2.0 * room);
             add(&mut content[self.layers.home[v]], rect);
+        }
+        for (&bend, size) in &self.worded {
+            let (start, end) = columns[self.layers.rank[bend]];
+            let middle = Point::new(f64::midpoint(start, end), self.beside(bend, across));
+            add(
+                &mut content[self.layers.home[bend]],
+                Rect::around(middle, *size),
+            );
         }
         let mut frames = vec![Rect::default(); self.layers.parent.len()];
         for cluster in (1..frames.len()).rev() {
@@ -297,15 +384,16 @@ impl<'a> Spacing<'a> {
         let ((top, bottom), (low, high)) =
             (self.layers.borders[cluster], self.layers.span[cluster]);
         let (lead, head) = (self.lead(cluster), self.headroom(cluster));
+        let (tail, foot) = self.footer[cluster];
         let mut frame = Rect::new(
             content.x - lead,
             content.y - head,
-            content.w + lead + PADDING,
-            content.h + head + PADDING,
+            content.w + lead + PADDING + tail,
+            content.h + head + PADDING + foot,
         );
         // A title longer than that may need the room up to the borders.
         let wanted = self.title[cluster];
-        let room = (columns[low].0 - lead, columns[high].1 + PADDING);
+        let room = (columns[low].0 - lead, columns[high].1 + PADDING + tail);
         (frame.x, frame.w) = stretched((frame.x, frame.w), wanted.w + 2.0 * PADDING, room);
         let room = (across[top], across[bottom]);
         (frame.y, frame.h) = stretched((frame.y, frame.h), wanted.h + 2.0 * PADDING, room);

@@ -7,12 +7,14 @@ use std::fmt::Write as _;
 
 pub(crate) use self::sentence::{predicate, sentence, sentence_with};
 use super::json::entries::rows;
+pub(crate) use super::json::entries::text as quoted;
+use crate::base::columns::hang;
 use crate::base::csv::table;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::graph::Element;
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, EntryId, Phase};
+use crate::mission::ledger::{Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase};
 
 /// The format of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +44,7 @@ pub struct LogOptions {
 /// A row of the log, in order.
 enum LogRow<'a> {
     Phase(usize, &'a Phase),
+    Interruption(&'a Interruption),
     Entry(EntryId, &'a Entry),
     Part(EntryId, &'a Entry),
 }
@@ -49,13 +52,31 @@ enum LogRow<'a> {
 /// The log of a mission; ends in a new line unless it is empty. Characters in names that would control a terminal or
 /// change the direction of text are written as escapes.
 pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String {
+    if format == LogFormat::Text {
+        return lines(mission, options)
+            .iter()
+            .map(|line| line.text(None))
+            .collect();
+    }
     let rows = chosen(mission, options);
     match format {
-        LogFormat::Text => text(mission, &rows),
+        LogFormat::Text => String::new(),
         LogFormat::Csv => csv(mission, &rows),
         LogFormat::Ndjson => ndjson(mission, &rows),
         LogFormat::Markdown => markdown(mission, &rows),
     }
+}
+
+/// One entry of the log, as [`LogFormat::Ndjson`] or as text.
+pub(crate) fn line(mission: &Mission, id: EntryId, entry: &Entry, format: LogFormat) -> String {
+    if format == LogFormat::Ndjson {
+        return rows_of(mission).swap_remove(id as usize);
+    }
+    format!(
+        "{:>13}  {}",
+        at(mission, entry),
+        sentence(mission, id, entry)
+    )
 }
 
 fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
@@ -67,10 +88,14 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
     };
     let phases = ledger.phases.iter().enumerate();
     let mut phases = phases.filter(|_| options.phases).peekable();
+    let mut interruptions = ledger.interruptions.iter().peekable();
     let mut rows = Vec::new();
     for (id, entry) in (0..).zip(&ledger.entries) {
         while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= entry.time) {
             rows.push(LogRow::Phase(at, phase));
+        }
+        while let Some(one) = interruptions.next_if(|one| one.time <= entry.time) {
+            rows.push(LogRow::Interruption(one));
         }
         if entry.part_of.is_some() || entry.quiet && !options.all {
             continue;
@@ -82,6 +107,7 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
         rows.extend(own);
     }
     rows.extend(phases.map(|(at, phase)| LogRow::Phase(at, phase)));
+    rows.extend(interruptions.map(LogRow::Interruption));
     rows
 }
 
@@ -106,33 +132,97 @@ fn title(at: usize, phase: &Phase) -> String {
     format!("phase {}: {}", at + 1, visible(&phase.name))
 }
 
-fn text(mission: &Mission, rows: &[LogRow<'_>]) -> String {
-    let mut all = String::new();
-    for row in rows {
-        let (when, words) = match row {
+/// A line of the log for people.
+#[derive(Debug)]
+pub(crate) struct LogLine {
+    /// The kind of event; `None` for the title of a phase and for what the recorder did.
+    pub(crate) kind: Option<Kind>,
+    lead: String,
+    words: String,
+}
+
+impl LogLine {
+    /// The time, with the space behind it.
+    pub(crate) fn lead(&self) -> &str {
+        &self.lead
+    }
+
+    /// The line, broken to `width` characters with a hanging indent.
+    pub(crate) fn text(&self, width: Option<usize>) -> String {
+        hang(&self.lead, &self.words, self.lead.chars().count(), width)
+    }
+}
+
+/// The log as lines for people, sorted by the time that each shows.
+pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
+    let rows = chosen(mission, options);
+    let shown = sorted(&rows).into_iter().map(|row| {
+        let (kind, when, words) = match row {
             LogRow::Phase(at, phase) => {
                 let when = words::offset_tenths(mission.offset(phase.span.start));
-                (when, format!("── {} ──", title(*at, phase)))
+                (None, when, format!("── {} ──", title(*at, phase)))
             }
-            LogRow::Entry(id, entry) => (at(mission, entry), sentence(mission, *id, entry)),
-            LogRow::Part(id, entry) => {
-                let words = format!("  {}", sentence(mission, *id, entry));
-                (at(mission, entry), words)
+            LogRow::Interruption(one) => {
+                let when = words::offset_tenths(mission.offset(one.time));
+                (None, when, sentence::interrupted(one))
             }
+            LogRow::Entry(id, entry) | LogRow::Part(id, entry) => (
+                Some(entry.kind),
+                at(mission, entry),
+                sentence(mission, *id, entry),
+            ),
         };
-        // Writing into a string does not fail.
-        let _ = writeln!(all, "{when:>13}  {words}");
+        let inner = if matches!(row, LogRow::Part(..)) {
+            "  "
+        } else {
+            ""
+        };
+        LogLine {
+            kind,
+            lead: format!("{when:>13}  {inner}"),
+            words,
+        }
+    });
+    shown.collect()
+}
+
+/// The rows by the time that each shows, parts behind the event that they belong to.
+fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
+    let mut time = Stamp(i64::MIN);
+    let timed = rows.iter().map(|row| {
+        time = match row {
+            LogRow::Phase(_, phase) => phase.span.start,
+            LogRow::Interruption(one) => one.time,
+            LogRow::Entry(_, entry) => shown(entry),
+            LogRow::Part(..) => time,
+        };
+        (time, row)
+    });
+    let mut timed: Vec<_> = timed.collect();
+    timed.sort_by_key(|(time, _)| *time);
+    timed.into_iter().map(|(_, row)| row).collect()
+}
+
+/// The time at which an entry is shown: the earliest possible one where that is written.
+fn shown(entry: &Entry) -> Stamp {
+    if entry.latest.since(entry.earliest) > ABOUT_NS {
+        entry.earliest
+    } else {
+        entry.time
     }
-    all
 }
 
 fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = "| when | what |\n|---:|---|\n".to_owned();
-    for row in rows {
+    for row in sorted(rows) {
         let (when, words) = match row {
             LogRow::Phase(at, phase) => {
                 let when = words::offset_tenths(mission.offset(phase.span.start));
                 (when, format!("**{}**", escaped(&title(*at, phase))))
+            }
+            LogRow::Interruption(one) => {
+                let when = words::offset_tenths(mission.offset(one.time));
+                (when, sentence::interrupted(one))
             }
             LogRow::Entry(id, entry) => {
                 let words = sentence(mission, *id, entry);
@@ -187,6 +277,7 @@ fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
         &COLUMNS,
         rows.iter().map(|row| match row {
             LogRow::Phase(at, phase) => phase_cells(*at, phase),
+            LogRow::Interruption(one) => interruption_cells(one),
             LogRow::Entry(id, entry) | LogRow::Part(id, entry) => cells(mission, *id, entry),
         }),
     )
@@ -232,6 +323,7 @@ fn values(mission: &Mission, entry: &Entry) -> (String, String) {
     match &entry.detail {
         Detail::None => (String::new(), String::new()),
         Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
+        Detail::Count(many) => (String::new(), many.to_string()),
         Detail::Senders { from, to } => (names(from), names(to)),
         Detail::Values { from, to } => (visible(from).into_owned(), visible(to).into_owned()),
     }
@@ -247,12 +339,35 @@ fn phase_cells(at: usize, phase: &Phase) -> Vec<String> {
     cells
 }
 
+fn interruption_cells(one: &Interruption) -> Vec<String> {
+    let mut cells = vec![String::new(); COLUMNS.len()];
+    cells[0] = one.time.0.to_string();
+    one.kind.word().clone_into(&mut cells[1]);
+    cells[8] = until(one).0.to_string();
+    cells
+}
+
+/// The end of an interruption: the time to which the clock went back, or at which messages came again.
+fn until(one: &Interruption) -> Stamp {
+    match one.kind {
+        InterruptionKind::ClockBack => one.time.plus(-one.length),
+        InterruptionKind::Nothing => one.time.plus(one.length),
+    }
+}
+
 fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let entries = rows_of(mission);
     let mut all = String::new();
     for row in rows {
         match row {
             LogRow::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
+            LogRow::Interruption(one) => {
+                let (kind, time, until) = (one.kind.word(), one.time.0, until(one).0);
+                let _ = write!(
+                    all,
+                    "{{\"kind\":\"{kind}\",\"time_ns\":{time},\"until_ns\":{until}}}"
+                );
+            }
             LogRow::Entry(id, _) | LogRow::Part(id, _) => {
                 all.push_str(entries.get(*id as usize).map_or("{}", String::as_str));
             }

@@ -6,6 +6,7 @@
 mod changes;
 mod from_changes;
 mod hands;
+mod incidents;
 mod lifetimes;
 mod make;
 mod rates;
@@ -49,6 +50,8 @@ pub type EntryId = u32;
 pub struct Ledger {
     /// Sorted by time, then kind, then name: the log never runs backwards.
     pub entries: Vec<Entry>,
+    /// The interruptions of the recording, sorted by time: nothing that the robot did.
+    pub interruptions: Vec<Interruption>,
     /// The phases, in order and without gaps; empty where they were not searched.
     pub phases: Vec<Phase>,
     /// Whether it is the comparison of a mission, B, with another, A: elements that started or appeared are only in B,
@@ -82,11 +85,17 @@ pub enum Kind {
     Type,
     /// A topic is offered with another quality of service.
     Qos,
+    /// A subscriber gets nothing over this edge: its quality of service asks for more than is offered.
+    Starved,
+    /// Two nodes have the same name.
+    Duplicate,
+    /// The recorder lost messages of a topic.
+    Lost,
 }
 
 impl Kind {
     /// All kinds, in their order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 14] = [
         Self::Started,
         Self::Stopped,
         Self::Restarted,
@@ -98,6 +107,9 @@ impl Kind {
         Self::Lifecycle,
         Self::Type,
         Self::Qos,
+        Self::Starved,
+        Self::Duplicate,
+        Self::Lost,
     ];
 
     /// The kind's word in JSON and in the log.
@@ -114,7 +126,15 @@ impl Kind {
             Self::Lifecycle => "lifecycle",
             Self::Type => "type",
             Self::Qos => "qos",
+            Self::Starved => "starved",
+            Self::Duplicate => "duplicate",
+            Self::Lost => "lost",
         }
+    }
+
+    /// Whether it is a remark about the robot or the recorder, and no reconfiguration.
+    pub(crate) fn is_remark(self) -> bool {
+        matches!(self, Self::Starved | Self::Duplicate | Self::Lost)
     }
 }
 
@@ -139,6 +159,8 @@ pub enum Detail {
         /// The senders after.
         to: Vec<NodeId>,
     },
+    /// A number of messages.
+    Count(u64),
     /// A value before and after; empty for none.
     Values {
         /// The value before.
@@ -182,6 +204,41 @@ impl Entry {
     /// Whether it is shown by itself: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()
+    }
+}
+
+/// A place at which a recording does not simply go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub struct Interruption {
+    /// The time of the last message before, on the mission's time axis.
+    pub time: Stamp,
+    /// The kind.
+    pub kind: InterruptionKind,
+    /// The time by which the clock went back, or for which nothing was recorded, in nanoseconds, ≥ 0.
+    pub length: i64,
+}
+
+/// The kind of an interruption.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum InterruptionKind {
+    /// The recorder's clock was set back, or simulated time began again: what follows is shown behind what came before.
+    ClockBack,
+    /// Nothing was recorded: the recorder paused, or its clock was set ahead.
+    Nothing,
+}
+
+impl InterruptionKind {
+    /// All kinds, in their order.
+    pub const ALL: [Self; 2] = [Self::ClockBack, Self::Nothing];
+
+    /// The kind's word in JSON and in the log.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::ClockBack => "clock_back",
+            Self::Nothing => "nothing_recorded",
+        }
     }
 }
 
@@ -239,7 +296,7 @@ impl Ledger {
         let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
         let mut turns = Vec::new();
         let mut last: Option<Stamp> = None;
-        for (_, entry) in self.headlines(span) {
+        for (_, entry) in self.headlines(span).filter(|(_, e)| !e.kind.is_remark()) {
             if last.is_none_or(|last| entry.time.since(last) > close) {
                 turns.push(entry.time);
             }

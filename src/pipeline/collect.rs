@@ -1,13 +1,15 @@
 //! Reads every bag once and gathers its evidence.
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use super::inputs::{each_once, known_span};
 use super::{Reading, Watch};
-use crate::bag::{self, Input, OpenOptions, Reader, Report};
+use crate::bag::straight::{self, Straightened, Watched};
+use crate::bag::{self, Input, OpenOptions, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
+use crate::base::words;
 use crate::evidence::collector::{self, Collector, Recorded};
 use crate::graph::window;
 
@@ -26,20 +28,51 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         ..OpenOptions::default()
     };
     let (inputs, twice) = each_once(&reading.inputs)?;
-    let mut readers = bag::open_each(inputs, &options).collect::<Result<Vec<_>>>()?;
+    let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
+    let mut readers = bag::open_each(inputs.clone(), &options).collect::<Result<Vec<_>>>()?;
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
+    // Where time falls, a part of the mission is not a part of the times.
+    let cut = cut && readers.iter().all(|reader| reader.is_straight());
     let known = if cut { known_span(&mut readers)? } else { None };
     let range = known
         .map(|span| window::range(&reading.division, span))
         .transpose()?;
     let mut collector = Collector::new(affordable(reading));
     let mut reports = Vec::new();
-    for mut reader in readers {
-        let mut progress = |done, total| watch.progress(done, total);
-        reports.push(reader.read(range, &mut collector.bag(&mut progress))?);
+    let mut seams = Vec::new();
+    let (mut before, mut size) = (0, 0);
+    for reader in &mut readers {
+        let mut progress = |done, total: u64| {
+            size = total;
+            watch.progress(before + done, whole.max(before + total));
+        };
+        let mut sink = collector.bag(&mut progress);
+        let mut watched = Watched::new(&mut sink);
+        reports.push(reader.read(range, &mut watched)?);
+        seams.push(watched.seams());
+        before += std::mem::take(&mut size);
+    }
+    let is_straight = seams.iter().all(Vec::is_empty);
+    if !is_straight && !inputs.iter().any(Input::is_pipe) {
+        collector = Collector::new(affordable(reading));
+        for (reader, seams) in readers.iter_mut().zip(&seams) {
+            let mut progress = |done, total| watch.progress(done, total);
+            let mut sink = collector.bag(&mut progress);
+            reader.read(range, &mut Straightened::new(seams, &mut sink))?;
+        }
     }
     let mut recorded = collector.finish()?;
     recorded.notices.extend(twice);
+    recorded.falls = seams
+        .iter()
+        .flat_map(|seams| straight::falls(seams))
+        .collect();
+    recorded.falls.sort_unstable();
+    for fall in &recorded.falls {
+        let length = words::duration(fall.length);
+        let text = format!("{SET_BACK} {length}; the two runs are shown one after the other");
+        recorded.notices.add(Notice::new(NoticeKind::Note, text));
+    }
     let Some(span) = recorded.span else {
         return Err(no_messages(&reading.inputs, &recorded.notices));
     };
@@ -53,6 +86,9 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         range,
     })
 }
+
+/// The beginning of the notice about a clock that was set back.
+const SET_BACK: &str = "the recorder's clock went back by";
 
 /// The options of collecting, without the payloads of bags that are too large, or too far away, to be compared: an index
 /// would be of no use if every payload were read. Where all are asked for they are read.
@@ -68,34 +104,11 @@ fn affordable(reading: &Reading) -> collector::CollectOptions {
     options
 }
 
-/// Every input once, with a notice for those named twice, which would count twice.
-fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
-    let mut seen = BTreeSet::new();
-    let (mut once, mut twice) = (Vec::new(), Vec::new());
-    for input in inputs {
-        let real = match input {
-            Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
-            Input::Url(url) => PathBuf::from(url),
-            Input::Stdin => PathBuf::from("-"),
-        };
-        if seen.insert(real) {
-            once.push(input.clone());
-        } else if input.is_pipe() {
-            let what = format!("{} was named twice, and can be read once", input.name());
-            return Err(Error::usage(what, "name it once"));
-        } else {
-            let text = format!("`{}` was named twice and read once", input.name());
-            twice.push(Notice::new(NoticeKind::Note, text));
-        }
-    }
-    Ok((once, twice))
-}
-
 /// The words for a bag that is whole and empty.
-pub(super) const NOTHING_RECORDED: &str = "it was closed before anything was recorded";
+pub(super) const NOTHING_RECORDED: &str = "the recording is empty";
 
 /// The error for bags without a message, with the losses on the way.
-fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
+pub(super) fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
     let lost: Vec<String> = notices
         .iter()
         .filter(|n| n.kind.is_loss())
@@ -112,19 +125,4 @@ fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
             lost.join("; ")
         },
     }
-}
-
-/// The time that all bags cover; `None` unless every one of them tells its own without being read.
-pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
-    let mut all: Option<Span> = None;
-    for reader in readers {
-        let Some(span) = reader.span()? else {
-            return Ok(None);
-        };
-        all = Some(all.map_or(span, |a| Span {
-            start: a.start.min(span.start),
-            end: a.end.max(span.end),
-        }));
-    }
-    Ok(all)
 }

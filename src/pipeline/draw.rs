@@ -99,6 +99,14 @@ impl Drawing {
         }
     }
 
+    /// The same drawing by another engine.
+    pub(super) fn with(&self, engine: &'static (dyn Engine + Sync)) -> Self {
+        Self {
+            engine,
+            ..self.clone()
+        }
+    }
+
     /// The smallest text that can be read, in pixels.
     pub(super) fn readable(&self) -> f64 {
         self.purpose.map_or(READABLE, Purpose::readable)

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use super::draw::{Body, Composed, places, unplaced, unseen};
 use super::fit::compose;
-use super::{Drawing, Phases, Reading, Stage, Watch, read, unfolded};
+use super::{Drawing, Reading, Stage, Watch, read, unfolded};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::board::Board;
 use crate::draw::figure::Figure;
 use crate::draw::figure::course::{self, Course, LifeLines};
+use crate::draw::figure::lives::LivesFigure;
 use crate::draw::figure::source::FigureSource;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
@@ -22,7 +23,7 @@ use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{View, ViewOptions, filtered, nothing, outline};
+use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, outline, unmatched};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -38,6 +39,8 @@ pub struct Render {
     pub kept: Vec<PathBuf>,
     /// The outputs to write.
     pub outputs: Vec<Output>,
+    /// The output in place of all others for a picture that is not a film: of a mission in one window, or a topic timeline.
+    pub still: Option<Output>,
     /// Whether data files hold the viewed graph only.
     pub is_filtered: bool,
 }
@@ -53,6 +56,7 @@ impl Render {
             drawing: Drawing::new()?,
             sequence: options::SequenceOptions::default(),
             outputs,
+            still: None,
             kept: Vec::new(),
             is_filtered: false,
         })
@@ -89,7 +93,8 @@ pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let mut kept = job.reading.files();
     kept.extend_from_slice(&job.kept);
-    export::check(&job.outputs, &kept)
+    let outputs = job.outputs.iter().chain(&job.still);
+    export::check(&outputs.cloned().collect::<Vec<_>>(), &kept)
 }
 
 /// Refuses a figure without an output that holds it, and lines for LaTeX without a figure.
@@ -97,7 +102,7 @@ fn check_figure(job: &Render) -> Result<()> {
     let holds = |o: &Output| o.format.whole != OneDrawing::Never && o.format.word != "tex";
     if job.sequence.figure.is_some() && !job.outputs.iter().any(holds) {
         return Err(Error::usage(
-            "no output holds the figure",
+            "no output can contain the figure",
             "write it with `-o fig.pdf`, `.svg`, `.png` or `.webp`",
         ));
     }
@@ -112,7 +117,9 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+    let still = still(job, &mut mission);
+    let job = still.as_ref().unwrap_or(job);
     let is_figure = job.sequence.figure.is_some();
     let is_whole: Vec<bool> = job.outputs.iter().map(has_whole_hubs).collect();
     let is_mixed = is_whole.contains(&true)
@@ -120,7 +127,9 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
             .outputs
             .iter()
             .any(|o| o.format.is_drawn && !has_whole_hubs(o));
-    if is_figure || !is_mixed || !outline(&mission, &job.drawing.view).has_hubs() {
+    let options = &job.drawing.view;
+    let is_other = || options.mode == Mode::Nodes || outline(&mission, options).has_hubs();
+    if is_figure || !is_mixed || !is_other() {
         return show_alike(job, mission, watch);
     }
     // Two drawings of one mission: the same picture as if either kind of output had been asked for alone.
@@ -147,6 +156,28 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     })
 }
 
+/// The job with the output for a still in place of the film, where there is nothing to play, with a note of the command
+/// that makes a film.
+fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
+    let still = job.still.as_ref()?;
+    let is_board = job.drawing.body.is_board(mission);
+    if mission.windows.len() > 1 && !is_board {
+        return None;
+    }
+    let why = if is_board {
+        "a topic timeline shows the whole time at once"
+    } else {
+        "nothing changes after the beginning, so this is one picture with rates over the whole time"
+    };
+    let film = job.outputs.first()?.target.path().display();
+    let text = format!("{why}; `-o {film}` makes a film");
+    mission.notices.add(Notice::new(NoticeKind::Chosen, text));
+    Some(Render {
+        outputs: vec![still.clone()],
+        ..job.clone()
+    })
+}
+
 /// Whether an output has each topic once: a page that opens boxes, and a graph that is written down. Pictures may show
 /// a hub in each namespace that uses it.
 fn has_whole_hubs(output: &Output) -> bool {
@@ -157,9 +188,13 @@ fn has_whole_hubs(output: &Output) -> bool {
 /// Draws and writes a mission where all outputs show the same drawing.
 fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
-    drawing.splits_hubs &= !job.outputs.iter().any(has_whole_hubs);
+    let is_picture = !job.outputs.iter().any(has_whole_hubs);
+    drawing.splits_hubs &= is_picture;
+    if is_picture && drawing.view.mode == Mode::Nodes {
+        drawing.view.mode = Mode::Bundles;
+    }
     drawing.page.title.get_or_insert_with(|| mission.title());
-    if matches!(job.reading.phases, Phases::Captions(_)) {
+    if job.reading.phases.is_named() {
         drawing.page.phases = captions(&mission);
     }
     let figure = drawn_figure(job, &mission)?;
@@ -173,10 +208,13 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         &mission,
         &drawing.view.ns_filter,
         &drawing.view.topic_filter,
-        false,
+        job.reading.phases.is_named(),
     );
     let lives = (is_drawn && !is_board).then(|| course::of_all(&source));
-    drawing.page.course = lives.as_ref().map(|lives| Course::new(lives, MOST_LIVES));
+    let course = lives
+        .as_ref()
+        .map(|lives| Course::new(lives, rows(drawing.page.size.h)));
+    drawing.page.course = course.unwrap_or_default();
     let Composed {
         view,
         options,
@@ -206,11 +244,13 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         .as_ref()
         .and_then(|view| unfolded::drawn(view, &drawing, &job.outputs));
     let lives = lives.filter(|_| opened.is_some()).map(LifeLines::new);
+    let lives = job.sequence.pairs.clone().or(lives);
     let strip = match figure {
         Some(_) => None,
         None => side_by_side(job, &mission, &view, &picture)?,
     };
     let mut all = mission.notices.clone();
+    all.extend(unmatched(&mission.elements, &drawing.view));
     all.extend(notices.iter());
     let remarks = figure.iter().flat_map(|(figure, _)| &figure.remarks);
     let remarks = remarks.chain(strip.iter().flat_map(|s| &s.remarks));
@@ -310,8 +350,19 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     ))
 }
 
-/// The number of life lines that fit below a frame.
-const MOST_LIVES: usize = 14;
+/// The most rows below a frame, and the height of the page for each, in pixels: the graph needs the rest.
+const ROWS: (f64, f64) = (8.0, 78.0);
+
+/// The number of rows below a frame of this height.
+fn rows(height: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 8"
+    )]
+    let rows = (height / ROWS.1).clamp(1.0, ROWS.0) as usize;
+    rows
+}
 
 /// Writes a mission whose picture is the topic board.
 fn show_board(
@@ -322,9 +373,10 @@ fn show_board(
     watch: &mut dyn Watch,
 ) -> Result<Rendered> {
     let mut all = mission.notices.clone();
+    all.extend(unmatched(&mission.elements, &drawing.view));
     if drawing.body == Body::Auto {
-        let text = "of most messages nobody knows the publisher, so the picture is a board of topics; `--view graph` draws what is known";
-        all.add(Notice::new(NoticeKind::Chosen, text));
+        let text = "most publishers are unknown; drawing a topic timeline instead of a graph (draw what is known with `--view graph`)";
+        all.add(Notice::new(NoticeKind::Note, text));
     }
     let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
     let source = FigureSource::new(&mission, nodes, topics, false);
@@ -342,7 +394,11 @@ fn show_board(
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = board.overview();
     let viewed = job.is_filtered.then(|| filtered(&mission, options));
-    let lives = LifeLines::new(course::of_all(&source));
+    let lives = LifeLines::new(LivesFigure::new(&source, true));
+    // Each topic has a row of its own.
+    let mut each = drawing.clone();
+    each.view.group = Grouping::parse("none")?;
+    let opened = unfolded::opened(&mission, &each, &job.outputs);
     let sequence = Sequence {
         mission: &mission,
         data: viewed.as_ref().unwrap_or(&mission),
@@ -351,7 +407,7 @@ fn show_board(
         view,
         picture: &board,
         unfolded: Some(Unfolded {
-            view,
+            view: opened.as_ref().unwrap_or(view),
             picture: None,
             lives: Some(&lives),
             rate_change: drawing.page.rate_change,

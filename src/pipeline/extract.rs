@@ -1,9 +1,12 @@
 //! The messages themselves as tables: a row per message, or a table per topic with every field decoded.
 
+mod definitions;
 mod fields;
 mod messages;
 
-use super::collect::known_span;
+use std::path::PathBuf;
+
+use super::inputs::{each_once, known_span};
 use super::read::files;
 use super::{Stage, Watch};
 use crate::bag::{
@@ -30,8 +33,12 @@ pub struct Extract {
     pub format: TableFormat,
     /// Whether messages are decoded.
     pub fields: bool,
+    /// Whether the fields of messages inside messages are structures; else columns with dots in their names.
+    pub nested: bool,
     /// The topics to take.
     pub topics: NameFilter,
+    /// Folders of `.msg` files that define the types that the bags do not.
+    pub msg_paths: Vec<PathBuf>,
     /// The moment before which messages are left out.
     pub start: Option<Moment>,
     /// The moment after which messages are left out.
@@ -58,16 +65,23 @@ pub struct Extracted {
 /// Where an input cannot be read at all, an output cannot be written, or times make no sense.
 pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let kept = files(&job.inputs);
-    if job.fields {
+    let (inputs, twice) = each_once(&job.inputs)?;
+    let once = Extract {
+        inputs,
+        ..job.clone()
+    };
+    let mut done = if job.fields {
         check_folder(job.target.path(), job.format.word(), &kept)?;
         watch.stage(Stage::Read);
-        fields::extract(job, watch)
+        fields::extract(&once, watch)?
     } else {
         check(std::slice::from_ref(&job.target), &kept)?;
         make_folder(&job.target)?;
         watch.stage(Stage::Read);
-        messages::extract(job, watch)
-    }
+        messages::extract(&once, watch)?
+    };
+    done.notices.extend(twice);
+    Ok(done)
 }
 
 impl Extract {
@@ -100,7 +114,7 @@ impl Extract {
     fn open_files(&self) -> Result<Vec<Box<dyn Reader>>> {
         if self.inputs.iter().any(Input::is_pipe) {
             return Err(Error::usage(
-                "a bag that flows by tells only at its end when it began and ended",
+                "the time range of a pipe is unknown until it ends",
                 "save it to a file first, or leave `--start` and `--end` out",
             ));
         }

@@ -1,4 +1,6 @@
-//! Makes a drawing readable: the page grows, what does not change is folded, then what changes, then topics are bundled.
+//! Makes a drawing readable: the page grows, topics become lines, what does not change is folded, then what changes.
+
+mod notices;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -7,13 +9,16 @@ use super::draw::{Composed, Drawing, known};
 use super::{Purpose, Stage, Watch};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
+use crate::draw::style::Style;
 use crate::graph::Element;
 use crate::layout::{Engine, Layout, LayoutOptions, Plan, RING, engine, extend, lay_out};
 use crate::mission::Mission;
 use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
+use notices::{parts, so_that, told};
 
+/// The style by which it is decided what is drawn.
+const PLAIN: &str = "light";
 /// The largest page that `--fit auto` grows to.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The least number of boxes that must vanish in a collapsed namespace from which those that change are left out.
@@ -29,6 +34,8 @@ struct Fitting<'a> {
     drawing: &'a Drawing,
     page: PageOptions,
     options: ViewOptions,
+    /// The engine of the best drawing.
+    engine: &'static (dyn Engine + Sync),
     best: Attempt,
     layouts: Layouts,
 }
@@ -38,6 +45,13 @@ struct Fitting<'a> {
 /// namespaces that turn out to fit are opened again.
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
+    // What is drawn does not depend on the style.
+    let plain = Drawing {
+        style: Style::builtin(PLAIN).unwrap_or_else(|_| drawing.style.clone()),
+        ..drawing.clone()
+    };
+    let is_styled = plain.style != drawing.style;
+    let (asked, drawing) = (drawing, &plain);
     let (page, options) = (drawing.page.clone(), drawing.view.clone());
     let mut layouts = Layouts::default();
     let best = Attempt::new(mission, drawing, (&options, &page), &mut layouts);
@@ -46,6 +60,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         drawing,
         page,
         options,
+        engine: drawing.engine,
         best,
         layouts,
     };
@@ -53,12 +68,60 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     if drawing.is_fitted && !fitting.is_readable() {
         fitting.make_readable();
     }
+    if is_styled {
+        fitting.drawing = asked;
+        let engine = fitting.engine;
+        let (drawing, chosen) = (&asked.with(engine), (&fitting.options, &fitting.page));
+        fitting.best = Attempt::drawn(mission, drawing, chosen, &mut Layouts::default());
+    }
+    let drawing = asked;
     let mut composed = fitting.composed();
+    if !drawing.is_sized && drawing.is_fitted && drawing.page.width_mm.is_none() {
+        composed.page = cut(&composed, drawing);
+    }
     let notices = &mut composed.notices;
     notices.extend(picture::unshown(&composed.view, &drawing.fonts));
     let remarks = composed.layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     composed
+}
+
+/// The size of names on a page that is cut to its graph, in pixels.
+const NAMES: f64 = 15.0;
+/// The space around the graph on such a page, in pixels.
+const AROUND: f64 = 20.0;
+/// The least width of such a page for a film, which has a timeline, and for a still; and the least height.
+const LEAST: (f64, f64, f64) = (720.0, 320.0, 140.0);
+/// The least width of such a page with a legend.
+const LEGEND: f64 = 480.0;
+/// The width of a page whose furniture has its usual size, and the least scale of furniture that can be read.
+const FURNITURE: (f64, f64) = (1100.0, 0.8);
+
+/// The page cut to its graph, where names of a readable size leave it empty.
+fn cut(composed: &Composed, drawing: &Drawing) -> PageOptions {
+    let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
+    let measured =
+        |page: &PageOptions| Measured::new(view, &drawing.style, &drawing.fonts, page.clone());
+    let largest = NAMES / drawing.style.node.size;
+    let scale = measured(page).scale(&composed.layout).min(largest);
+    let least = if view.has_time() { LEAST.0 } else { LEAST.1 };
+    let wide = (natural.w * scale + 2.0 * AROUND)
+        .max(least)
+        .min(page.size.w);
+    let mut cut = PageOptions {
+        size: Size::new(wide, page.size.h),
+        unit: Some((wide / FURNITURE.0).clamp(FURNITURE.1, 1.0)),
+        has_legend: page.has_legend && wide >= LEGEND,
+        ..page.clone()
+    };
+    let furniture = page.size.h - measured(&cut).layout_options().page.h;
+    let high = furniture + natural.h * scale + 1.2 * AROUND;
+    cut.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
+    if cut.size.h < page.size.h {
+        cut
+    } else {
+        page.clone()
+    }
 }
 
 impl Fitting<'_> {
@@ -84,6 +147,16 @@ impl Fitting<'_> {
             {
                 self.again();
             }
+        }
+        if !self.is_readable() && !self.options.mode.is_direct() {
+            self.options.mode = Mode::Bundles;
+            self.again();
+            self.take_higher_page();
+        }
+        if !self.is_readable() {
+            self.options.are_leaves_in_words = true;
+            self.again();
+            self.take_higher_page();
         }
         let changing = self.collapse_the_steady();
         self.collapse_the_rest(changing);
@@ -134,7 +207,7 @@ impl Fitting<'_> {
     /// Collapses what does not change in namespaces until the text can be read. Returns the namespaces with the boxes
     /// in them that were left out.
     fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
-        let told: BTreeSet<Element> = headlines(self.mission).collect();
+        let told = self.changing();
         let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
         loop {
             let is_new = |name: &Arc<str>| {
@@ -163,6 +236,38 @@ impl Fitting<'_> {
         }
     }
 
+    /// The elements that change, with the nodes that they connect, and the partners of those.
+    fn changing(&self) -> BTreeSet<Element> {
+        let elements = &self.mission.elements;
+        let view = &self.best.view;
+        let mut told: BTreeSet<Element> = headlines(self.mission).collect();
+        let topics: BTreeSet<_> = told
+            .iter()
+            .filter_map(|what| elements.ends(*what).1)
+            .collect();
+        let edges = elements
+            .edges()
+            .filter(|(_, edge)| topics.contains(&edge.topic));
+        told.extend(edges.map(|(_, edge)| Element::Node(edge.node)));
+        let is_told = |item: u32| {
+            view.items[item as usize]
+                .members
+                .iter()
+                .any(|m| told.contains(m))
+        };
+        let lines = view
+            .arrows
+            .iter()
+            .filter(|a| is_told(a.from) != is_told(a.to));
+        let partners: BTreeSet<u32> = lines.flat_map(|arrow| [arrow.from, arrow.to]).collect();
+        let members = partners
+            .iter()
+            .flat_map(|item| &view.items[*item as usize].members);
+        let members: Vec<Element> = members.copied().collect();
+        told.extend(members);
+        told
+    }
+
     /// Collapses these namespaces with the boxes in them that were left out, until the text can be read.
     fn collapse_the_rest(&mut self, mut left: Vec<(Arc<str>, Vec<Arc<str>>)>) {
         while !self.is_readable() && !left.is_empty() {
@@ -186,12 +291,9 @@ impl Fitting<'_> {
         all
     }
 
-    /// The last resort: outermost namespaces as one box each, and one arrow for all topics between two boxes; if that
+    /// The last resort: outermost namespaces as one box each, and one line for all topics between two boxes; if that
     /// can be read better.
     fn bundle(&mut self) {
-        if self.options.mode.is_direct() {
-            return;
-        }
         let mut bundled = ViewOptions {
             mode: Mode::Bundles,
             ..self.drawing.view.clone()
@@ -205,19 +307,18 @@ impl Fitting<'_> {
         let boxes = outline(self.mission, &bundled);
         // Few boxes with many arrows among them stand best around the page.
         let is_few = boxes.items.len() <= RING && boxes.namespaces.is_empty();
-        let attempt = match engine("ring").ok().filter(|_| is_few) {
+        let ring = engine("ring").ok().filter(|_| is_few);
+        let attempt = match ring {
             None => self.attempt(&bundled, &self.page.clone()),
             Some(engine) => {
-                let drawing = Drawing {
-                    engine,
-                    ..self.drawing.clone()
-                };
                 let chosen = (&bundled, &self.page);
+                let drawing = self.drawing.with(engine);
                 Attempt::new(self.mission, &drawing, chosen, &mut Layouts::default())
             }
         };
         if boxes.items.len() > 1 && attempt.text > self.best.text {
             (self.options, self.best) = (bundled, attempt);
+            self.engine = ring.unwrap_or(self.engine);
         }
     }
 
@@ -249,7 +350,7 @@ impl Fitting<'_> {
             notices.extend(told(drawing, &parts(collapsed, kept), &self.page, text).iter());
             if self.options.mode != drawing.view.mode {
                 let text = format!(
-                    "one arrow for all topics between two boxes{}; `--mode {}` draws each",
+                    "drew one line per pair of boxes{}; draw each topic with `--mode {}`",
                     so_that(text >= drawing.readable()),
                     drawing.view.mode.word()
                 );
@@ -383,77 +484,4 @@ const LEAST_BOX: f64 = 4.0;
 fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
     let text = drawing.readable();
     boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
-}
-
-/// The collapsed namespaces in words, with the number of those in it that were kept open because they change.
-fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
-    let told = |name: &Arc<str>| {
-        let inside = |other: &&Arc<str>| {
-            let rest = other.strip_prefix(&**name);
-            rest.is_some_and(|rest| rest.starts_with('/'))
-        };
-        let words = match kept.iter().filter(inside).count() {
-            0 => name.to_string(),
-            many => format!("{name} but for {} in it", words::count(many, "change")),
-        };
-        (Arc::clone(name), words)
-    };
-    collapsed.iter().map(told).collect()
-}
-
-/// The notices about what `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
-fn told(
-    drawing: &Drawing,
-    collapsed: &[(Arc<str>, String)],
-    got: &PageOptions,
-    text: f64,
-) -> Notices {
-    let mut notices = Notices::new();
-    let is_readable = text >= drawing.readable();
-    if drawing.page.size != got.size && drawing.purpose.is_none() {
-        let text = format!(
-            "the page is {}x{}{}; `--size` takes another",
-            got.size.w,
-            got.size.h,
-            so_that(is_readable)
-        );
-        notices.add(Notice::new(NoticeKind::Chosen, text));
-    }
-    if let Some((first, _)) = collapsed.first() {
-        let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
-        let text = format!(
-            "drawn as one box each{}: {}; `--expand {first}` opens one, `--fit none` all",
-            so_that(is_readable),
-            words::some_of(&collapsed, 3)
-        );
-        notices.add(Notice::new(NoticeKind::Hidden, text));
-    }
-    if let Some(purpose) = drawing.purpose.filter(|_| !is_readable) {
-        let size = match got.width_mm {
-            Some(mm) => {
-                let pt = text * mm / got.size.w * 72.0 / 25.4;
-                format!("{} pt", words::number(words::significant(pt, 2)))
-            }
-            None => format!("{} pixels", words::number(words::significant(text, 2))),
-        };
-        let advice = purpose.advice();
-        let text =
-            format!("the smallest text is {size} where it is seen, too small to be read; {advice}");
-        notices.add(Notice::new(NoticeKind::Note, text));
-    } else if !is_readable {
-        let text = format!(
-            "the smallest text is {} pixels high, too small to be read; `--ns-filter`, `--hide dead,leaf`, `--mode nodes` or a larger `--size` help",
-            words::number(text)
-        );
-        notices.add(Notice::new(NoticeKind::Note, text));
-    }
-    notices
-}
-
-fn so_that(is_readable: bool) -> &'static str {
-    if is_readable {
-        " so that the text can be read"
-    } else {
-        ""
-    }
 }

@@ -12,7 +12,7 @@ use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
     DiffFormat, DiffSubject, Difference, Format, Side, Subject, Verdict, Written, differences,
-    judge, union, update, write,
+    judge, pairs, union, update, write,
 };
 use crate::graph::window::Length;
 use crate::mission::Mission;
@@ -27,6 +27,8 @@ pub(crate) struct ReportJob {
 pub(crate) struct Check {
     pub(crate) reading: Reading,
     pub(crate) expect: PathBuf,
+    /// The expectation from the root of its repository.
+    pub(crate) tracked: String,
     pub(crate) reports: Vec<ReportJob>,
     /// The bags as they were typed.
     pub(crate) bags: Vec<String>,
@@ -40,13 +42,13 @@ pub(crate) struct Check {
 impl Check {
     /// The subject of the reports.
     pub(crate) fn subject<'a>(&self, mission: &'a Mission) -> Subject<'a> {
-        // Services that show findings beside the file compare its name with those of the repository.
         let file = self.expect.display().to_string();
         let plain = file.trim_start_matches("./");
         Subject {
             mission,
             bags: self.bags.clone(),
             file: plain.to_owned(),
+            tracked: self.tracked.clone(),
             links: self.links.clone(),
         }
     }
@@ -147,6 +149,9 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
         let mission = union(&first, &second, &differences, side);
         let mut render = Render::new(Reading::default(), outputs)?;
         render.drawing = job.drawing.clone();
+        let missions = [&first, &second];
+        let pairs = pairs(missions, &job.subject, &differences, &mission);
+        render.sequence.pairs = (!pairs.rows.is_empty()).then_some(pairs);
         let done = show(&render, mission, watch)?;
         let of_files = done.written.iter().flat_map(|w| w.remarks.clone());
         remarks.extend(of_files);

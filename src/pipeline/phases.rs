@@ -125,7 +125,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
         path: path.to_owned(),
         line,
         reason,
-        hint: "write a phase per line: `0:38 navigation`, or names alone for those that are found"
+        hint: "write a phase per line: `0:38 navigation`, or only names for the detected phases"
             .to_owned(),
     };
     let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
@@ -135,7 +135,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
         return Err(bad(
             *n,
-            "some lines say when their phase begins, this one does not".to_owned(),
+            "this line has no start time, but others do".to_owned(),
         ));
     }
     if timed > 0 {
@@ -143,7 +143,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
         if let Some(pair) = disordered {
             return Err(bad(
                 pair[1].0,
-                "it does not begin after the one before".to_owned(),
+                "it does not begin after the previous one".to_owned(),
             ));
         }
         // What comes before the first phase belongs to it.
@@ -157,7 +157,10 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     let mut found = basis.found();
     let many = found.len();
     if let Some((n, _)) = lines.get(many) {
-        return Err(bad(*n, format!("there are {many} phases and more names")));
+        return Err(bad(
+            *n,
+            format!("there are more names than phases ({many})"),
+        ));
     }
     for (phase, (_, (_, name))) in found.iter_mut().zip(lines) {
         phase.name = Arc::from(name);

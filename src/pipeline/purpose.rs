@@ -41,7 +41,7 @@ impl Purpose {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found.map(|(_, purpose)| *purpose).ok_or_else(|| {
             Error::usage(
-                format!("`{word}` is not a place where pictures are seen"),
+                format!("`{word}` is not a known place"),
                 "places: readme, slide, column, page",
             )
         })
@@ -96,7 +96,7 @@ impl Purpose {
                 "`--ns-filter`, `--hide dead,leaf` or `--mode nodes` leave less to draw"
             }
             Self::Column | Self::Page => {
-                "`--figure lives`, `map` or `steps` are made for paper; `--ns-filter` or `--mode nodes` leave less to draw"
+                "`bagreel figure` is made for paper; `--ns-filter` or `--mode nodes` leave less to draw"
             }
         }
     }

@@ -7,13 +7,14 @@ use std::sync::Arc;
 
 use super::collect::{Collected, collect};
 use super::phases::{Basis, wanted};
+use super::probe::probe;
 use super::verify::{Verified, verify};
 use super::{Phases, Stage, Watch};
 use crate::bag::{self, Input, InputKind};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
-use crate::base::{budget, file};
+use crate::base::{budget, file, words};
 use crate::evidence::EvidenceLine;
 #[cfg(feature = "source")]
 use crate::evidence::code::{self, SourceCode};
@@ -22,8 +23,8 @@ use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::history::Sending;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
-use crate::graph::{History, Windowed, graphs, made};
-use crate::mission::ledger::{self, Ledger};
+use crate::graph::{History, Windowed, graphs, made, traffic, unread};
+use crate::mission::ledger::{self, Interruption, InterruptionKind, Ledger};
 use crate::mission::{Mission, Window, read_json};
 
 /// The inputs of a mission and the options of reading them.
@@ -38,6 +39,9 @@ pub struct Reading {
     pub division: Division,
     /// Whether to merge runs of windows without a change.
     pub skip_unchanged: bool,
+    /// Whether a mission in which nothing changes after the first window has one window, with its rates over the whole
+    /// time.
+    pub is_still_if_unchanged: bool,
     /// The options of collecting evidence.
     pub collect: collector::CollectOptions,
     /// The additions to the facts that the bags tell.
@@ -61,6 +65,7 @@ impl Default for Reading {
             verify: false,
             division: Division::default(),
             skip_unchanged: false,
+            is_still_if_unchanged: false,
             collect: collector::CollectOptions::default(),
             conclude: conclude::ConcludeOptions::default(),
             grace: 0,
@@ -130,7 +135,7 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
     let pipe = reading.inputs.iter().find(|input| input.is_pipe());
     if let Some(pipe) = pipe.filter(|_| reading.verify) {
         let what = format!(
-            "`--verify` reads a bag twice, and {} only gives it once",
+            "`--verify` reads a bag twice, but {} can be read only once",
             pipe.name()
         );
         return Err(Error::usage(what, "save the bag in a file first"));
@@ -140,12 +145,16 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
         refuse(reading, path)?;
         return Ok((reread(path, reading)?, Vec::new()));
     }
-    let collected = collect(reading, false, watch)?;
+    let mut collected = collect(reading, false, watch)?;
     let verified = reading.verify.then(|| verify(&collected, reading, watch));
     let verified = verified.transpose()?;
     watch.stage(Stage::Graphs);
     let findings = concluded(&collected, reading)?;
-    let mission = mission(&collected, &findings, verified, reading)?;
+    let traffic = traffic(&collected.recorded, &findings)?;
+    let passed_over = unread(&collected.recorded, &findings, &traffic)?;
+    probe(reading, &mut collected, &passed_over)?;
+    let history = made(&collected.recorded, &findings, &traffic)?;
+    let mission = mission(&collected, &findings, history, verified, reading)?;
     Ok((mission, findings.lines))
 }
 
@@ -175,10 +184,22 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
     match source.or(cut).or(topic) {
         None => Ok(()),
         Some(what) => Err(Error::usage(
-            format!("{what}, and `{}` is an evolution", path.display()),
+            format!("{what}, but `{}` is a mission's JSON", path.display()),
             "give the bag itself",
         )),
     }
+}
+
+/// The mission of what was collected of a growing recording.
+///
+/// # Errors
+/// As [`read`].
+#[cfg(feature = "cli")]
+pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission> {
+    let findings = concluded(collected, reading)?;
+    let traffic = traffic(&collected.recorded, &findings)?;
+    let history = made(&collected.recorded, &findings, &traffic)?;
+    mission(collected, &findings, history, None, reading)
 }
 
 const DAY: i64 = 86_400_000_000_000;
@@ -200,12 +221,12 @@ fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)>
         let reason = format!("{many} windows are more than {}", budget::WINDOWS);
         Err((
             reason,
-            "write it anew from the bag with a longer `--period`",
+            "write it again from the bag with a longer `--period`",
         ))
     } else if longest > budget::NAME || lengths.len() > budget::NAMES || whole > budget::NAMES_BYTES
     {
         let reason = "its names are too many or too long".to_owned();
-        Err((reason, "no robot has such names"))
+        Err((reason, "such names are not valid"))
     } else {
         Ok(())
     }
@@ -227,7 +248,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         mission.find_changes(reading.rate_change, &[]);
     } else if (reading.rate_change - RATE_CHANGE).abs() > f64::EPSILON {
         let what = format!(
-            "`--rate-change` compares windows, and `{}` holds its changes already",
+            "`--rate-change` has no effect on `{}`, which already contains its changes",
             path.display()
         );
         return Err(Error::usage(what, "give the bag itself"));
@@ -262,26 +283,32 @@ fn concluded(collected: &Collected, reading: &Reading) -> Result<Findings> {
 fn mission(
     collected: &Collected,
     findings: &Findings,
+    history: History,
     verified: Option<Verified>,
     reading: &Reading,
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
-    let history = made(recorded, findings)?;
     let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
     let ledger = told(&history, collected, reading)?;
     let mut windows = divided(reading, collected.range, &ledger)?;
     let period = windows.period;
     let mut windowed = graphs(&windows.spans, reading.grace)?;
     let mut list = list(&windows, &windowed, &history, &ledger);
-    if reading.skip_unchanged {
-        windows.spans = merged(&list);
+    let is_still = reading.is_still_if_unchanged && is_still(&windows, &ledger);
+    if reading.skip_unchanged || is_still {
+        windows.spans = if is_still {
+            vec![windows.span]
+        } else {
+            merged(&list)
+        };
         windowed = graphs(&windows.spans, reading.grace)?;
         list = self::list(&windows, &windowed, &history, &ledger);
     }
     let mut notices: Notices = recorded.notices.clone();
     notices.extend(findings.notices.iter());
-    if reading.division.length == Length::Auto && reading.division.cut.is_none() {
-        let text = format!("the period is {period}; `--period` takes another");
+    notices.extend(doubled(&history));
+    if reading.division.length == Length::Auto && reading.division.cut.is_none() && !is_still {
+        let text = format!("using {period} windows (change with `--period`)");
         notices.add(Notice::new(NoticeKind::Chosen, text));
     }
     let (bags, remarks) = match verified {
@@ -306,13 +333,27 @@ fn mission(
     })
 }
 
+/// The notice about nodes that several recordings show at the same time.
+fn doubled(history: &History) -> Option<Notice> {
+    let name = |id: &u32| format!("`{}`", history.elements.nodes[*id as usize].name);
+    let names: Vec<String> = history.doubled.iter().map(name).collect();
+    let text = format!(
+        "several recordings have messages of the same nodes at the same time, so their restarts are unknown: {}",
+        words::some_of(&names, NAMED)
+    );
+    (!names.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
+}
+
+/// The most nodes that a notice names.
+const NAMED: usize = 3;
+
 /// The windows: equal ones, or from change to change.
 fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
     let windows = match reading.division.cut {
         None => return window::divide(&reading.division, span),
         Some(Cut::Phases) if ledger.phases.is_empty() => {
             return Err(Error::usage(
-                "`--cut phases` needs phases, and `--phases none` leaves none",
+                "`--cut phases` needs phases, but `--phases none` removes them",
                 "leave out `--phases none`",
             ));
         }
@@ -340,7 +381,20 @@ fn told(history: &History, collected: &Collected, reading: &Reading) -> Result<L
         texts: &collected.recorded.texts,
         earlier: Vec::new(),
     };
+    let back = collected.recorded.falls.iter().map(|fall| Interruption {
+        time: fall.time,
+        kind: InterruptionKind::ClockBack,
+        length: fall.length,
+    });
+    let nothing = history.pauses.iter().map(|pause| Interruption {
+        time: pause.start,
+        kind: InterruptionKind::Nothing,
+        length: pause.nanos(),
+    });
+    let mut interruptions: Vec<Interruption> = back.chain(nothing).collect();
+    interruptions.sort_unstable();
     Ok(Ledger {
+        interruptions,
         entries,
         phases: wanted(reading, basis)?,
         ..Ledger::default()
@@ -361,6 +415,14 @@ fn list(windows: &Windows, windowed: &Windowed, history: &History, ledger: &Ledg
     };
     let parts = windowed.messages.iter().copied().zip(changes);
     parts.enumerate().map(window).collect()
+}
+
+/// Whether nothing begins, ends or lasts after the first window.
+fn is_still(windows: &Windows, ledger: &Ledger) -> bool {
+    let first = windows.spans.first().map_or(windows.span.end, |s| s.end);
+    let all = ledger.headlines(windows.span);
+    let mut later = all.filter(|(_, e)| e.until.unwrap_or(e.time) >= first);
+    later.next().is_none()
 }
 
 /// The windows' times with every run of them that shows no change made one.

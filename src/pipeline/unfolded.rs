@@ -3,7 +3,7 @@
 
 use super::Drawing;
 use crate::base::geometry::Size;
-use crate::draw::picture::{Measured, PageOptions, Picture};
+use crate::draw::picture::{Course, Measured, PageOptions, Picture};
 use crate::export::Output;
 use crate::mission::Mission;
 use crate::view::{View, view};
@@ -31,7 +31,7 @@ pub(super) fn drawn<'a>(
         size: SCREEN,
         bare: true,
         width_mm: None,
-        course: None,
+        course: Course::default(),
         ..drawing.page.clone()
     };
     let measured = Measured::new(view, &drawing.style, &drawing.fonts, page);

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::audience::Audience;
+use super::home::{home, without_transport};
 use super::items::Viewed;
 use super::{Frame, Headline, ItemKind, Lasting, Phrase};
-use crate::base::name::{is_quiet, namespace};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::graph::{Element, Elements, NodeId, TopicId};
+use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
 use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
 use crate::view::lasting::Part;
@@ -23,6 +24,8 @@ pub(crate) struct Speaker<'a> {
     viewed: &'a Viewed,
     ledger: &'a Ledger,
     start: Stamp,
+    /// Whether there is but one window.
+    is_still: bool,
     /// The last event of the windows so far.
     last: Option<Stamp>,
     audience: Audience<'a>,
@@ -38,6 +41,7 @@ impl<'a> Speaker<'a> {
             viewed,
             ledger: &mission.ledger,
             start: mission.span.start,
+            is_still: mission.windows.len() == 1,
             last: None,
             audience: Audience::new(&mission.elements),
         }
@@ -80,6 +84,9 @@ impl<'a> Speaker<'a> {
         if frame.caption.is_empty() {
             return match self.last {
                 Some(last) => format!("no change since {}", self.moment(last)),
+                None if self.is_still => {
+                    format!("no change in {}", words::duration(frame.span.nanos()))
+                }
                 None => "no change yet".to_owned(),
             };
         }
@@ -177,6 +184,9 @@ impl<'a> Speaker<'a> {
                     said(' ', "", name, format!("restarts {tail}").trim_end()),
                 )
             }
+            Kind::Starved => (9, said(' ', "", name, "starves a subscriber")),
+            Kind::Duplicate => (9, said(' ', "", name, "is used by two nodes")),
+            Kind::Lost => (12, said(' ', "", name, "lost messages in the recorder")),
             Kind::HandedOver | Kind::Lifecycle | Kind::Type | Kind::Qos | Kind::Rate => {
                 self.changed(headline, name, home)
             }
@@ -299,53 +309,6 @@ impl<'a> Speaker<'a> {
     }
 }
 
-/// The subscribers of topics with one publisher.
-struct Audience<'a> {
-    elements: &'a Elements,
-    publishers: BTreeMap<TopicId, Vec<NodeId>>,
-    subscribers: BTreeMap<TopicId, Vec<NodeId>>,
-    published: BTreeMap<NodeId, Vec<TopicId>>,
-}
-
-impl<'a> Audience<'a> {
-    fn new(elements: &'a Elements) -> Self {
-        let mut all = Self {
-            elements,
-            publishers: BTreeMap::new(),
-            subscribers: BTreeMap::new(),
-            published: BTreeMap::new(),
-        };
-        for edge in &elements.publishes {
-            all.publishers
-                .entry(edge.topic)
-                .or_default()
-                .push(edge.node);
-            all.published.entry(edge.node).or_default().push(edge.topic);
-        }
-        for edge in &elements.subscribes {
-            all.subscribers
-                .entry(edge.topic)
-                .or_default()
-                .push(edge.node);
-        }
-        all
-    }
-
-    /// The topic that only this node, or other runs of it, publish with most subscribers, and those.
-    fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
-        let topics = self.published.get(&node)?.iter().copied();
-        let name = |topic: TopicId| self.elements.topics.get(topic as usize).map(|t| &t.name);
-        let role = |id: NodeId| self.elements.nodes.get(id as usize).map(|n| &n.role);
-        let own = topics.filter(|topic| {
-            let is_shown = name(*topic).is_some_and(|name| !is_quiet(name.as_str()));
-            let mut publishers = self.publishers.get(topic).into_iter().flatten();
-            is_shown && publishers.all(|other| role(*other) == role(node))
-        });
-        let missed = own.filter_map(|topic| Some((topic, &self.subscribers.get(&topic)?[..])));
-        missed.max_by_key(|(topic, nodes)| (nodes.len(), std::cmp::Reverse(*topic)))
-    }
-}
-
 fn said(sign: char, lead: &str, name: String, tail: &str) -> Phrase {
     Phrase {
         sign,
@@ -388,55 +351,12 @@ fn plural(phrase: Phrase) -> Phrase {
     }
 }
 
-/// The namespace below which names are written without it: the one around all names that have one, else that of most
-/// of them; empty where all stand at the root.
-fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
-    let spaces = names.map(|name| namespace(without_transport(name)));
-    let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
-    let Some(first) = spaces.first() else {
-        return "";
-    };
-    let around = spaces.iter().fold(*first, |a, b| shared(a, b));
-    if !around.is_empty() {
-        return around;
-    }
-    let mut most: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
-    for space in spaces {
-        let end = space[1..].find('/').map_or(space.len(), |at| at + 1);
-        let (count, around) = most.entry(&space[..end]).or_insert((0, space));
-        (*count, *around) = (*count + 1, shared(around, space));
-    }
-    // Of equal ones the first.
-    let best = most.values().rev().max_by_key(|(count, _)| *count);
-    best.map_or("", |(_, around)| around)
-}
-
-/// The namespace around two others; empty for the root.
-fn shared<'n>(a: &'n str, b: &str) -> &'n str {
-    let mut end = 0;
-    for (x, y) in a.split('/').zip(b.split('/')) {
-        if x != y {
-            break;
-        }
-        end += x.len() + 1;
-    }
-    &a[..end.saturating_sub(1).min(a.len())]
-}
-
-/// The name of an image topic without its transport.
-fn without_transport(name: &str) -> &str {
-    const TRANSPORTS: [&str; 3] = ["/compressed", "/compressedDepth", "/theora"];
-    let cut = TRANSPORTS.iter().find_map(|end| name.strip_suffix(end));
-    cut.filter(|rest| !rest.is_empty()).unwrap_or(name)
-}
-
 fn clip(name: &str) -> String {
     words::shorten(name, LONGEST_NAME).into_owned()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{home, shared};
     use crate::view::testing::mission;
     use crate::view::{Frame, Mark, ViewOptions, view};
 
@@ -511,16 +431,7 @@ mod tests {
         );
         assert!(frame.fitting(|_| true).contains("/k 1 → 5 Hz"));
         let short = frame.fitting(|text| text.chars().count() < 40);
-        assert_eq!(short, "− /m stops; + /b, +3 start; +6");
+        assert_eq!(short, "− /m stops; + /b, /c, /d, +1 start; +6");
         assert_eq!(frame.fitting(|_| false), "− /m stops; +10");
-    }
-
-    #[test]
-    fn the_namespace_of_most_names_is_left_out() {
-        assert_eq!(home(["/r1/a", "/r1/nav/b", "/c"].into_iter()), "/r1");
-        assert_eq!(home(["/r1/x/a", "/r2/b", "/r2/c"].into_iter()), "/r2");
-        assert_eq!(home(["/a", "/b"].into_iter()), "");
-        assert_eq!(home(["/cam/image/compressed"].into_iter()), "/cam");
-        assert_eq!(shared("/robot1", "/robot10"), "");
     }
 }

@@ -27,7 +27,12 @@ impl Counts {
             Kind::Vanished => &mut self.edges_removed,
             Kind::HandedOver => &mut self.handed_over,
             Kind::Rate => &mut self.rates,
-            Kind::Lifecycle | Kind::Type | Kind::Qos => &mut self.values,
+            Kind::Lifecycle
+            | Kind::Type
+            | Kind::Qos
+            | Kind::Starved
+            | Kind::Duplicate
+            | Kind::Lost => &mut self.values,
         }
     }
 

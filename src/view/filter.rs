@@ -52,6 +52,17 @@ impl NameFilter {
         self.includes.iter().map(|t| t.text.as_str()).collect()
     }
 
+    /// The inclusions and, with their `-`, the exclusions that match none of these names, as they were written.
+    pub(crate) fn unused(&self, names: &[&str]) -> Vec<String> {
+        let is_used = |token: &&FilterToken| names.iter().any(|name| token.matches(name.trim()));
+        let includes = self.includes.iter().filter(|token| !is_used(token));
+        let includes = includes.map(|token| token.text.clone());
+        let excludes = self.excludes.iter().filter(|token| !is_used(token));
+        includes
+            .chain(excludes.map(|token| format!("-{}", token.text)))
+            .collect()
+    }
+
     /// Whether every name passes.
     pub fn passes_all(&self) -> bool {
         self.includes.is_empty() && self.excludes.is_empty()

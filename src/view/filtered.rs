@@ -12,7 +12,7 @@ use crate::mission::{EntryId, Ledger, Mission, Window};
 /// The mission without the elements that the view leaves out. Topics in groups and elements inside collapsed namespaces
 /// are seen, so they stay, under their own names; so do changes, as they were found in the whole graph.
 pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
-    let viewed = Viewed::new(&mission.elements, options);
+    let viewed = Viewed::new(mission, options);
     let mut keep = Keep::new(&mission.elements, options, &viewed);
     let ledger = keep.ledger(&mission.ledger);
     let windows = mission.windows.iter();
@@ -90,6 +90,7 @@ impl Keep {
         Ledger {
             entries,
             phases: all.phases.clone(),
+            interruptions: all.interruptions.clone(),
             compares: all.compares,
         }
     }

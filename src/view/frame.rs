@@ -85,6 +85,8 @@ pub struct Frame {
     pub counts: Counts,
     /// What changed in words, the most important first; empty exactly if nothing is marked.
     pub caption: Vec<Phrase>,
+    /// The long time without a message and without a change that it lies in, which is one frame of a film.
+    pub empty: Option<Span>,
     /// The line below: namespace, exact times and consequence of the changes, or since when nothing changed.
     pub note: String,
 }
@@ -102,6 +104,7 @@ impl Frame {
             lasting: Vec::new(),
             counts: Counts::default(),
             caption: Vec::new(),
+            empty: None,
             note: String::new(),
         }
     }
@@ -109,6 +112,11 @@ impl Frame {
     /// Whether an event begins or ends in it.
     pub fn is_changed(&self) -> bool {
         !self.headlines.is_empty() || self.lasting.iter().any(|l| l.ended.is_some())
+    }
+
+    /// The time that its drawing shows.
+    pub fn shown(&self) -> Span {
+        self.empty.unwrap_or(self.span)
     }
 
     /// The events that it reports: the ids of those that begin in it, and of those that last.
@@ -122,18 +130,27 @@ impl Frame {
         self.shortened(most, 3)
     }
 
-    /// The caption with as many names as fit, at most 40 of each kind; the shortest form where none fits.
+    /// The caption with as many names as fit, at most 40 of each kind, and of as many phrases as can be; the shortest form
+    /// where none fits.
     pub fn fitting(&self, fits: impl Fn(&str) -> bool) -> String {
-        let all = self.caption.len();
         let longest = self.caption.iter().map(|p| p.names.len()).max();
-        let named = (1..=longest.unwrap_or(1).min(40)).rev();
-        let named = named.map(|names| (all, names));
-        let fewer = (1..all).rev().map(|phrases| (phrases, 1));
-        let mut texts = named
-            .chain(fewer)
-            .map(|(phrases, names)| self.shortened(phrases, names));
-        let fitting = texts.find(|text| fits(text));
-        fitting.unwrap_or_else(|| self.shortened(1, 1))
+        let longest = longest.unwrap_or(1).min(40);
+        let mut best = (0, self.shortened(1, 1));
+        for phrases in (1..=self.caption.len()).rev() {
+            for names in (1..=longest).rev() {
+                let told = self.caption.iter().take(phrases);
+                let told: usize = told.map(|p| p.names.len().min(names)).sum();
+                if told <= best.0 {
+                    break;
+                }
+                let text = self.shortened(phrases, names);
+                if fits(&text) {
+                    best = (told, text);
+                    break;
+                }
+            }
+        }
+        best.1
     }
 
     fn shortened(&self, phrases: usize, names: usize) -> String {

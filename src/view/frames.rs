@@ -4,13 +4,15 @@ use super::caption::Speaker;
 use super::items::Viewed;
 use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
-use super::marks::{News, Parts, Told};
+use super::marks::{News, Parts};
 use super::settle::{Lengths, settled};
 use super::showing::{Showing, ShowingWriter};
 use super::state::{LivingItems, Now};
-use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
+use super::turn::{WindowTurn, marked, with_ends};
+use super::{Attendance, Counts, Frame, Shown, ViewOptions};
+use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::mission::ledger::EntryId;
+use crate::graph::window::default_period;
 use crate::mission::{Mission, Window};
 
 /// The windows, and the looks of each item and arrow in them.
@@ -49,12 +51,40 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
         speaker.tell(&mut frame);
         list.push(frame);
     }
+    join_empty(&mut list);
     let lengths = Lengths::new(mission.windows.iter().map(|w| w.span));
     Frames {
         list,
         items: stage.items.finish(&lengths),
         arrows: stage.arrows.finish(&lengths),
     }
+}
+
+/// The most windows without a message in a row that are a frame each.
+const MOST_EMPTY: usize = 10;
+
+/// Marks each long run of windows without a message and without a change as one time.
+fn join_empty(frames: &mut [Frame]) {
+    let is_empty = |frame: &Frame| frame.messages == 0 && !frame.is_changed();
+    for run in frames.chunk_by_mut(|a, b| is_empty(a) && is_empty(b)) {
+        let (Some(first), Some(last)) = (run.first(), run.last()) else {
+            continue;
+        };
+        let (start, end) = (first.span.start, last.span.end);
+        if run.len() > MOST_EMPTY {
+            for frame in run {
+                frame.empty = Some(Span { start, end });
+            }
+        }
+    }
+}
+
+/// The end of the time in which everything begins that is there from the beginning, to the eye, where a mission is one
+/// window.
+fn beginning(mission: &Mission) -> Option<Stamp> {
+    let first = default_period(mission.span.nanos());
+    let end = mission.span.start.plus(first.nanos());
+    (mission.windows.len() == 1 && !mission.ledger.compares).then_some(end)
 }
 
 /// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before, or
@@ -85,6 +115,8 @@ struct ShownWindows<'a> {
     lives: ItemTurns<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
+    /// What begins before it is no news.
+    beginning: Option<Stamp>,
     now: Now<'a>,
     turn: WindowTurn,
     rolls: Vec<Vec<Attendance>>,
@@ -146,6 +178,7 @@ impl<'a> ShownWindows<'a> {
             lives: ItemTurns::new(mission),
             parts: mission.ledger.all_parts(),
             lasting: LastingEvents::new(&mission.ledger, viewed),
+            beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
             rolls: Vec::new(),
@@ -181,7 +214,7 @@ impl<'a> ShownWindows<'a> {
             after: LivingItems::of(self.viewed, &after),
             news: News::new(
                 &self.mission.ledger,
-                &self.parts,
+                (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),
                 self.viewed,
             ),
@@ -252,123 +285,9 @@ fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<
         .collect()
 }
 
-/// The items and arrows there before and after a window, and the news in between.
-#[derive(Default)]
-struct WindowTurn {
-    before: LivingItems,
-    after: LivingItems,
-    news: News,
-}
-
-/// An item in a window with headlines.
-struct Marked {
-    /// Whether anything of it lives.
-    is_there: bool,
-    marked: Option<Shown>,
-}
-
-impl WindowTurn {
-    fn items(&self, viewed: &Viewed, now: &Now<'_>) -> Vec<Marked> {
-        let ids = (0..).zip(&viewed.items);
-        let item = |(id, item): (u32, &super::Item)| {
-            let shown = now.item(id);
-            let at = id as usize;
-            let there = (self.before.items[at], self.after.items[at]);
-            Marked {
-                is_there: shown.is_some(),
-                marked: shown.and_then(|shown| {
-                    let mut shown = marked(shown, there, self.news.items.get(&id))?;
-                    let is_folded = item.kind == ItemKind::Namespace;
-                    shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
-                    Some(shown)
-                }),
-            }
-        };
-        ids.map(item).collect()
-    }
-
-    /// An arrow comes and goes with its ends, if nothing is told of itself.
-    fn arrows(&self, viewed: &Viewed, now: &Now<'_>, items: &[Marked]) -> Vec<Option<Shown>> {
-        let arrow = |(id, arrow): (u32, &super::Arrow)| {
-            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end as usize));
-            let (from, to) = (from?, to?);
-            let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
-            let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
-            let at = id as usize;
-            // A node that restarts keeps its arrows, though it is away when the window ends.
-            let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
-            let is_kept = ends.iter().any(is_back);
-            let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
-            let told = self.news.arrows.get(&id).cloned();
-            let ends = ends.map(|end| Some((end.mark, &end.entries[..])));
-            let told = told.or_else(|| with_ends(there, ends));
-            let shown = marked(shown, there, told.as_ref())?;
-            let is_bundle = arrow.kind == ArrowKind::Bundle;
-            let inside = is_bundle.then(|| self.inside(&shown)).flatten();
-            Some(Shown { inside, ..shown })
-        };
-        (0..).zip(&viewed.arrows).map(arrow).collect()
-    }
-
-    /// The number of headlines told on a folded namespace or a bundle; `None` without any.
-    fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
-        let told = self.news.headlines.iter();
-        let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));
-        (counts.total() > 0).then(|| Box::new(counts))
-    }
-}
-
-/// The news of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
-/// before and is there after.
-fn with_ends(there: (bool, bool), ends: [Option<(Option<Mark>, &[EntryId])>; 2]) -> Option<Told> {
-    let marks: &[Mark] = match there {
-        (false, true) => &[Mark::Added],
-        (_, false) => &[Mark::Removed],
-        // Lines stay, dotted, while one of their ends is away.
-        (true, true) => &[Mark::Removed, Mark::Away],
-    };
-    let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
-    let mut ends = ends.into_iter().flatten();
-    let (mark, entries) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
-    Some(Told {
-        came: mark == Mark::Added,
-        went: mark == Mark::Removed,
-        mark: Some(mark).filter(|_| there == (true, true)),
-        entries: entries.to_vec(),
-        ..Told::default()
-    })
-}
-
-/// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
-/// entry.
-fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
-    let Some(told) = told else {
-        return there.1.then_some(shown);
-    };
-    let mark = match there {
-        (false, true) if told.came => Some(Mark::Added),
-        (_, false) if told.went => Some(Mark::Removed),
-        // It ended and began within one window.
-        (true, true) if told.came && told.went => told.mark.or(Some(Mark::Restarted)),
-        // One of several that are drawn as one.
-        (true, true) if told.came || told.went => told.mark.or(Some(Mark::Inside)),
-        _ => told.mark,
-    };
-    let is_gone = mark == Some(Mark::Removed);
-    Some(Shown {
-        mark,
-        hz: if is_gone { Some(0.0) } else { shown.hz },
-        rates: told
-            .rates
-            .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
-        entries: told.entries.clone(),
-        ..shown
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::{Grouping, Hide, ItemKind, Mode, View, view};
+    use super::super::{Grouping, Hide, ItemKind, Mark, Mode, View, view};
     use super::*;
     use crate::view::testing::mission;
 

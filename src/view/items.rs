@@ -3,14 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::collapse::{Collapse, swallows};
+use super::bundles;
+use super::collapse::Collapse;
 use super::group::{Groups, groups};
+use super::homes::{ItemKey, inside, set_groups, swallow};
 use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
-use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, Topic, TopicId};
+use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
+use crate::mission::Mission;
 
 /// The place of an edge of the graph in the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,18 +40,26 @@ pub(crate) struct Viewed {
     pub(crate) node: Vec<Option<u32>>,
     /// Per topic of the mission, its item.
     pub(crate) topic: Vec<Option<u32>>,
-    /// The place of each publication. In mode *nodes* it may be part of several arrows and is told by `pairs` alone.
+    /// The place of each publication. In mode *nodes* it may be part of several arrows and is reported by `pairs` alone.
     pub(crate) publish: Vec<EdgePlace>,
     /// The place of each subscription.
     pub(crate) subscribe: Vec<EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
+    /// Per topic of the mission, its name in a bundle: that of its group, if it is in one.
+    pub(crate) bundled: Vec<Arc<str>>,
     /// Node and topic of each publication.
     pub(crate) published: Vec<(NodeId, TopicId)>,
     /// Node and topic of each subscription.
     pub(crate) subscribed: Vec<(NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
+    /// Per topic, whether bundles draw it.
+    drawn: Vec<bool>,
+    /// The number of items at the end of the list that bundles name in words, because no line leads to them.
+    pub(crate) in_words: usize,
+    /// Whether each node is in one of these.
+    is_in_words: Vec<bool>,
     /// The number of arrows from node to node that were left out because they were too many.
     pub(crate) dropped: usize,
 }
@@ -65,14 +76,14 @@ fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
     Fleets::new(elements, options)
 }
 
-type ItemKey = (ItemKind, Arc<str>);
 type ArrowEnds = (u32, u32, ArrowKind);
 
 impl Viewed {
-    pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
+    pub(crate) fn new(mission: &Mission, options: &ViewOptions) -> Self {
+        let elements = &mission.elements;
         let mut selection = select(elements, options);
         let grouping = match options.mode {
-            mode if mode.is_direct() => super::Grouping::NONE,
+            Mode::Nodes => super::Grouping::NONE,
             _ => options.group,
         };
         let seen: Vec<bool> = selection.topics.iter().map(Option::is_none).collect();
@@ -92,8 +103,20 @@ impl Viewed {
             subscribed: elements.subscribes.iter().map(pair).collect(),
             ..Self::default()
         };
+        if options.mode == Mode::Bundles {
+            viewed.drawn = bundles::drawn(mission, options);
+            viewed.is_in_words = bundles::nodes_in_words(
+                mission,
+                (&viewed.selection, &viewed.drawn),
+                options.are_leaves_in_words,
+            );
+        } else {
+            viewed.drawn = vec![true; elements.topics.len()];
+            viewed.is_in_words = vec![false; elements.nodes.len()];
+        }
         viewed.set_items(elements, options, &groups);
         if options.mode.is_direct() {
+            viewed.bundled = bundles::names(elements, &groups);
             viewed.set_direct(elements, options);
         } else {
             viewed.set_arrows(elements);
@@ -165,7 +188,17 @@ impl Viewed {
                 members.entry(key).or_default().push(Element::Topic(id));
             }
         }
-        let places: BTreeMap<&ItemKey, u32> = members.keys().copied().zip(0..).collect();
+        let is_in_words = |key: &ItemKey, members: &[Element]| {
+            let is = |what: &Element| matches!(what, Element::Node(id) if self.is_in_words[*id as usize]);
+            key.0 == ItemKind::Node && members.iter().all(is)
+        };
+        let (mut members, in_words): (Vec<_>, Vec<_>) = members
+            .into_iter()
+            .partition(|(key, members)| !is_in_words(key, members));
+        self.in_words = in_words.len();
+        members.extend(in_words);
+        let places: BTreeMap<&ItemKey, u32> =
+            members.iter().map(|(key, _)| *key).zip(0..).collect();
         let place = |key: &Option<ItemKey>| key.as_ref().and_then(|key| places.get(key).copied());
         self.node = nodes.iter().map(place).collect();
         self.topic = topics.iter().map(place).collect();
@@ -237,8 +270,9 @@ impl Viewed {
         self.node.get(node as usize).copied().flatten()
     }
 
-    /// Arrows from publishers to subscribers, one per topic between two of them.
+    /// Arrows from publishers to subscribers: one per topic between two of them, or one for all topics in a bundle.
     fn set_direct(&mut self, elements: &Elements, options: &ViewOptions) {
+        let is_bundled = options.mode == Mode::Bundles;
         let mut subscribers: Vec<Vec<(EdgeId, u32)>> = vec![Vec::new(); elements.topics.len()];
         for (edge, id) in elements.subscribes.iter().zip(0..) {
             let item = self.item_of_node(edge.node);
@@ -248,7 +282,6 @@ impl Viewed {
         }
         let mut arrows: BTreeMap<ArrowEnds, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
         let mut pairs = 0;
-        let is_bundled = options.mode == Mode::Bundles;
         self.publish = vec![EdgePlace::Hidden; elements.publishes.len()];
         self.subscribe = vec![EdgePlace::Hidden; elements.subscribes.len()];
         for (edge, publish) in elements.publishes.iter().zip(0..) {
@@ -259,7 +292,8 @@ impl Viewed {
             };
             let name = topic.name.as_str();
             if self.selection.topics.get(at) != Some(&None)
-                || options.mode == Mode::Nodes && options.hide.debug && is_debug_label(name)
+                || !self.drawn[at]
+                || options.hide.debug && is_debug_label(name)
             {
                 continue;
             }
@@ -267,6 +301,9 @@ impl Viewed {
                 if from == *to && self.is_namespace(from) {
                     self.publish[publish as usize] = EdgePlace::Inside(from);
                     self.subscribe[*subscribe as usize] = EdgePlace::Inside(from);
+                    continue;
+                }
+                if !self.is_drawn(from) || !self.is_drawn(*to) {
                     continue;
                 }
                 pairs += 1;
@@ -277,17 +314,82 @@ impl Viewed {
                     Mode::Bundles => ArrowKind::Bundle,
                     _ => ArrowKind::Direct(topic.name.shared()),
                 };
-                let ends = (from, *to, kind);
+                // One line for both directions.
+                let ends = if is_bundled {
+                    (from.min(*to), from.max(*to))
+                } else {
+                    (from, *to)
+                };
+                let ends = (ends.0, ends.1, kind);
                 arrows.entry(ends).or_default().push((publish, *subscribe));
             }
         }
         self.dropped = pairs.saturating_sub(MOST_PAIRS);
-        for (ends, pairs) in arrows {
+        for (mut ends, pairs) in arrows {
+            if is_bundled {
+                self.turn(&mut ends, &pairs);
+            }
             let publishes = pairs.iter().map(|(p, _)| Element::Publish(*p));
             let others = pairs.iter().map(|(_, s)| Element::Subscribe(*s));
             let members: BTreeSet<Element> = publishes.chain(others).collect();
-            self.arrows.push(arrow(ends, members.into_iter().collect()));
+            let mut arrow = arrow(ends, members.into_iter().collect());
+            if is_bundled {
+                let topics = pairs
+                    .iter()
+                    .map(|(_, s)| &self.bundled[self.subscribed[*s as usize].1 as usize]);
+                let topics: BTreeSet<&Arc<str>> = topics.collect();
+                arrow.topics = topics.into_iter().cloned().collect();
+            }
+            self.arrows.push(arrow);
             self.pairs.push(pairs);
+        }
+    }
+
+    /// Lets a bundle run as most of its topics do.
+    fn turn(&self, ends: &mut ArrowEnds, pairs: &[(EdgeId, EdgeId)]) {
+        let topics = |from: u32| {
+            let of = pairs
+                .iter()
+                .filter(|(p, _)| self.item_of_sender(*p) == Some(from));
+            let topics = of.map(|(p, _)| &self.bundled[self.published[*p as usize].1 as usize]);
+            topics.collect::<BTreeSet<_>>().len()
+        };
+        if topics(ends.1) > topics(ends.0) {
+            (ends.0, ends.1) = (ends.1, ends.0);
+        }
+    }
+
+    /// Whether an item has a box.
+    fn is_drawn(&self, item: u32) -> bool {
+        (item as usize) < self.items.len() - self.in_words
+    }
+
+    /// The item of the node that publishes.
+    fn item_of_sender(&self, publish: EdgeId) -> Option<u32> {
+        self.item_of_node(self.published.get(publish as usize)?.0)
+    }
+
+    /// The topic of a bundle that a pair of edges is part of, and whether it runs against the arrow.
+    pub(crate) fn row(
+        &self,
+        arrow: &Arrow,
+        (publish, subscribe): (EdgeId, EdgeId),
+    ) -> Option<(u32, usize)> {
+        let topic = self.subscribed.get(subscribe as usize)?.1;
+        let name = self.bundled.get(topic as usize)?;
+        let at = arrow.topics.binary_search(name).ok()?;
+        let is_back = self.item_of_sender(publish) != Some(arrow.from);
+        Some((u32::try_from(at).ok()?, usize::from(is_back)))
+    }
+
+    /// The topic of an element: that of an edge, or itself.
+    pub(crate) fn topic_of(&self, what: Element) -> Option<TopicId> {
+        let of = |edges: &[(NodeId, TopicId)], id: u32| edges.get(id as usize).map(|edge| edge.1);
+        match what {
+            Element::Node(_) => None,
+            Element::Topic(id) => Some(id),
+            Element::Publish(id) => of(&self.published, id),
+            Element::Subscribe(id) => of(&self.subscribed, id),
         }
     }
 
@@ -340,104 +442,6 @@ fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
         to,
         kind,
         members,
-    }
-}
-
-/// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their name.
-/// Topics that several boxes publish are told by the arrows alone, so they are in none.
-fn inside(
-    elements: &Elements,
-    collapse: &Collapse<'_>,
-    nodes: &[Option<ItemKey>],
-    selection: &Selection,
-) -> Vec<Option<ItemKey>> {
-    let mut homes: Vec<BTreeSet<Option<&ItemKey>>> = vec![BTreeSet::new(); elements.topics.len()];
-    for edge in &elements.publishes {
-        let node = nodes.get(edge.node as usize).and_then(Option::as_ref);
-        if let (Some(homes), Some(node)) = (homes.get_mut(edge.topic as usize), node) {
-            homes.insert((node.0 == ItemKind::Namespace).then_some(node));
-        }
-    }
-    let topics = elements.topics.iter().zip(&homes).zip(&selection.topics);
-    let home = |((topic, homes), hidden): ((&Topic, &BTreeSet<Option<&ItemKey>>), &Option<_>)| {
-        let mut homes = homes.iter();
-        match (hidden, homes.next(), homes.next()) {
-            (None, Some(home), None) => home.cloned(),
-            (None, None, _) => {
-                let space = collapse.of(topic.name.as_str())?;
-                Some((ItemKind::Namespace, space.into()))
-            }
-            _ => None,
-        }
-    };
-    topics.map(home).collect()
-}
-
-/// Puts the topics of each group into its box, whose name is made unlike that of every topic.
-fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
-    for ids in groups.values() {
-        for id in ids {
-            topics[*id as usize] = None;
-        }
-    }
-    let mut taken: BTreeSet<Arc<str>> = topics
-        .iter()
-        .flatten()
-        .map(|key| Arc::clone(&key.1))
-        .collect();
-    for (name, ids) in groups {
-        let mut name = name.clone();
-        while taken.contains(name.as_str()) {
-            name.push_str("_2");
-        }
-        let name: Arc<str> = name.into();
-        taken.insert(Arc::clone(&name));
-        for id in ids {
-            topics[*id as usize] = Some((ItemKind::Group, Arc::clone(&name)));
-        }
-    }
-}
-
-/// Moves topics and groups that belong inside a collapsed namespace into it.
-fn swallow(
-    elements: &Elements,
-    (collapse, names): (&Collapse<'_>, &[Arc<str>]),
-    nodes: &[Option<ItemKey>],
-    topics: &mut [Option<ItemKey>],
-) {
-    type Spaces<'a> = Vec<Option<&'a str>>;
-    let mut ends: BTreeMap<ItemKey, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
-    for key in topics.iter().flatten() {
-        ends.entry(key.clone()).or_default();
-    }
-    let space = |edge: &Edge| {
-        let node = edge.node as usize;
-        nodes.get(node)?.as_ref()?;
-        Some(names.get(node).and_then(|name| collapse.of(name)))
-    };
-    let publishes = elements.publishes.iter().map(|e| (e, true));
-    let subscribes = elements.subscribes.iter().map(|e| (e, false));
-    for (edge, publishes) in publishes.chain(subscribes) {
-        let key = topics.get(edge.topic as usize).and_then(Option::as_ref);
-        let lists = key.and_then(|key| ends.get_mut(key));
-        if let (Some((p, s)), Some(space)) = (lists, space(edge)) {
-            if publishes {
-                p.push(space);
-            } else {
-                s.push(space);
-            }
-        }
-    }
-    let inside: BTreeMap<ItemKey, Arc<str>> = ends
-        .into_iter()
-        .filter_map(|(key, (p, s))| {
-            let space = swallows(collapse.of(&key.1), &p, &s)?;
-            (!collapse.keeps(&key.1)).then(|| (key, space.into()))
-        })
-        .collect();
-    for topic in topics.iter_mut().flatten() {
-        if let Some(space) = inside.get(topic) {
-            *topic = (ItemKind::Namespace, Arc::clone(space));
-        }
+        topics: Vec::new(),
     }
 }

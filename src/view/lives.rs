@@ -29,7 +29,7 @@ impl<'a> ItemTurns<'a> {
         };
         let entries = &mission.ledger.entries;
         for entry in entries {
-            // A part is told with its whole, so that it comes and goes with it. What restarts keeps its parts; of a role
+            // A part is reported with its whole, so that it comes and goes with it. What restarts keeps its parts; of a role
             // one run ends there and the next one begins, without which each of them would live all the time.
             let whole = entry.part_of.and_then(|id| entries.get(id as usize));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::items::{EdgePlace, Viewed};
 use super::lasting::Part;
 use super::{Headline, ItemKind, Lasting, Mark};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::Ledger;
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
@@ -38,10 +38,10 @@ pub(crate) struct News {
 
 impl News {
     /// The news of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
-    /// headline; they are told with it, whenever they were seen.
+    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is no news.
     pub(crate) fn new(
         ledger: &Ledger,
-        parts: &Parts,
+        (parts, beginning): (&Parts, Option<Stamp>),
         (span, lasting): (Span, Vec<Lasting>),
         viewed: &Viewed,
     ) -> Self {
@@ -53,7 +53,9 @@ impl News {
         }
         news.lasting = lasting;
         for (id, entry) in ledger.headlines(span) {
-            if !viewed.sees(entry.what) {
+            let is_start = matches!(entry.kind, Kind::Started | Kind::Appeared);
+            let is_first = is_start && beginning.is_some_and(|end| entry.time < end);
+            if is_first || !viewed.sees(entry.what) {
                 continue;
             }
             news.headlines.push(Headline {
@@ -172,7 +174,7 @@ impl Reach {
     }
 }
 
-/// The effect of one entry on the item or arrow that it is told on.
+/// The effect of one entry on the item or arrow that it is reported on.
 struct EntrySign {
     kind: Kind,
     part: Part,
@@ -209,6 +211,7 @@ impl EntrySign {
             (Kind::Restarted, _) => Some(Mark::Restarted),
             (Kind::Silent, _) => Some(Mark::Paused),
             (Kind::HandedOver, _) => Some(Mark::HandedOver),
+            (kind, _) if kind.is_remark() => Some(Mark::Changed),
             (Kind::Lifecycle | Kind::Type | Kind::Qos, _) => Some(Mark::Changed),
             _ => None,
         }

@@ -27,6 +27,23 @@ pub(crate) fn is_debug_label(topic: &str) -> bool {
     matches!(topic, "/time" | "/clock" | "/rosout" | "/statistics")
 }
 
+/// Whether it is a topic that every system has and nearly every node is connected to: it says nothing of what a robot
+/// does.
+pub(crate) fn is_plumbing(topic: &str) -> bool {
+    const LAST: [&str; 9] = [
+        "tf",
+        "tf_static",
+        "diagnostics",
+        "diagnostics_agg",
+        "diagnostics_toplevel_state",
+        "bond",
+        "rosout",
+        "rosout_agg",
+        "clock",
+    ];
+    LAST.contains(&topic.rsplit('/').next().unwrap_or(topic))
+}
+
 /// Whether it is a topic of the transform tree at the root, which `rqt_graph` hides or groups.
 pub(crate) fn is_tf(topic: &str) -> bool {
     matches!(topic, "/tf" | "/tf_static")

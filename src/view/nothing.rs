@@ -1,11 +1,14 @@
-//! The error of a view that shows nothing at all, with the name that may have been meant.
+//! Options of a view that name nothing, and the error of a view that shows nothing at all, with the name that may have
+//! been meant.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use super::ViewOptions;
 use crate::base::error::Error;
 use crate::base::name::namespace;
 use crate::base::nearest::nearest;
+use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
 use crate::graph::Elements;
 
@@ -31,6 +34,52 @@ pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
         format!("nothing is left to draw of {all}"),
         "`--hide none` and `--show-recorder` show what is left out; wider filters show more",
     )
+}
+
+/// Notices about the names and patterns in these options that match nothing.
+pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notice> {
+    let nodes: Vec<&str> = elements.nodes.iter().map(|n| n.name.as_str()).collect();
+    let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
+    let both: Vec<&str> = nodes.iter().chain(&topics).copied().collect();
+    let without = |spaces: &[Arc<str>]| -> Vec<String> {
+        let is_used = |space: &&Arc<str>| both.iter().any(|name| within(name, space));
+        let unused = spaces.iter().filter(|space| !is_used(space));
+        unused.map(ToString::to_string).collect()
+    };
+    let options = [
+        (
+            "--ns-filter",
+            "node",
+            options.ns_filter.unused(&nodes),
+            &nodes,
+        ),
+        (
+            "--topic-filter",
+            "topic",
+            options.topic_filter.unused(&topics),
+            &topics,
+        ),
+        ("--collapse", "name", without(&options.collapse), &both),
+        ("--expand", "name", without(&options.expand), &both),
+    ];
+    let mut notices = Vec::new();
+    for (flag, what, unused, names) in options {
+        for text in unused {
+            let meant = meant(&[text.trim_start_matches('-')], names);
+            // What a filter takes is of no use where namespaces are named.
+            let meant = meant.split(": ").next().unwrap_or_default();
+            let text = format!("`{flag} {text}` matches no {what}; {meant}");
+            notices.push(Notice::new(NoticeKind::Note, text));
+        }
+    }
+    notices
+}
+
+/// Whether a name lies in a namespace, or is it.
+fn within(name: &str, space: &str) -> bool {
+    let space = space.trim_end_matches('/');
+    let rest = name.strip_prefix(space);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 fn among(names: usize) -> String {
@@ -77,6 +126,27 @@ mod tests {
         let mission = mission(&["/robot1/nav/planner>/robot1/plan /robot1/amcl</robot1/plan"]);
         assert!(outline(&mission, &options).items.is_empty(), "{filter}");
         nothing(&mission.elements, &options).hint()
+    }
+
+    #[test]
+    fn what_matches_nothing_is_told_with_the_nearest_name() {
+        let options = ViewOptions {
+            ns_filter: NameFilter::parse("/robot1/.*,-/rviz").unwrap(),
+            topic_filter: NameFilter::parse("/robot1/plam").unwrap(),
+            collapse: vec!["/robot1/nav".into(), "/robot2".into()],
+            ..ViewOptions::default()
+        };
+        let mission = mission(&["/robot1/nav/planner>/robot1/plan"]);
+        let told = unmatched(&mission.elements, &options);
+        let told: Vec<&str> = told.iter().map(|notice| notice.text.as_str()).collect();
+        assert_eq!(
+            told,
+            [
+                "`--ns-filter -/rviz` matches no node; there are /robot1/nav/planner",
+                "`--topic-filter /robot1/plam` matches no topic; the nearest name is `/robot1/plan`",
+                "`--collapse /robot2` matches no name; the nearest namespace is `/robot1`",
+            ]
+        );
     }
 
     #[test]

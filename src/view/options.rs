@@ -10,7 +10,7 @@ use crate::base::error::{Error, Result};
 pub enum Mode {
     /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
     Nodes,
-    /// Nodes and collapsed namespaces only, one arrow from each to each for all topics between them, for a graph that
+    /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a graph that
     /// no page can hold.
     Bundles,
     /// Nodes and topics, in each window only those that carry messages in it.
@@ -212,6 +212,8 @@ pub struct ViewOptions {
     pub expand: Vec<Arc<str>>,
     /// Whether to show the recorder and the player.
     pub show_recorder: bool,
+    /// Whether bundles name nodes that never change in words too if one line leads to them.
+    pub(crate) are_leaves_in_words: bool,
     /// Whether anonymous nodes are drawn under their full names, each run a box of its own.
     pub exact_names: bool,
 }

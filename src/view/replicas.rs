@@ -393,7 +393,7 @@ mod tests {
             seen.namespaces[1].replicas,
             ["1", "2", "3", "4"].map(Arc::from)
         );
-        // Long numbers are no index: those are told apart, or one by their role.
+        // Long numbers are no index: those are distinguished, or one by their role.
         assert!(seen.items.iter().all(|item| !item.name.ends_with("NN")));
         assert_eq!(seen.namespaces.len(), 2);
     }

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::State;
-use crate::view::{Arrow, Mark, Showing, Shown, View};
+use crate::view::{Arrow, Mark, Showing, Shown, TopicRow, View};
 
 /// A value of a table that holds from a window on, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -254,12 +254,13 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
             if shown.mark == Some(Mark::Removed) {
                 continue;
             }
-            let hz = shown
-                .hz
-                .map(|hz| (hz.to_bits(), shown.count, shown.each, shown.topics));
+            let hz = shown.hz.map(|hz| {
+                let rows: Vec<_> = shown.topics.iter().map(TopicRow::key).collect();
+                (hz.to_bits(), shown.count, shown.each, rows)
+            });
             let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
             if hz != last_hz || (life.rates.is_empty() && arrow.is_some()) {
-                last_hz = hz;
+                last_hz.clone_from(&hz);
                 let place = known.entry(hz).or_insert_with(|| {
                     let text = (self.label)(shown, arrow);
                     self.labels.place(text)

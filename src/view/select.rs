@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_tf};
-use super::options::{Mode, ViewOptions};
+use super::options::ViewOptions;
 use crate::graph::{Elements, Topic};
 
 /// The reason for leaving a node or topic out.
@@ -142,7 +142,7 @@ pub(crate) fn finish(
             *reason = Some(Reason::Orphan);
         } else if !grouped
             && options.hide.debug
-            && options.mode != Mode::Nodes
+            && !options.mode.is_direct()
             && is_debug(topic.name.as_str())
         {
             *reason = Some(Reason::Debug);
@@ -170,7 +170,7 @@ impl Selection {
 mod tests {
     use super::*;
     use crate::view::testing::mission;
-    use crate::view::{Hide, NameFilter, outline};
+    use crate::view::{Hide, Mode, NameFilter, outline};
 
     /// The names of the boxes that are left.
     fn left(window: &str, options: &ViewOptions) -> String {

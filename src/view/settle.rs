@@ -1,5 +1,5 @@
-//! Looks that do not flicker: between two entries of the ledger, an element keeps its state and the thickness of its
-//! rate.
+//! Looks that do not flicker: between two entries of the ledger, an element keeps its state, the thickness of its rate,
+//! and the number that is written as long as chance alone may make the difference.
 
 use super::showing::{Showing, ShowingWriter};
 use super::{Mark, Shown};
@@ -39,6 +39,8 @@ struct PresentLife {
     /// Messages and nanoseconds since its rate last changed.
     sent: (f64, f64),
     is_measured: bool,
+    /// The rate that is written, with its number of messages.
+    held: Option<(f64, Option<u64>)>,
 }
 
 /// A look in some windows in a row.
@@ -50,6 +52,7 @@ struct LookRun<'a> {
     /// Its state, its degree and its average rate, settled.
     look: (State, Degree),
     steady_hz: Option<f64>,
+    held: Option<(f64, Option<u64>)>,
 }
 
 /// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest degree, and its average rate
@@ -96,6 +99,7 @@ fn runs(raw: &Showing, windows: u32) -> Vec<LookRun<'_>> {
             shown,
             look: (shown.state, shown.degree),
             steady_hz: None,
+            held: None,
         })
     };
     all.filter_map(run).collect()
@@ -120,6 +124,14 @@ impl PresentLife {
         }
         let (sent, time) = self.sent;
         run.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
+        // The number of an event is the event's, and a few messages are no rate.
+        let is_few = shown.count.is_some_and(|count| count < FEWEST);
+        if shown.mark.is_some() || is_few && self.held.is_none() {
+            self.held = None;
+        } else if self.held.is_none_or(|held| differs(held.0, shown)) {
+            self.held = shown.hz.map(|hz| (hz, shown.count)).filter(|_| !is_few);
+        }
+        run.held = self.held;
         self.show(run);
     }
 
@@ -146,7 +158,8 @@ impl PresentLife {
 /// The runs with their settled looks.
 fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
     let mut writer = ShowingWriter::default();
-    let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| (a.look, a.steady_hz) == (b.look, b.steady_hz);
+    let look = |run: &LookRun<'_>| (run.look, run.steady_hz, run.held);
+    let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| look(a) == look(b);
     // Between two changes only the numbers differ, and few of them do.
     let mut places: Vec<Option<u32>> = Vec::new();
     let mut before: Option<&LookRun<'_>> = None;
@@ -165,6 +178,7 @@ fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
                 state,
                 degree,
                 steady_hz: run.steady_hz,
+                held: run.held,
                 ..run.shown.clone()
             })
         });
@@ -175,6 +189,27 @@ fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
         writer.show(last.to, None);
     }
     writer.finish()
+}
+
+/// The least difference of a rate that changes the number that is written: as a share, and in standard deviations of the
+/// number of messages.
+const DIFFERENT: (f64, f64) = (0.25, 2.0);
+
+/// The fewest messages in a window that make a rate.
+const FEWEST: u64 = 5;
+
+/// Whether a window has another rate than `held`, more than by chance.
+fn differs(held: f64, shown: &Shown) -> bool {
+    let Some(hz) = shown.hz else {
+        return false;
+    };
+    let by = (hz - held).abs();
+    // Messages per hertz: the seconds of the window.
+    let seconds = match shown.count {
+        Some(count) if count > 0 && hz > 0.0 => count as f64 / hz,
+        _ => return by > DIFFERENT.0 * held && shown.count != Some(0),
+    };
+    by > DIFFERENT.0 * held && by * seconds > DIFFERENT.1 * libm::sqrt(held * seconds)
 }
 
 fn is_rate(shown: &Shown) -> bool {

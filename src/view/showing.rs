@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Members, Shown};
+use super::{Members, RowKey, Shown, TopicRow};
 use crate::evidence::Degree;
 use crate::graph::State;
 
@@ -71,7 +71,8 @@ const FEW: usize = 4;
 type LookKey = (
     (State, Degree, bool),
     [Option<u64>; 3],
-    (usize, usize, Members),
+    (usize, Members),
+    Vec<RowKey>,
     Option<Arc<str>>,
 );
 
@@ -136,7 +137,8 @@ fn key(shown: &Shown) -> LookKey {
     (
         (shown.state, shown.degree, shown.is_paused),
         [bits(shown.hz), bits(shown.steady_hz), shown.count],
-        (shown.topics, shown.each, shown.members),
+        (shown.each, shown.members),
+        shown.topics.iter().map(TopicRow::key).collect(),
         shown.lifecycle.clone(),
     )
 }

@@ -1,14 +1,15 @@
 //! The state of items and arrows in one window: states, rates and counts gathered from the graph's elements.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
-use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, ViewOptions};
+use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions, sum};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
-use crate::mission::Mission;
+use crate::mission::ledger::Entry;
+use crate::mission::{EntryId, Mission};
 
 /// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
 /// summed.
@@ -61,6 +62,8 @@ impl One {
 pub(crate) struct LivingItems {
     pub(crate) items: Vec<bool>,
     pub(crate) arrows: Vec<bool>,
+    /// Per arrow, the topics of a bundle that live.
+    pub(crate) topics: Vec<Vec<bool>>,
 }
 
 impl LivingItems {
@@ -84,14 +87,22 @@ impl LivingItems {
             itself && is(&items, arrow.from) && is(&items, arrow.to)
         };
         let arrows = viewed.arrows.iter().enumerate().map(arrow).collect();
-        Self { items, arrows }
-    }
-}
-
-fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Option<T> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(add(a, b)),
-        (a, b) => a.or(b),
+        let topics = |(at, arrow): (usize, &super::Arrow)| {
+            let mut lives = vec![false; arrow.topics.len()];
+            let pairs = viewed.pairs.get(at).filter(|_| !lives.is_empty());
+            for both in pairs.into_iter().flatten().filter(|both| pair(both)) {
+                if let Some((topic, _)) = viewed.row(arrow, *both) {
+                    lives[topic as usize] = true;
+                }
+            }
+            lives
+        };
+        let topics = viewed.arrows.iter().enumerate().map(topics).collect();
+        Self {
+            items,
+            arrows,
+            topics,
+        }
     }
 }
 
@@ -313,6 +324,7 @@ impl<'a> Now<'a> {
         let mut slot = None;
         let is_bundle = arrow.kind == ArrowKind::Bundle;
         let (mut last, mut carried) = (None, BTreeSet::new());
+        let mut rows: BTreeMap<u32, (Option<Shown>, [bool; 2])> = BTreeMap::new();
         for (publish, subscribe) in self.viewed.pairs.get(id as usize)? {
             let (Some(p), Some(s)) = (
                 self.one(Element::Publish(*publish)),
@@ -320,6 +332,13 @@ impl<'a> Now<'a> {
             ) else {
                 continue;
             };
+            let row = self
+                .viewed
+                .row(arrow, (*publish, *subscribe))
+                .filter(|_| is_bundle);
+            if let Some((topic, way)) = row {
+                rows.entry(topic).or_default().1[way] = true;
+            }
             // What several nodes of a box hear comes once.
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
@@ -337,9 +356,33 @@ impl<'a> Now<'a> {
                 is_paused: p.is_paused,
             };
             gather(&mut slot, id, &joined);
+            if let Some((topic, _)) = row {
+                gather(&mut rows.entry(topic).or_default().0, topic, &joined);
+            }
         }
-        let topics = if is_bundle { carried.len() } else { 0 };
+        let topics = rows.into_values().filter_map(|(shown, ways)| {
+            let shown = shown?;
+            Some(TopicRow {
+                topic: shown.id,
+                ways,
+                state: if shown.is_paused {
+                    shown.state.max(State::Silent)
+                } else {
+                    shown.state
+                },
+                hz: shown.hz,
+                count: shown.count,
+                mark: None,
+                rates: None,
+            })
+        });
+        let topics = topics.collect();
         slot.map(|shown| Shown { topics, ..shown })
+    }
+
+    /// An event of the log.
+    pub(crate) fn entry(&self, id: EntryId) -> Option<&Entry> {
+        self.mission.ledger.entries.get(id as usize)
     }
 
     /// Whether the options hide elements that are not heard in a window.

@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Edge, EdgeState, Elements, Graph, Node, NodeState, State, Topic, TopicState};
+use crate::graph::{
+    Edge, EdgeState, Elements, Graph, Measures, Node, NodeState, State, Topic, TopicState,
+};
 use crate::mission::{Mission, Window};
 
 const SECOND: i64 = 1_000_000_000;
@@ -200,6 +202,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
                 hz,
                 median_period_s: None,
                 max_gap_s: None,
+                measures: Measures::default(),
             });
         }
     }
@@ -223,6 +226,8 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
                     degree: Degree::Measured,
                     count: count(w.hz),
                     hz: w.hz,
+                    bytes: None,
+                    measures: Measures::default(),
                 })
             })
             .collect()

@@ -1,7 +1,7 @@
 //! All windows as one, for a still picture of the whole mission.
 
 use crate::view::settle::Lengths;
-use crate::view::{SeenWindow, Showing, Shown, View};
+use crate::view::{SeenWindow, Showing, Shown, TopicRow, View, sum as added};
 
 /// The whole sequence as one window without marks: everything that was ever there, in its liveliest state, with rates
 /// averaged over the whole time and messages summed. `None` for a view without windows.
@@ -32,7 +32,13 @@ fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
     let average = |sum: f64| if time > 0.0 { sum / time } else { 0.0 };
     let sum: Shown = slot?;
     let hz = sum.hz.map(average);
+    let row = |row: TopicRow| TopicRow {
+        hz: row.hz.map(average),
+        ..row
+    };
+    let topics = sum.topics.iter().cloned().map(row).collect();
     Some(Shown {
+        topics,
         hz,
         steady_hz: hz,
         ..sum
@@ -42,8 +48,16 @@ fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
 /// Adds a look that holds in `windows` windows, `length` nanoseconds together; rates become sums over time.
 fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
     let count = shown.count.map(|count| count.saturating_mul(windows));
+    let rows = shown.topics.iter().map(|row| TopicRow {
+        hz: row.hz.map(|hz| hz * length),
+        count: row.count.map(|count| count.saturating_mul(windows)),
+        mark: None,
+        rates: None,
+        ..row.clone()
+    });
     let Some(sum) = slot else {
         *slot = Some(Shown {
+            topics: rows.collect(),
             mark: None,
             hz: shown.hz.map(|hz| hz * length),
             rates: None,
@@ -55,16 +69,23 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         });
         return;
     };
+    for row in rows {
+        match sum.topics.binary_search_by_key(&row.topic, |r| r.topic) {
+            Err(place) => sum.topics.insert(place, row),
+            Ok(place) => add_row(&mut sum.topics[place], &row),
+        }
+    }
     sum.state = sum.state.min(shown.state);
     sum.degree = sum.degree.min(shown.degree);
-    sum.hz = match (sum.hz, shown.hz) {
-        (sum, Some(hz)) => Some(sum.unwrap_or(0.0) + hz * length),
-        (sum, None) => sum,
-    };
-    sum.count = match (sum.count, count) {
-        (sum, Some(count)) => Some(sum.unwrap_or(0).saturating_add(count)),
-        (sum, None) => sum,
-    };
+    sum.hz = added(sum.hz, shown.hz.map(|hz| hz * length), |a, b| a + b);
+    sum.count = added(sum.count, count, u64::saturating_add);
+}
+
+fn add_row(sum: &mut TopicRow, row: &TopicRow) {
+    sum.ways = [sum.ways[0] | row.ways[0], sum.ways[1] | row.ways[1]];
+    sum.state = sum.state.min(row.state);
+    sum.hz = added(sum.hz, row.hz, |a, b| a + b);
+    sum.count = added(sum.count, row.count, u64::saturating_add);
 }
 
 #[cfg(test)]

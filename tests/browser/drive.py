@@ -15,6 +15,7 @@ import time
 import zlib
 
 import axe
+import choose
 import firefox
 import folded
 import sight
@@ -348,7 +349,7 @@ def under_policies(b, outer, page):
         b.frame(0)
         time.sleep(0.3)
         assert (window(b) > 0) == plays, (policy, window(b))
-        seen = b.js("return [document.querySelectorAll('#told a').length, document.querySelectorAll('.items > .node:not(.off)').length, getComputedStyle(document.querySelector('.node ellipse')).fill]")
+        seen = b.js("return [document.querySelectorAll('#told a').length, document.querySelectorAll('.items > .node:not(.off)').length, getComputedStyle(document.querySelector('.node :is(ellipse, rect)')).fill]")
         assert seen[0] > 3 and seen[1] > 3 and seen[2] != "rgb(0, 0, 0)", (policy, seen)
         b.log("browser")
 
@@ -392,6 +393,7 @@ def main(page, evolution, hostile_page, svg, folded_page, board, report):
     elsewhere(url(page), text)
     animation(svg)
     folded.check(url(folded_page), data_of(pathlib.Path(folded_page).read_text()))
+    choose.check(url(page), url(board), evolution)
     touch.check(url(page))
     sight.check(url(page), url(folded_page), url(board))
     if is_there(axe):
@@ -399,7 +401,8 @@ def main(page, evolution, hostile_page, svg, folded_page, board, report):
     if is_there(firefox):
         with firefox.Firefox() as b:
             drive(b, url(page), evolution, data)
-        print("  all of the first in Firefox")
+            choose.drive(b, url(page), url(board), evolution)
+        print("  all of this in Firefox, too")
     print("all well")
 
 

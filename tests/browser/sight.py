@@ -7,6 +7,10 @@ from webdriver import Browser
 SCREENS = ((1440, 900), (1920, 1080), (1024, 768), (390, 844))
 SMALLEST = """
 const stage = document.getElementById('stage').getBoundingClientRect(), graph = document.querySelector('.graph:not([hidden])');
+if (document.body.classList.contains('board')) {
+    const rows = [...document.querySelectorAll('#rownames button, #ticks span')].filter(row => row.getBoundingClientRect().width);
+    return [rows.length, Math.min(...rows.map(row => parseFloat(getComputedStyle(row).fontSize))), document.documentElement.scrollWidth];
+}
 const sizes = [...graph.querySelectorAll('text')].filter(text => {
     const at = text.getBoundingClientRect(), is = getComputedStyle(text);
     return text.textContent && at.width && is.visibility == 'visible' && is.display != 'none'

@@ -58,7 +58,7 @@ def check(url):
         assert moved[0] > after[0] + 1 and moved[1] > after[1] + 1 and abs(moved[2] - after[2]) < 1, (after, moved)
         assert page_scale(b) == page and b.js("return document.getElementById('card').hidden"), "a drag is no tap"
         tap(b, "[data-key=f]")
-        tap(b, "#graph .node:not(.off) ellipse")
+        tap(b, "#graph .node:not(.off) :is(ellipse, rect)")
         name = b.js("return document.querySelector('#graph .node:not(.off)').dataset.name")
         assert b.js("return document.getElementById('name').textContent") == name
         axis = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")

@@ -1,6 +1,8 @@
 """The installed wheel: what its functions give, raise and leave alone. Run with Python; ends with 1 if anything is wrong."""
 
+import inspect
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -111,6 +113,81 @@ def errors_have_their_types():
     assert len(gone["counts"]) == 0 and "no_such.bag" in gone["bags"].to_pyarrow()["error"][0].as_py()
 
 
+def missions_say_what_is_in_them():
+    mission = bagreel.read(WAREHOUSE)
+    assert mission.messages == 26_719 and 320 < mission.duration < 330 and mission.bags == ["warehouse.bag"]
+    assert mission.nodes == sorted(mission.nodes) and "/robot1/amcl" in mission.nodes, mission.nodes
+    assert "/robot1/scan" in mission.topics and len(mission.windows) == len(mission)
+    assert sum(window["messages"] for window in mission.windows) == mission.messages
+    assert mission.events == bagreel.events(WAREHOUSE) != [], mission.events[:1]
+    assert bagreel.__version__ == subprocess.run(
+        [sys.executable, "-m", "bagreel", "--version"], capture_output=True, text=True, check=True
+    ).stdout.split()[-1]
+    shown = mission._repr_html_()
+    assert "warehouse.bag" in shown and "data:image/svg+xml;base64," in shown, shown[:300]
+
+
+def notebooks_show_what_was_made():
+    for what in (COURIER, bagreel.read(COURIER)):
+        shown = bagreel.show(what, height=400, collapse=["/nav"])
+        assert shown.html.count("<iframe") == 1 and "srcdoc=" in shown.html and "data:image/svg+xml" in shown.html
+        assert "height:400px" in shown._repr_html_()
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        frames = bagreel.render(COURIER, [folder / "f{n}.png", folder / "t.csv"], period="30s")
+        assert [path.name for path in frames[:2]] == ["f0.png", "f1.png"] and folder / "t.edges.csv" in frames
+        assert "data:image/png" in frames._repr_html_()
+        lives = bagreel.figure(WAREHOUSE, folder / "lives.svg", width="180mm")
+        assert "data:image/svg+xml" in lives._repr_html_() and len(lives) == 1
+        report = bagreel.render(COURIER, folder / "r.md")
+        assert report._repr_html_() is None and "courier.mcap" in report._repr_markdown_()
+
+
+def missions_are_judged():
+    with tempfile.TemporaryDirectory() as folder:
+        graph = Path(folder) / "graph.yaml"
+        text = bagreel.baseline(COURIER, graph)
+        assert text == graph.read_text() and text.startswith("schema: bagreel.expect/1")
+        kept = bagreel.check(COURIER, graph)
+        assert kept.ok and kept and not kept.findings and "no findings" in str(kept), kept
+        graph.write_text("schema: bagreel.expect/1\nnodes:\n  /gone: {}\n")
+        broken = bagreel.check(COURIER, graph)
+        assert not broken.ok and broken.errors == 1 and broken.findings[0]["name"] == "/gone", broken
+        assert broken._repr_markdown_().startswith("### ❌ ")
+        raises(bagreel.BagreelError, "no_such.bag", lambda: bagreel.check("no_such.bag", graph))
+        graph.write_text("nodes: 3\n")
+        raises(bagreel.BagreelError, "graph.yaml", lambda: bagreel.check(COURIER, graph))
+        page = Path(folder) / "d.html"
+        other = bagreel.diff(COURIER, WAREHOUSE, page)
+        assert not other.same and len(other) > 50 and other[0]["kind"] == "node" and page.exists()
+        assert bagreel.diff(COURIER, COURIER).same
+        table = bagreel.extract(COURIER, Path(folder) / "t", fields=True, nested=True, topic_filter="/scan")
+        assert sorted(path.name for path in table.iterdir()) == ["index.parquet", "scan.parquet"]
+
+
+def signatures_are_those_of_the_command():
+    for command, left_out in (
+        ("render", {"output", "quiet", "verbose", "help", "timings", "watch", "color"}),
+        ("figure", {"output", "quiet", "verbose", "help", "color"}),
+        ("extract", {"output", "quiet", "verbose", "help", "color"}),
+    ):
+        said = subprocess.run([sys.executable, "-m", "bagreel", command, "--help"], capture_output=True, text=True, check=True)
+        options = set(re.findall(r"^ +(?:-\w, )?--([a-z-]+)", said.stdout, re.MULTILINE)) - left_out
+        named = inspect.signature(getattr(bagreel, command)).parameters
+        ours = {name.rstrip("_").replace("_", "-") for name in named} - {"bags", "outputs", "output"}
+        assert ours == options, f"{command}: {ours ^ options}"
+
+
+def the_examples_run():
+    tests = ROOT / "examples/python"
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", tests], check=True, stdout=subprocess.DEVNULL)
+    cells = json.loads((tests / "mission.ipynb").read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    # Notebooks show the last line of a cell, which a program computes in vain.
+    done = subprocess.run([sys.executable, "-c", "\n".join(code)], cwd=tests, capture_output=True, text=True, check=False)
+    assert len(code) > 8 and done.returncode == 0, done.stderr
+
+
 def other_threads_go_on():
     gap, done = 0.0, threading.Event()
 
@@ -144,7 +221,8 @@ def main():
     failed = 0
     for test in (
         tables_are_arrow, tables_outlive_their_owner, duckdb_takes_them, polars_takes_them, parts_make_the_whole, missions_are_read,
-        plans_name_every_bag, pictures_are_drawn, errors_have_their_types, other_threads_go_on, the_command_is_there,
+        plans_name_every_bag, missions_say_what_is_in_them, notebooks_show_what_was_made, missions_are_judged,
+        signatures_are_those_of_the_command, the_examples_run, pictures_are_drawn, errors_have_their_types, other_threads_go_on, the_command_is_there,
     ):  # fmt: skip
         try:
             test()

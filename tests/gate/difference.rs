@@ -62,19 +62,19 @@ fn a_difference_is_told_of_what_both_could_have_told() {
             assert!(!text.contains(&format!(" {words}")), "{words}");
         }
     }
-    assert!(html.contains("<body class=\"compares\">"));
+    assert!(html.contains("<body class=\"compares paired\">"));
     let (code, said) = run(here, &["diff", "a.bag", "b.bag", "-o", "d.csv"]);
-    assert!(code == 2 && said.contains("two are compared"), "{said}");
+    assert!(
+        code == 2 && said.contains("cannot represent a comparison"),
+        "{said}"
+    );
     fs::create_dir(here.join("new")).unwrap();
     fs::copy(here.join("b.bag"), here.join("new/a.bag")).unwrap();
     let (_, said) = run(here, &["diff", "a.bag", "new/a.bag"]);
     assert!(said.contains("only in new/a.bag"), "{said}");
     assert!(fs::read(here.join("d.gif")).unwrap().starts_with(b"GIF89a"));
-    assert!(
-        fs::read_to_string(here.join("d.md"))
-            .unwrap()
-            .starts_with("### 🔀 ")
-    );
+    let markdown = fs::read_to_string(here.join("d.md")).unwrap();
+    assert!(markdown.starts_with("### 🔀 "), "{markdown}");
     fs::write(
         here.join("g.yaml"),
         "schema: bagreel.expect/1\nnodes:\n  /teleop: {}\n",
@@ -88,4 +88,28 @@ fn a_difference_is_told_of_what_both_could_have_told() {
     );
     assert_eq!(run(here, &["diff", "gone.bag", "a.bag"]).0, 2);
     assert_eq!(run(here, &["diff", "a.bag"]).0, 2);
+}
+
+#[test]
+fn what_one_recording_cannot_tell_is_folded_below_the_differences() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "a.bag", &recording(HEALTHY, 0));
+    let ros2 = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+    let (code, said) = run(here, &["diff", "a.bag", ros2, "-o", "d.md"]);
+    assert_eq!(code, 1, "{said}");
+    let lines: Vec<&str> = said.lines().filter(|l| !l.contains(": ")).collect();
+    let unknown: Vec<bool> = lines.iter().map(|l| l.starts_with("? ")).collect();
+    assert!(unknown.is_sorted() && unknown.contains(&true), "{said}");
+    let markdown = fs::read_to_string(here.join("d.md")).unwrap();
+    let (open, folded) = markdown.split_once("<details><summary>").unwrap();
+    let rows = |text: &str, sign: &str| text.lines().filter(|l| l.starts_with(sign)).count();
+    assert!(
+        rows(open, "| - ") > 0 && rows(open, "| ? ") == 0,
+        "{markdown}"
+    );
+    assert!(
+        rows(folded, "| ? ") > 0 && rows(folded, "| - ") == 0,
+        "{markdown}"
+    );
 }

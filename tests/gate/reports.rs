@@ -235,3 +235,62 @@ fn no_report_is_larger_than_its_reader_takes() {
     assert_eq!(note, &format!("{rest} more findings left out"));
     roxmltree::Document::parse(&read("c.xml")).unwrap();
 }
+
+#[test]
+fn services_find_the_file_by_its_path_in_the_repository() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    let folder = here.join("robot/ci");
+    fs::create_dir_all(&folder).unwrap();
+    let text = "schema: bagreel.expect/1\nnodes:\n  /gone: {}\n";
+    fs::write(folder.join("graph.yaml"), text).unwrap();
+    let print = |format: &str, checkout: Option<(&str, &std::path::Path)>| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"));
+        for name in ["GITHUB_STEP_SUMMARY", "GITHUB_WORKSPACE", "CI_PROJECT_DIR"] {
+            command.env_remove(name);
+        }
+        command.envs(checkout).current_dir(&folder);
+        let bag = here.join("run.bag");
+        command
+            .arg("check")
+            .arg(bag)
+            .args(["--expect", "graph.yaml"]);
+        said(&command.args(["--format", format]).output().unwrap())
+    };
+    let forms = [
+        ("github", "file="),
+        ("gitlab", "\"path\": \""),
+        ("sarif", "\"uri\": \""),
+    ];
+    for (format, before) in forms {
+        let plain = print(format, None);
+        assert!(plain.contains(&format!("{before}graph.yaml")), "{plain}");
+        for variable in ["GITHUB_WORKSPACE", "CI_PROJECT_DIR"] {
+            let text = print(format, Some((variable, here)));
+            let path = format!("{before}robot/ci/graph.yaml");
+            assert!(text.contains(&path), "{text}");
+            let elsewhere = print(format, Some((variable, &here.join("other"))));
+            assert_eq!(elsewhere, plain);
+        }
+    }
+    fs::create_dir(here.join("robot/.git")).unwrap();
+    for (format, before) in forms {
+        let text = print(format, None);
+        let path = format!("{before}ci/graph.yaml");
+        assert!(text.contains(&path), "{text}");
+    }
+    // Two checks of one recording leave two comments.
+    fs::write(folder.join("rules.yaml"), text).unwrap();
+    let mark = |file: &str| {
+        let bag = here.join("run.bag");
+        let args = ["check", bag.to_str().unwrap(), "--expect", file];
+        let text = said(&bagreel(
+            &folder,
+            &[&args[..], &["--format", "markdown"]].concat(),
+        ));
+        text.lines().last().unwrap().to_owned()
+    };
+    assert_eq!(mark("graph.yaml"), "<!-- bagreel:run:ci_graph -->");
+    assert_eq!(mark("rules.yaml"), "<!-- bagreel:run:ci_rules -->");
+}

@@ -18,6 +18,8 @@ pub struct Options {
     pub message_index: bool,
     pub summary: bool,
     pub chunk: u64,
+    /// The key of a channel's metadata that names its publisher in ROS 2, if any.
+    pub publisher_key: Option<&'static str>,
 }
 
 impl Default for Options {
@@ -29,6 +31,7 @@ impl Default for Options {
             message_index: true,
             summary: true,
             chunk: 16 * 1024,
+            publisher_key: None,
         }
     }
 }
@@ -62,6 +65,8 @@ pub fn write(recording: &Recording, options: &Options) -> Vec<u8> {
                 metadata.insert("latching".to_owned(), u8::from(p.latching).to_string());
             } else {
                 metadata.insert("offered_qos_profiles".to_owned(), p.qos.clone());
+                let key = options.publisher_key.map(str::to_owned);
+                metadata.extend(key.map(|key| (key, p.node.clone())));
             }
             to.add_channel(schema, &p.topic, encoding, &metadata)
                 .unwrap()

@@ -57,7 +57,7 @@ impl<G: Grammar> Query<'_, G> {
         let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
         let mut from = chunk.start;
         while next_chunk::<G>(&mut stream, from) && stream.position() < chunk.end {
-            let text = "chunks were read that the index does not name";
+            let text = "chunks that the index does not list were read";
             sink.notice(Notice::new(NoticeKind::Damaged, text));
             from = stream.position();
             let here = Chunk {
@@ -188,8 +188,8 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-const OTHER_TIMES: &str = "chunks begin or end at other times than the index of the bag says";
-const APART: &str = "chunks are not where the index of the bag says, or not as long";
+const OTHER_TIMES: &str = "chunks begin or end at other times than the bag's index states";
+const APART: &str = "chunks are not where the bag's index states, or have another length";
 
 /// The index of a chunk.
 struct Found {

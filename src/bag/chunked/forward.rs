@@ -99,18 +99,18 @@ impl<G: Grammar> Forward<'_, G> {
     ) -> Result<(), NoRecord> {
         if self.ended && matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. }) {
             self.ended = false;
-            self.damage("messages stand behind what should be the end of the data");
+            self.damage("messages follow the end of the data");
         }
         if let RecordHead::Tail { .. } | RecordHead::Total { .. } = record
             && !self.ended
         {
-            self.damage("records of the bag's end stand among its messages");
+            self.damage("records that belong to the bag's end are among its messages");
         }
         match record {
             RecordHead::Chunk(head) => self.chunk(stream, &head),
             RecordHead::Message { raw, time, size } => {
                 if self.is_chunked {
-                    self.damage("messages stand between chunks");
+                    self.damage("messages lie between chunks");
                 }
                 self.found.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
@@ -131,7 +131,7 @@ impl<G: Grammar> Forward<'_, G> {
             RecordHead::FileEnd { len } => self.file_end(stream, len),
             RecordHead::Unknown { len, extension } => {
                 self.told.interrupt();
-                let text = "records of a kind that the format does not define were passed over";
+                let text = "records of a kind that the format does not define were skipped";
                 if extension {
                     self.sink.notice(Notice::new(NoticeKind::Note, text));
                 } else {
@@ -155,7 +155,7 @@ impl<G: Grammar> Forward<'_, G> {
         }
         let at = stream.position();
         self.damage(&format!(
-            "what stands from byte {at} on is not the end of the bag"
+            "unexpected data at byte {at} instead of the end of the bag"
         ));
         Ok(())
     }
@@ -165,7 +165,9 @@ impl<G: Grammar> Forward<'_, G> {
         let found = next_chunk::<G>(stream, from);
         if found {
             let lost = stream.position() - from;
-            self.damage(&format!("{lost} bytes from byte {from} on are not records"));
+            self.damage(&format!(
+                "skipped {lost} bytes at byte {from} that are not records"
+            ));
         }
         found
     }
@@ -175,7 +177,7 @@ impl<G: Grammar> Forward<'_, G> {
         self.is_chunked = head.packed > 0;
         self.found.compression.extend(head.how);
         if head.misnamed {
-            self.damage("a chunk is marked as a record of another kind, and was read all the same");
+            self.damage("a chunk is marked as another kind of record; it was read anyway");
         }
         if head.unclosed {
             return Err(self.tail(stream, head.how.unwrap_or(Compression::None)));
@@ -259,7 +261,7 @@ impl<G: Grammar> Forward<'_, G> {
         let found = self.told.messages + homeless;
         if let Some(total) = self.total.filter(|total| *total > found) {
             self.damage(&format!(
-                "the bag says that it holds {total} messages; {found} were found"
+                "the bag should contain {total} messages; found {found}"
             ));
         }
         let (kind, text) = match stop {
@@ -274,10 +276,7 @@ impl<G: Grammar> Forward<'_, G> {
                 NoticeKind::Truncated,
                 format!("the bag is cut at byte {at}"),
             ),
-            NoRecord::Broken => (
-                NoticeKind::Damaged,
-                format!("what stands from byte {at} on is not a record"),
-            ),
+            NoRecord::Broken => (NoticeKind::Damaged, format!("no record at byte {at}")),
             NoRecord::Io(e) => (
                 NoticeKind::Damaged,
                 format!("reading stopped at byte {at}: {e}"),
@@ -317,7 +316,7 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         }
         let data = peek_whole(stream, len)?;
         let Ok(described) = self.grammar.describe(what, data, &self.connections) else {
-            self.damage("what describes a connection is not readable");
+            self.damage("the description of a connection cannot be read");
             return pass(stream, len);
         };
         if let Some((raw, connection)) = described
@@ -334,7 +333,10 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
 }
 
 /// The next `len` bytes of `stream`, without taking them.
-fn peek_whole<'s>(stream: &'s mut ByteStream<'_>, len: u64) -> Result<&'s [u8], NoRecord> {
+pub(super) fn peek_whole<'s>(
+    stream: &'s mut ByteStream<'_>,
+    len: u64,
+) -> Result<&'s [u8], NoRecord> {
     let len = usize::try_from(len).unwrap_or(usize::MAX);
     let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
     if bytes.len() < len {

@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use super::Grammar;
 use super::record::{Connections, RecordHead};
+use crate::bag::adapters::MOST_CUTS;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
 /// The sum that the index of a chunk should have, whatever the order of its entries.
@@ -57,7 +59,46 @@ impl Index {
             self.stamps.push(time);
             self.offsets.push(offset);
         }
+        // Recorders write the entries of a connection by time.
+        if !self.offsets[start..].is_sorted() {
+            let stamps = self.stamps.drain(start..).zip(self.offsets.drain(start..));
+            let mut pairs: Vec<(Stamp, u64)> = stamps.collect();
+            pairs.sort_by_key(|(_, offset)| *offset);
+            let (stamps, offsets): (Vec<Stamp>, Vec<u64>) = pairs.into_iter().unzip();
+            self.stamps.extend(stamps);
+            self.offsets.extend(offsets);
+        }
         self.runs.push((raw, start..self.stamps.len()));
+    }
+
+    /// The places in the chunk where time falls, in order.
+    fn falls(&self) -> impl Iterator<Item = u64> + use<> {
+        let mut falls = Vec::new();
+        for (_, entries) in &self.runs {
+            let mut last = Stamp::MIN;
+            for at in entries.clone() {
+                let time = self.stamps[at];
+                if last.since(time) > OUT_OF_ORDER_NS {
+                    falls.push(self.offsets[at]);
+                    last = time;
+                }
+                last = last.max(time);
+            }
+        }
+        falls.sort_unstable();
+        let is_few = falls.len() <= MOST_CUTS;
+        falls.into_iter().filter(move |_| is_few)
+    }
+
+    /// The part of the entries of one connection that lies in a part of the chunk.
+    fn between(&self, entries: &Range<usize>, part: Range<u64>) -> Range<usize> {
+        let offsets = &self.offsets[entries.clone()];
+        let place = |offset| entries.start + offsets.partition_point(|at| *at < offset);
+        place(part.start)..if part.end == u64::MAX {
+            entries.end
+        } else {
+            place(part.end)
+        }
     }
 
     /// Whether these are the first and last times in the index.
@@ -117,18 +158,25 @@ impl<G: Grammar> Query<'_, G> {
         } else {
             self.fetch(index, &wanted, body, sink)
         };
-        for (raw, entries) in &index.runs {
-            let Some(id) = self.connections.get(*raw) else {
-                nameless(sink, entries.len() as u64);
-                continue;
-            };
-            // Of entries outside the range they are not looked up, and no sink is told of those.
-            let known = self.wants[id.0 as usize] > Want::Stamps;
-            let sizes = sizes
-                .as_ref()
-                .filter(|_| known)
-                .map(|s| &s[entries.clone()]);
-            sink.stamps(id, &index.stamps[entries.clone()], sizes);
+        let mut from = 0;
+        for to in index.falls().chain([u64::MAX]) {
+            sink.part();
+            for (raw, entries) in &index.runs {
+                let entries = index.between(entries, from..to);
+                if entries.is_empty() {
+                    continue;
+                }
+                let Some(id) = self.connections.get(*raw) else {
+                    nameless(sink, entries.len() as u64);
+                    continue;
+                };
+                // Of entries outside the range they are not looked up, and no sink is reported of those.
+                let known = self.wants[id.0 as usize] > Want::Stamps;
+                let sizes = sizes.as_ref().filter(|_| known);
+                let sizes = sizes.map(|s| &s[entries.clone()]);
+                sink.stamps(id, &index.stamps[entries], sizes);
+            }
+            from = to;
         }
     }
 
@@ -355,4 +403,4 @@ fn wanted_part<'s>(
 }
 
 /// The notice about a payload larger than [`MOST_PAYLOAD`].
-const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";
+const TOO_LARGE: &str = "messages larger than 16 MiB were counted but not decoded";

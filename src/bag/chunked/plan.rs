@@ -175,7 +175,7 @@ impl Used {
         if all.all(|raw| connections.get(raw).is_some()) {
             return Ok(());
         }
-        Unindexed::wrong("its index counts messages of connections that it does not describe")
+        Unindexed::wrong("its index counts messages of undescribed connections")
     }
 }
 

@@ -103,7 +103,7 @@ impl fmt::Display for NoRecord {
         match self {
             Self::End => f.write_str("it ends"),
             Self::Cut => f.write_str("it ends inside a record"),
-            Self::Broken => f.write_str("what stands there is not a record"),
+            Self::Broken => f.write_str("there is no record"),
             Self::Io(e) => e.fmt(f),
         }
     }

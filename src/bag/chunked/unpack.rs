@@ -44,7 +44,7 @@ pub(super) fn unpack<G: Grammar>(
 ) -> Result<Option<String>, NoRecord> {
     let end = stream.position().saturating_add(head.packed);
     let found = match (head.how, head.crc) {
-        (None, _) => Some("it is compressed in a way that no reader knows".to_owned()),
+        (None, _) => Some("its compression is not supported".to_owned()),
         (Some(Compression::None), None) => match records(stream, end, visitor) {
             Err(NoRecord::Io(e)) => return Err(NoRecord::Io(e)),
             Err(stop) => Some(stop.to_string()),
@@ -54,12 +54,12 @@ pub(super) fn unpack<G: Grammar>(
         (Some(how), _) => summed(stream, head, how, allowance, visitor),
     };
     let rest = end.saturating_sub(stream.position());
-    // A chunk cut by the end of the file is told once, as the cut.
+    // A chunk cut by the end of the file is reported once, as the cut.
     pass(stream, rest.saturating_add(head.padding))?;
     Ok(found)
 }
 
-const NOT_AS_LONG: &str = "it is not as long as it says";
+const NOT_AS_LONG: &str = "its length is wrong";
 
 /// Hands over the records of a chunk that is compressed or has a checksum, which means reading all of it.
 fn summed<G: Grammar>(

@@ -368,7 +368,21 @@ fn describe(connection: &mut Connection, metadata: &[u8]) {
             "latching" => connection.latching = value == "1" || value == "true",
             "md5sum" | "topic_type_hash" => connection.type_hash = Some(value.into()),
             "offered_qos_profiles" => connection.qos = Some(value.into()),
+            key if connection.publisher.is_none() && names_publisher(key, &value) => {
+                connection.publisher = Some(value.into());
+            }
             _ => {}
         }
     }
+}
+
+/// Whether a key of a channel's metadata has the node that publishes it as its value: recorders have no common word for
+/// it, but a node's full name begins with a slash and has no blanks.
+fn names_publisher(key: &str, value: &str) -> bool {
+    let key = key.to_lowercase();
+    let is_about = ["node", "publisher", "caller"]
+        .iter()
+        .any(|word| key.contains(word));
+    let is_name = |c: char| c.is_ascii_alphanumeric() || "/_".contains(c);
+    is_about && value.len() > 1 && value.starts_with('/') && value.chars().all(is_name)
 }

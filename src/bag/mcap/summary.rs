@@ -179,7 +179,7 @@ impl Summary {
             return Unindexed::missing("its messages lie outside chunks");
         }
         if all.chunks as usize != chunks.len() {
-            return Unindexed::wrong("its index does not name all of its chunks");
+            return Unindexed::wrong("its index does not list all of its chunks");
         }
         if all.messages != known {
             return if self.blind {
@@ -201,7 +201,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
     for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
         if start < free || end > plan.body.end {
-            return Unindexed::wrong("its index names chunks where none can be");
+            return Unindexed::wrong("its index lists chunks at impossible places");
         }
         let mut stream = ByteStream::of_file(source, free, start, NEAR);
         let mut hidden = false;
@@ -215,7 +215,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
             pass(stream, record.len())
         });
         if hidden {
-            return Unindexed::wrong("its summary does not name all of its messages");
+            return Unindexed::wrong("its summary does not list all of its messages");
         }
         free = end;
     }

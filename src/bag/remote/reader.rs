@@ -27,7 +27,7 @@ struct Watched {
 /// Opens the bag at `url`.
 pub(crate) fn open(url: &str, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     if url.ends_with('/') {
-        let what = format!("`{}` is the beginning of names, and no bag", told_url(url));
+        let what = format!("`{}` is a prefix, not a bag", told_url(url));
         return Err(Error::usage(
             what,
             "name one bag; `bagreel tables` counts all of a store",

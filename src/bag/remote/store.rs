@@ -67,18 +67,18 @@ impl StoreRefusal {
             ),
             StoreError::Unauthenticated { .. } => Self::new(
                 io::ErrorKind::PermissionDenied,
-                "the store asks who we are (401)",
+                "the store requires credentials (401)",
                 CREDENTIALS,
             ),
             StoreError::Precondition { .. } => Self::replaced(),
             StoreError::NotSupported { .. } => Self::new(
                 io::ErrorKind::Unsupported,
-                "the server does not give parts of a file",
-                "it must support range requests; download the bag",
+                "the server does not support range requests",
+                "download the bag",
             ),
             other if is_instance(other) => Self::new(
                 io::ErrorKind::PermissionDenied,
-                "there are no credentials for it",
+                "no credentials were found for it",
                 CREDENTIALS,
             ),
             other => Self::new(io::ErrorKind::Other, innermost(other), AGAIN),
@@ -119,7 +119,7 @@ fn is_instance(error: &StoreError) -> bool {
     places.iter().any(|place| said.contains(place))
 }
 
-/// The most characters that are told of what a server says.
+/// The most characters that are reported of what a server says.
 const MOST_SAID: usize = 200;
 
 /// What is at the bottom of an error. What stands above it may name a URL with a signature in it.
@@ -243,7 +243,7 @@ impl Object {
         let (asked, at) = (Arc::clone(&store), path.clone());
         let (meta, bytes) = wait(async move { begin(&*asked, &at, first).await })?;
         if i64::try_from(meta.size).is_err() {
-            let what = "the server says that it has more than 2^63 bytes";
+            let what = "the server reports more than 2^63 bytes";
             return Err(StoreRefusal::new(
                 io::ErrorKind::InvalidData,
                 what,
@@ -334,7 +334,7 @@ async fn taken(got: GetResult, len: u64) -> StoreResult<Vec<u8>> {
     if bytes.len() as u64 == len {
         return Ok(bytes);
     }
-    let what = "an answer was not as long as it was said to be";
+    let what = "a response had the wrong length";
     Err(StoreRefusal::new(io::ErrorKind::UnexpectedEof, what, AGAIN))
 }
 

@@ -15,9 +15,22 @@ pub(super) struct Ready {
     pub(super) left_behind: bool,
     /// The copy, removed when the bag has been read.
     copy: Option<Temporary>,
+    /// Whether a recorder writes to a log beside the database, which is read with it.
+    is_shared: bool,
 }
 
 impl Ready {
+    /// A database that is read where it is, with the log beside it if it has one.
+    pub(super) fn growing(path: &Path, has_log: bool) -> Self {
+        Self {
+            path: path.to_owned(),
+            damaged: false,
+            left_behind: false,
+            copy: None,
+            is_shared: has_log,
+        }
+    }
+
     /// Whether it is a copy of ours, which SQLite may bring up to date; otherwise it must not touch the file.
     pub(super) fn is_copy(&self) -> bool {
         self.copy.is_some()
@@ -34,12 +47,7 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
         .map(|end| with_suffix(path, end))
         .filter(|p| p.metadata().is_ok_and(|m| m.is_file() && m.len() > 0))
         .collect();
-    let mut ready = Ready {
-        path: path.to_owned(),
-        damaged: false,
-        left_behind: false,
-        copy: None,
-    };
+    let mut ready = Ready::growing(path, false);
     if beside.is_empty() {
         return Ok(ready);
     }
@@ -59,7 +67,7 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
     Ok(ready)
 }
 
-fn with_suffix(path: &Path, end: &str) -> PathBuf {
+pub(super) fn with_suffix(path: &Path, end: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(end);
     name.into()
@@ -80,6 +88,8 @@ pub(super) fn address(ready: &Ready) -> String {
     }
     address += if ready.is_copy() {
         "?mode=rw"
+    } else if ready.is_shared {
+        "?mode=ro"
     } else {
         "?mode=ro&immutable=1"
     };

@@ -162,6 +162,23 @@ impl<'a> RowReader<'a> {
         }
     }
 
+    /// Reports the rows from `next` on, up to one that cannot be read; returns the row after the last.
+    pub(super) fn read_from(&self, db: &Db, next: i64, sink: &mut dyn Sink) -> i64 {
+        let mut reading = RowReading {
+            rows: self,
+            left: (next, i64::MAX),
+            repeated: false,
+            lost: LostRows::default(),
+            gather: Gather::default(),
+            sink,
+        };
+        reading.gather.sizeless = !self.sized;
+        // What cannot be read is not there yet.
+        let _ = reading.some(db, &format!("{} ORDER BY rowid", self.sql), Direction::Up);
+        reading.gather.flush(reading.sink);
+        reading.left.0
+    }
+
     fn row(
         &self,
         row: &QueryRow<'_>,

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{GraphArgs, Inputs, length, moment, share, size};
+use super::values::{length, moment, share, size};
+use super::{GraphArgs, Inputs};
 use crate::base::time::Moment;
 use crate::gate;
 use crate::graph::diff::RATE_CHANGE;
@@ -13,32 +14,31 @@ use crate::graph::window::Length;
 
 #[derive(Debug, Args)]
 pub(crate) struct DiffArgs {
-    /// A bag, a folder, a mission in JSON, or an expectation (`.yaml`), which the other is held against.
+    /// First mission: a bag, a folder, a mission's JSON, or an expectations file (`.yaml`).
     #[arg(value_name = "A")]
     pub(crate) first: PathBuf,
-    /// The other.
+    /// Second mission, in the same forms.
     #[arg(value_name = "B")]
     pub(crate) second: PathBuf,
-    /// How to print what differs.
+    /// Output format.
     #[arg(long, value_name = "text|json|markdown", default_value = "text", value_parser = diff_format)]
     pub(crate) format: &'static gate::DiffFormat,
-    /// A file to write too: `.txt`, `.json`, `.md`, or one picture of both: `.html`, `.svg`, `.gif` and all that `render`
-    /// draws. May be given many times.
+    /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// The style of pictures: built in, or a style file. See `bagreel styles`.
+    /// Built-in style or style file of pictures; see `bagreel styles`.
     #[arg(long, default_value = "light", value_name = "NAME|FILE")]
     pub(crate) style: String,
-    /// The size of pictures in pixels.
+    /// Size of pictures in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<(u32, u32)>,
-    /// A rate that differs by more than this share is told, if chance does not make such a difference.
+    /// Report rates that differ by more than this fraction, if statistically significant.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(crate) rate_change: f64,
-    /// Begin both here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    /// Start time in both: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) start: Option<Moment>,
-    /// End both here, written like `--start`.
+    /// End time in both, in the same forms as `--start`.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) end: Option<Moment>,
     #[command(flatten)]
@@ -58,10 +58,10 @@ impl DiffArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct BaselineArgs {
-    /// Healthy runs: each bag is one, and what holds in all of them is written down.
+    /// Bags of healthy runs, one run each.
     #[arg(required = true, value_name = "BAG")]
     pub(crate) bags: Vec<PathBuf>,
-    /// The file to write; `-` is standard output.
+    /// Output file; `-` is standard output.
     #[arg(
         long,
         short,
@@ -70,10 +70,10 @@ pub(crate) struct BaselineArgs {
         conflicts_with = "update"
     )]
     pub(crate) output: OsString,
-    /// Bring this expectation up to date instead: only what no longer holds is written anew, comments stay.
+    /// Update this expectations file: rewrite only what no longer holds and keep comments.
     #[arg(long, value_name = "FILE")]
     pub(crate) update: Option<PathBuf>,
-    /// Bring only these nodes and topics up to date.
+    /// Update only these nodes and topics.
     #[arg(long, value_name = "NAME", requires = "update")]
     pub(crate) only: Vec<String>,
     #[command(flatten)]
@@ -84,26 +84,25 @@ pub(crate) struct BaselineArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// Bags, as `render` takes them: several are one mission.
+    /// Bags, as for `render`; several are read as one mission.
     #[arg(required_unless_present = "explain", value_name = "BAG")]
     pub(crate) bags: Vec<PathBuf>,
-    /// The expectation that the mission is held against.
+    /// Expectations file to check against.
     #[arg(long, value_name = "FILE", required_unless_present = "explain")]
     pub(crate) expect: Option<PathBuf>,
-    /// How to print what was found.
+    /// Output format.
     #[arg(long, value_name = "WORD", default_value = "text", value_parser = check_format)]
     pub(crate) format: &'static gate::Format,
-    /// A file to write too; its name tells the format, or a word before it: `check.xml`, `gitlab:quality.json`. May be
-    /// given many times.
+    /// Also write this file, in the format of its extension or prefix: `check.xml`, `gitlab:quality.json`. Repeatable.
     #[arg(long = "output", short, value_name = "[WORD:]FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// A link for the Markdown: `player=URL`.
+    /// Link to add to Markdown reports, such as `player=URL`.
     #[arg(long, value_name = "NAME=URL", value_parser = link)]
     pub(crate) link: Vec<(String, String)>,
-    /// What comes of rules that the bag has no evidence to decide.
+    /// How to treat rules that cannot be evaluated.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) undecidable: Undecidable,
-    /// Explain a kind of finding, such as `topic-rate-low`.
+    /// Explain a kind of finding, such as `topic-rate-low`, and exit.
     #[arg(long, value_name = "ID", conflicts_with_all = [
         "bags", "expect", "format", "outputs", "link", "undecidable", "period", "start", "end", "roles", "topology", "source",
         "infer",
@@ -119,10 +118,10 @@ pub(crate) struct CheckArgs {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lower")]
 pub(crate) enum Undecidable {
-    /// Nothing.
+    /// They do not fail the check.
     #[default]
     Allow,
-    /// They fail.
+    /// They fail the check.
     Error,
 }
 
@@ -130,13 +129,13 @@ pub(crate) enum Undecidable {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Time")]
 pub(crate) struct GateTime {
-    /// The length of the windows in which rates are judged: `60`, `30s`, `500ms`. [default: the expectation's `period`]
+    /// Length of the windows in which rates are checked: `60`, `30s`, `500ms`. [default: the file's `period`]
     #[arg(long, short, value_parser = length)]
     pub(crate) period: Option<Length>,
-    /// Begin here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) start: Option<Moment>,
-    /// End here, written like `--start`.
+    /// End time, in the same forms as `--start`.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) end: Option<Moment>,
 }
@@ -151,12 +150,12 @@ impl CheckArgs {
     }
 }
 
-pub(crate) const DIFF_HELP: &str = "Exit codes: 0 the same, 1 different, 2 could not tell (usage, unreadable), 3 the same but data was skipped (damaged \
-    bag).";
+pub(crate) const DIFF_HELP: &str = "Exit codes: 0 equal, 1 different, 2 not compared (usage error, unreadable bag), 3 equal but data was skipped \
+    (damaged bag).";
 pub(crate) const BASELINE_HELP: &str =
-    "Exit codes: 0 written, 1 failed, 2 usage, 3 written but data was skipped (damaged bag).";
-pub(crate) const CHECK_HELP: &str = "Exit codes: 0 kept, 1 broken, 2 could not tell (usage, unreadable, or nothing could be decided), 3 kept but data was \
-    skipped (damaged bag).";
+    "Exit codes: 0 written, 1 failed, 2 usage error, 3 written but data was skipped (damaged bag).";
+pub(crate) const CHECK_HELP: &str = "Exit codes: 0 passed, 1 failed, 2 not checked (usage error, unreadable bag, no rule could be evaluated), 3 passed but \
+    data was skipped (damaged bag).";
 
 fn check_format(word: &str) -> Result<&'static gate::Format, String> {
     gate::Format::from_word(word).ok_or_else(|| {

@@ -18,7 +18,7 @@ pub(crate) const MM_PER_PT: f64 = 25.4 / 72.0;
 pub(crate) const HAIRLINE: f64 = 0.18;
 
 /// The colours of a figure, which is on white paper. Every mark has a shape of its own too, so that grey print loses
-/// nothing; the three colours of change are those of the pictures, told apart by colour-blind readers.
+/// nothing; the three colours of change are those of the pictures, distinguished by colour-blind readers.
 pub(crate) mod ink {
     use crate::draw::style::Color;
 

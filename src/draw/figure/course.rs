@@ -1,100 +1,212 @@
-//! The course of a mission beside its picture: life lines without names for the strip below frames, and with names for
-//! the timeline of a page.
+//! The course of a mission beside its picture: phases and groups for the strip below frames, and the life lines of all
+//! for the timeline of a page.
 
-use super::groups;
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::lives::LivesFigure;
-use super::marks::{Handover, RowMark};
+use super::marks::{Handover, RowMark, Sign};
 use super::rows::FigureRow;
 use super::source::FigureSource;
-use super::tracks::{SendingBar, TrackLife};
-use crate::base::time::Span;
+use super::tracks::{SendingBar, Track, TrackLife};
+use crate::base::name::last_part;
+use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
+use crate::mission::EntryId;
+use crate::mission::ledger::{Entry, Kind, Phase};
 
-/// The life lines of a mission, in rows from top to bottom, and its phases.
+/// The course of a mission below its picture: the phases, and a row per group of nodes that come and go together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Course {
     /// The phases, none if there is only one.
-    pub(crate) phases: Vec<Span>,
+    pub(crate) phases: Vec<CoursePhase>,
     pub(crate) rows: Vec<CourseRow>,
-    /// Ticks, crosses and small circles, on rows.
-    pub(crate) marks: Vec<RowMark>,
-    /// Topics that others send from a moment on, from row to row.
-    pub(crate) handovers: Vec<Handover>,
 }
 
-/// A row of a course: a node, a topic, some of them that come and go together, or all that live throughout.
+/// A phase with its name, as long as there is room for it, else one of the shorter ones.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CoursePhase {
+    pub(crate) span: Span,
+    pub(crate) names: Vec<String>,
+}
+
+/// A row of a course.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CourseRow {
-    pub(crate) lives: Vec<TrackLife>,
-    pub(crate) bars: Vec<SendingBar>,
+    /// The names of its members; of none for events that belong to no row.
+    pub(crate) names: Vec<String>,
+    /// The times in which a member lives.
+    pub(crate) lives: Vec<Span>,
+    pub(crate) marks: Vec<CourseMark>,
 }
 
+/// Events of a row that are drawn as one sign.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CourseMark {
+    pub(crate) at: Stamp,
+    pub(crate) sign: Sign,
+    pub(crate) entries: Vec<EntryId>,
+}
+
+/// The part of the mission, one in this many, within which starts, or ends, are drawn as one.
+const BURST: i64 = 33;
+
 impl Course {
-    /// The course in at most `most` rows: of nodes, else of groups, of which those that change least are left out; of
-    /// topics where publishers are unknown. From the lives of [`of_all`].
+    /// The course in at most `most` rows: of nodes, or of topics where publishers are unknown, as far as something
+    /// happens to them. From the lives of [`of_all`]. Events without a row stand together on the last one.
     pub(crate) fn new(lives: &LivesFigure<'_>, most: usize) -> Self {
         let source = lives.source;
-        let is_grouped = rows(lives).len() > most && source.knows_publishers();
-        let grouped = is_grouped.then(|| {
-            let tracks = groups::tracks(source, &lives.tracks, usize::MAX);
-            LivesFigure::of(source, tracks)
-        });
-        let lives = grouped.as_ref().unwrap_or(lives);
-        let mut chosen = rows(lives);
-        if chosen.len() > most {
-            let signs = &lives.marks.signs;
-            let changes = |tracks: &[usize]| {
-                let own = signs.iter().filter(|s| tracks.contains(&s.track));
-                own.count()
-            };
-            let mut order: Vec<usize> = (0..chosen.len()).collect();
-            order.sort_by_cached_key(|at| (std::cmp::Reverse(changes(&chosen[*at].0)), *at));
-            let kept = &order[..most];
-            let mut at = 0..;
-            chosen.retain(|_| at.next().is_some_and(|at| kept.contains(&at)));
+        let mut marks = lives.marks.clone().plain();
+        let begun = source.span().start.plus(source.span().nanos() / BURST);
+        // What starts with the recording is there from the beginning, to the eye.
+        let is_first = |s: &RowMark| s.sign == Sign::Start && s.at < begun;
+        marks.signs.retain(|s| !is_first(s));
+        let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<usize>> = BTreeMap::new();
+        let bursts = [Sign::Start, Sign::End].map(|sign| bursts(&marks.signs, sign, source.span()));
+        for track in 0..lives.tracks.len() {
+            let own: Vec<&RowMark> = marks.signs.iter().filter(|s| s.track == track).collect();
+            let turns = own.iter().filter_map(|mark| match mark.sign {
+                Sign::Start => Some((true, burst(&bursts[0], mark.at))),
+                Sign::End => Some((false, burst(&bursts[1], mark.at))),
+                Sign::Dot => None,
+            });
+            if !own.is_empty() {
+                groups.entry(turns.collect()).or_default().push(track);
+            }
         }
-        let place = |track| chosen.iter().position(|(all, _)| all.contains(&track));
+        let mut rows: Vec<CourseRow> = groups
+            .values()
+            .map(|tracks| row(lives, tracks, &marks.signs))
+            .collect();
+        let start = |row: &CourseRow| row.lives.first().map_or(Stamp::MAX, |l| l.start);
+        rows.sort_by(|a, b| (start(a), &a.names).cmp(&(start(b), &b.names)));
+        let mut others = CourseRow {
+            marks: unplaced(source, &marks.signs),
+            ..CourseRow::default()
+        };
+        while rows.len() + usize::from(!others.marks.is_empty()) > most.max(1) {
+            let few = rows.iter().enumerate().min_by_key(|(at, row)| {
+                let members = row.names.len() * row.marks.len();
+                (members, std::cmp::Reverse(*at))
+            });
+            let Some((at, _)) = few else { break };
+            others.marks.extend(rows.remove(at).marks);
+        }
+        if !others.marks.is_empty() {
+            others.marks.sort_by_key(|m| m.at);
+            rows.push(others);
+        }
         Self {
-            phases: source.phases.iter().map(|p| p.span).collect(),
-            marks: lives
-                .marks
-                .signs
-                .iter()
-                .filter_map(|m| m.on(place))
-                .collect(),
-            handovers: lives
-                .marks
-                .handovers
-                .iter()
-                .filter_map(|h| h.on(place))
-                .collect(),
-            rows: chosen.into_iter().map(|(_, row)| row).collect(),
+            phases: phases(source),
+            rows,
         }
     }
+}
+
+/// The beginnings of the bursts of signs of a kind: those that follow within a short time belong to the first of them.
+fn bursts(signs: &[RowMark], sign: Sign, whole: Span) -> Vec<Stamp> {
+    let mut times: Vec<Stamp> = signs
+        .iter()
+        .filter(|s| s.sign == sign)
+        .map(|s| s.at)
+        .collect();
+    times.sort_unstable();
+    let near = whole.nanos() / BURST;
+    times.dedup_by(|later, first| later.since(*first) <= near);
+    times
+}
+
+fn burst(bursts: &[Stamp], at: Stamp) -> Stamp {
+    let next = bursts.partition_point(|first| *first <= at);
+    next.checked_sub(1).map_or(at, |found| bursts[found])
+}
+
+/// The row of some tracks, with one sign for all that happen at once.
+fn row(lives: &LivesFigure<'_>, tracks: &[usize], signs: &[RowMark]) -> CourseRow {
+    let members = || tracks.iter().map(|at| &lives.tracks[*at]);
+    let is_shared = |name: &str| {
+        let same = lives.tracks.iter().filter(|t| last_part(&t.name) == name);
+        same.count() > 1
+    };
+    let name = |track: &Track| match last_part(&track.name) {
+        last if is_shared(last) => track.name.to_string(),
+        last => last.to_owned(),
+    };
+    let spans = members().flat_map(|t| &t.lives).map(|l| l.span).collect();
+    let near = lives.source.span().nanos() / BURST;
+    let mut marks: Vec<CourseMark> = Vec::new();
+    for mark in signs.iter().filter(|s| tracks.contains(&s.track)) {
+        let is_same = |other: &&mut CourseMark| {
+            let apart = mark.at.since(other.at);
+            other.sign == mark.sign && mark.sign != Sign::Dot && apart.abs() <= near
+        };
+        match marks.iter_mut().rev().find(is_same) {
+            Some(other) => {
+                let is_later = (other.sign == Sign::End) == (mark.at > other.at);
+                other.at = if is_later { mark.at } else { other.at };
+                other.entries.push(mark.entry);
+            }
+            None => marks.push(CourseMark {
+                at: mark.at,
+                sign: mark.sign,
+                entries: vec![mark.entry],
+            }),
+        }
+    }
+    CourseRow {
+        names: members().map(name).collect(),
+        lives: Span::joined(spans, 0),
+        marks,
+    }
+}
+
+/// The events of the log without a row.
+fn unplaced(source: &FigureSource<'_>, signs: &[RowMark]) -> Vec<CourseMark> {
+    let placed: BTreeSet<EntryId> = signs.iter().map(|s| s.entry).collect();
+    let all = source.mission.ledger.headlines(source.span());
+    let others = all.filter(|(id, _)| !placed.contains(id));
+    let mark = |(id, entry): (EntryId, &Entry)| CourseMark {
+        at: entry.time,
+        sign: match entry.kind {
+            Kind::Started | Kind::Appeared => Sign::Start,
+            Kind::Stopped | Kind::Vanished => Sign::End,
+            _ => Sign::Dot,
+        },
+        entries: vec![id],
+    };
+    others.map(mark).collect()
+}
+
+/// The phases with their names: the user's, else by what starts or ends, else how many.
+fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
+    let phase = |(k, phase): (usize, &Phase)| {
+        let name = phase.name.to_string();
+        let mut names = match name.split_once(": ").filter(|_| !source.is_named) {
+            Some((count, those)) => {
+                let sign: String = count.chars().take(1).collect();
+                vec![format!("{sign} {those}")]
+            }
+            // The same nodes as before: its number says as much.
+            None if !source.is_named && name.starts_with("same ") => Vec::new(),
+            None => vec![name],
+        };
+        let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
+        let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
+        let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
+        if !source.is_named && !counts.is_empty() {
+            names.push(counts.join(" "));
+        }
+        names.push((k + 1).to_string());
+        CoursePhase {
+            span: phase.span,
+            names,
+        }
+    };
+    source.phases.iter().enumerate().map(phase).collect()
 }
 
 /// The lives behind both the course and the life lines: of nodes; of topics where publishers are unknown.
 pub(crate) fn of_all<'a>(source: &'a FigureSource<'a>) -> LivesFigure<'a> {
     LivesFigure::new(source, !source.knows_publishers())
-}
-
-/// The rows of some lives, with the tracks they stand for.
-fn rows(lives: &LivesFigure<'_>) -> Vec<(Vec<usize>, CourseRow)> {
-    let row = |row: &FigureRow| match row {
-        FigureRow::Space(_) => None,
-        FigureRow::Track(at, ..) => {
-            let track = lives.tracks.get(*at)?;
-            let (lives, bars) = (track.lives.clone(), track.bars.clone());
-            Some((vec![*at], CourseRow { lives, bars }))
-        }
-        FigureRow::Folded(all, _) => {
-            let span = lives.source.span();
-            let bars = vec![SendingBar { span, share: 1.0 }];
-            let lives = Vec::new();
-            Some((all.clone(), CourseRow { lives, bars }))
-        }
-    };
-    lives.rows.iter().filter_map(row).collect()
 }
 
 /// The lives of all, a row each with its name, in the order of the figure: the timeline of a page.

@@ -61,6 +61,14 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     if tracks.is_empty() {
         return Err(nothing(sheet.source));
     }
+    let each: Vec<Option<usize>> = (0..tracks.len()).map(Some).collect();
+    let talks = Talks::new(sheet.source, &tracks);
+    if talks.between(&each, sheet.source.span(), false).is_empty() {
+        return Err(Error::usage(
+            "no topic has both a known publisher and a known subscriber, so there is nothing to map",
+            "`--figure lives` shows what there is; `--topology FILE` adds connections",
+        ));
+    }
     let asked = sheet.options.rows;
     let few = tracks.len() <= MOST_NODES;
     let nodes = (asked != Some(RowKind::Groups) && few)
@@ -325,11 +333,13 @@ fn finished(
     let title = |name: &String| Cluster {
         parent: None,
         title: Size::new(canvas.width(name, Type::Head), canvas.cap(Type::Head) + 0.9),
+        footer: Size::default(),
     };
     let plan = Plan {
         vertices,
         links: talks.iter().map(link).collect(),
         clusters: spaces.iter().map(title).collect(),
+        ..Plan::default()
     };
     let labels: Vec<Vec<Vec<String>>> =
         talks.iter().map(|t| t.labels(sheet.source, most)).collect();

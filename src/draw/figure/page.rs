@@ -20,7 +20,7 @@ use crate::draw::text::Fonts;
 /// The shortest time axis in millimetres on which anything can be seen.
 const SHORTEST_AXIS: f64 = 15.0;
 
-/// The most names of one kind that are told in a note; the others are counted.
+/// The most names of one kind that are reported in a note; the others are counted.
 pub(crate) const TOLD: usize = 60;
 
 /// The number of boxes that fit on a page, about.
@@ -41,6 +41,7 @@ impl<'a> FigureSheet<'a> {
             FigureKind::Lives => self.lives(),
             FigureKind::Map => super::map::draw(self),
             FigureKind::Steps => super::steps::draw(self),
+            FigureKind::Changes => super::steps::changes::draw(self),
         }
     }
 
@@ -183,8 +184,8 @@ fn top_space(name: &str) -> Option<&str> {
 pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
     if source.shown_topics().next().is_some() && source.knows_no_node() {
         return Error::usage(
-            "no node of this mission is known, so there is nobody to draw",
-            "`--figure lives` draws its topics; `bagreel info` says what would tell more",
+            "no nodes were found",
+            "`--kind lives` draws its topics; `bagreel info` lists what would reveal more",
         );
     }
     Error::usage(

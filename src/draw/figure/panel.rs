@@ -78,6 +78,25 @@ pub(crate) struct Panel {
     pub(crate) undrawn: usize,
 }
 
+impl Panel {
+    /// The nodes that began and ended, without namespaces and numbers, sorted: equal for steps that repeat each other.
+    pub(crate) fn changes(&self) -> Vec<(bool, String)> {
+        let changed = self.looks.iter().filter(|look| {
+            let fates = [Fate::Began, Fate::Ended];
+            fates.contains(&look.fate)
+        });
+        let names = changed.flat_map(|look| {
+            let is_digit = |c: char| c.is_ascii_digit() || c == '_';
+            let plain = move |line: &String| line.trim_end_matches(is_digit).to_owned();
+            let names = look.lines.iter().map(plain);
+            names.map(|name| (look.fate == Fate::Began, name))
+        });
+        let mut names: Vec<_> = names.collect();
+        names.sort();
+        names
+    }
+}
+
 /// Notes as running text.
 pub(crate) fn items(notes: &[(Color, String)]) -> Vec<Unbroken> {
     let item = |(color, text): &(Color, String)| sentence(*color, text.as_str());
@@ -111,10 +130,10 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
         .clone()
         .moved(aside, rect.y + INSIDE * 0.8 + canvas.sizes.pitch() + 0.6);
     for (at, (talk, fate)) in panel.talks.iter().enumerate() {
-        let color = if *fate == Fate::Ended {
-            ink::REMOVED
-        } else {
-            ink::ADDED
+        let color = match fate {
+            Fate::Ended => ink::REMOVED,
+            Fate::Neighbour => ink::LINE,
+            Fate::Began | Fate::ChangedHands => ink::ADDED,
         };
         let dash: &[f64] = if *fate == Fate::Ended {
             &[0.9, 0.6]

@@ -223,6 +223,17 @@ impl PlacedPanel {
         }
     }
 
+    /// Only these boxes and these lines with their labels, at their places.
+    pub(crate) fn only(&self, boxes: &[usize], links: &[usize]) -> Self {
+        Self {
+            boxes: boxes.iter().map(|at| self.boxes[*at]).collect(),
+            routes: links.iter().map(|at| self.routes[*at].clone()).collect(),
+            curves: links.iter().map(|at| self.curves[*at].clone()).collect(),
+            labels: links.iter().map(|at| self.labels[*at]).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Adds the places of a part.
     fn take(&mut self, part: &MapPart, placed: Self) {
         for (at, rect) in part.vertices.iter().zip(placed.boxes) {

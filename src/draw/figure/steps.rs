@@ -1,7 +1,9 @@
 //! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that changed hands, and the
 //! nodes linked to them.
 
+pub(crate) mod changes;
 mod events;
+mod repeated;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -32,9 +34,6 @@ const SHOWN: usize = 6;
 const ONE_BY_ONE: usize = 8;
 /// The most names in a box.
 const NAMED: usize = 4;
-/// The largest number of ways to put panels into columns that are followed: enough for all those of nine panels in
-/// three columns.
-const MOST_WAYS: usize = 729;
 /// The room between two panels in millimetres.
 const BETWEEN: f64 = 2.0;
 
@@ -54,34 +53,12 @@ struct StepSource<'s> {
 
 /// The figure and its remarks.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
-    let tracks = of_nodes(sheet.source);
-    if tracks.is_empty() {
-        return Err(nothing(sheet.source));
-    }
-    if sheet.source.phases.is_empty() {
-        return Err(Error::usage(
-            "this mission has one phase, so there is no step to show",
-            "`--figure lives` shows what there is; `--phases FILE` cuts by your own times",
-        ));
-    }
-    let columns = match sheet.options.width_mm {
-        w if w >= 150.0 => 3,
-        w if w >= 110.0 => 2,
-        _ => 1,
-    };
-    let mut studio = StepSource {
-        columns,
-        depth: depths(&tracks).next().unwrap_or(1),
-        talks: Talks::new(sheet.source, &tracks),
-        found: configurations(sheet.source.mission, sheet.source.phases),
-        marks: Marks::new(sheet.source, &tracks),
-        tracks,
-        sheet,
-    };
+    let mut studio = StepSource::new(sheet)?;
+    let columns = studio.columns;
     let mut chosen = studio.chosen()?;
     loop {
         let panels: Option<Vec<Panel>> = chosen.iter().map(|k| studio.panel(*k)).collect();
-        let Some(panels) = panels else {
+        let Some(mut panels) = panels else {
             // Fewer panels side by side are wider; shorter namespaces make fewer groups.
             match (studio.columns, studio.depth) {
                 (1, 1) => return Err(studio.too_wide()),
@@ -90,8 +67,8 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
             }
             continue;
         };
-        let left = sheet.source.phases.len() - 1 - chosen.len();
-        let scene = studio.page(&panels, left);
+        let (left, repeated) = (studio.left_out(&chosen), studio.fold_repeated(&mut panels));
+        let scene = studio.page(&panels, &repeated, left);
         if scene.size.h <= MOST_HEIGHT * PX_PER_MM {
             return Ok((scene, Vec::new()));
         }
@@ -105,7 +82,33 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     }
 }
 
-impl StepSource<'_> {
+impl<'s> StepSource<'s> {
+    fn new(sheet: &'s FigureSheet<'s>) -> Result<Self> {
+        let tracks = of_nodes(sheet.source);
+        if tracks.is_empty() {
+            return Err(nothing(sheet.source));
+        }
+        if sheet.source.phases.is_empty() {
+            return Err(Error::usage(
+                "this mission has a single phase and therefore no steps",
+                "draw `lives` instead, or set your own phases with `--phases FILE`",
+            ));
+        }
+        Ok(Self {
+            columns: match sheet.options.width_mm {
+                w if w >= 150.0 => 3,
+                w if w >= 110.0 => 2,
+                _ => 1,
+            },
+            depth: depths(&tracks).next().unwrap_or(1),
+            talks: Talks::new(sheet.source, &tracks),
+            found: configurations(sheet.source.mission, sheet.source.phases),
+            marks: Marks::new(sheet.source, &tracks),
+            tracks,
+            sheet,
+        })
+    }
+
     /// The boundaries to show, by the place of the phase that begins.
     fn chosen(&self) -> Result<Vec<usize>> {
         let many = self.sheet.source.phases.len();
@@ -116,10 +119,20 @@ impl StepSource<'_> {
                 format!("phases are counted from 1 to {many}; steps lead into 2 to {many}"),
             ));
         }
-        if !asked.is_empty() {
-            return Ok(asked.iter().map(|n| n - 1).collect());
+        let mut all: Vec<usize> = match &asked[..] {
+            [] => (1..many).collect(),
+            asked => asked.iter().map(|n| n - 1).collect(),
+        };
+        all.retain(|k| self.weight(*k) > 0);
+        if all.is_empty() {
+            return Err(Error::usage(
+                "no node starts, stops or hands over a topic in these steps, so there is nothing to show",
+                "`--figure lives` shows what there is",
+            ));
         }
-        let mut all: Vec<usize> = (1..many).collect();
+        if !asked.is_empty() {
+            return Ok(all);
+        }
         all.sort_by_key(|k| (std::cmp::Reverse(self.weight(*k)), *k));
         all.truncate(SHOWN);
         all.sort_unstable();
@@ -427,6 +440,7 @@ impl StepSource<'_> {
             vertices: looks.iter().map(vertex).collect(),
             links: talks.iter().map(link).collect(),
             clusters: Vec::new(),
+            ..Plan::default()
         };
         let rooms: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
         // Badges stand out of their boxes.
@@ -434,25 +448,29 @@ impl StepSource<'_> {
         place(&plan, &rooms, width, engine("layered").ok()?)
     }
 
-    /// All panels in columns, in order of time, and a note of what is left out.
-    fn page(&self, panels: &[Panel], left: usize) -> Scene {
+    /// All panels in rows, in order of time, and notes of what repeats and what is left out.
+    fn page(&self, panels: &[Panel], repeated: &[String], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();
         let (columns, wide) = (self.columns, self.panel_width());
-        let heights: Vec<f64> = panels.iter().map(|p| p.height).collect();
-        let mut ends = vec![0.1_f64; columns];
-        for (at, (panel, column)) in panels.iter().zip(in_columns(&heights, columns)).enumerate() {
-            canvas.begin_step(at + 1, &panel.entries);
-            let x = (wide + BETWEEN) * column as f64;
-            let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
-            paint(&mut canvas, panel, rect);
-            ends[column] += panel.height + 1.2;
+        let (mut y, mut number) = (0.1, 0);
+        for row in panels.chunks(columns) {
+            let high = row.iter().map(|p| p.height).fold(0.0, f64::max);
+            for (column, panel) in row.iter().enumerate() {
+                number += 1;
+                canvas.begin_step(number, &panel.entries);
+                let x = (wide + BETWEEN) * column as f64;
+                paint(&mut canvas, panel, Rect::new(x + 0.1, y, wide - 0.2, high));
+            }
+            y += high + 1.2;
         }
-        let y = ends.into_iter().fold(0.0, f64::max);
         canvas.begin("notes");
-        let mut items: Vec<Unbroken> = Vec::new();
+        let again = repeated
+            .iter()
+            .map(|text| sentence(ink::TEXT, text.as_str()));
+        let mut items: Vec<Unbroken> = again.collect();
         if !sheet.options.is_bare {
-            let text = "+ solid: began. − dashed: ended. Double: its topic changed hands. Thin: who is linked to them.";
+            let text = "+ solid: began. − dashed: ended. Double: a topic was taken over. Thin: who is linked to them.";
             items.push(sentence(ink::QUIET, text));
         }
         let lost: usize = panels
@@ -479,28 +497,4 @@ impl StepSource<'_> {
             sheet.title("Steps"),
         )
     }
-}
-
-/// The column of each panel: the first ones side by side, the others such that the highest column is as low as can be.
-fn in_columns(heights: &[f64], columns: usize) -> Vec<usize> {
-    let first: Vec<usize> = (0..heights.len().min(columns)).collect();
-    let highest = |way: &[usize]| {
-        let mut ends = vec![0.0_f64; columns];
-        for (height, column) in heights.iter().zip(way) {
-            ends[*column] += height;
-        }
-        ends.into_iter().fold(0.0, f64::max)
-    };
-    let mut ways = vec![first];
-    for _ in columns..heights.len() {
-        let more = |way: &Vec<usize>| {
-            let next = |column| [&way[..], &[column]].concat();
-            (0..columns).map(next).collect::<Vec<_>>()
-        };
-        ways = ways.iter().flat_map(more).collect();
-        // Stable, so that of equals the one that reads best stays first.
-        ways.sort_by(|a, b| highest(a).total_cmp(&highest(b)));
-        ways.truncate(MOST_WAYS);
-    }
-    ways.into_iter().next().unwrap_or_default()
 }

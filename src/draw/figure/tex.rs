@@ -38,10 +38,13 @@ pub(crate) fn caption(
 
 fn what(kind: FigureKind) -> &'static str {
     match kind {
-        FigureKind::Lives => "What was alive when, how busily it sent, and what changed.",
+        FigureKind::Lives => "What was alive when, how busy it was, and what changed.",
         FigureKind::Map => "Who talks to whom, and in which phases.",
+        FigureKind::Changes => {
+            "Phase by phase, at the same places: who is there, and what changed."
+        }
         FigureKind::Steps => {
-            "The reconfigurations one after the other: what began, what ended, what changed hands."
+            "The reconfigurations one by one: what started, what stopped, what was taken over."
         }
     }
 }
@@ -50,14 +53,14 @@ fn legend(kind: FigureKind) -> &'static str {
     match kind {
         FigureKind::Lives => {
             "Bars: it sends, as high as its rate against the row's highest; thin lines: silent, dashed: alive by inference; \
-             tick: starts; cross: ends; arrows from a dot: a topic changes hands; circled letters: returns and steps of rates."
+             tick: starts; cross: ends; arrows from a dot: another node takes over a topic; circled letters: returns and steps of rates."
         }
         FigureKind::Map => {
             "Numbers: the phases that a node lives in, none for all; arrows: topics, thicker for more messages per second, dashed \
              if inferred; dashed frames: nodes without a known partner."
         }
-        FigureKind::Steps => {
-            "Solid with plus: began; dashed with minus: ended; double frame: a topic changed hands; thin: their neighbours."
+        FigureKind::Steps | FigureKind::Changes => {
+            "Solid with plus: began; dashed with minus: ended; double frame: another node took over a topic; thin: their neighbours."
         }
     }
 }

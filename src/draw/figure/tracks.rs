@@ -255,7 +255,7 @@ fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
     joined
 }
 
-/// Whether two rates cannot be told apart as heights of bars.
+/// Whether two rates cannot be distinguished as heights of bars.
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 0.01 * a.max(b)
 }

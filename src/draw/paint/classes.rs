@@ -1,12 +1,9 @@
 //! The graph of a whole mission as one compact drawing without colours: classes say how elements look in a window, and
-//! their rules follow from the style. The player's page and the animated SVG are painted with it.
+//! their rules follow from the style. The player's page is painted with it.
 
 mod css;
 
-pub(crate) use css::{base, rules, states, variables};
-
-use std::collections::BTreeSet;
-use std::fmt::Write as _;
+pub(crate) use css::{rules, variables};
 
 use crate::base::geometry::Point;
 use crate::draw::paint::xml::{Xml, units};
@@ -14,24 +11,13 @@ use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
 use crate::view::runs::word;
-use crate::view::{Counts, Frame, Mark, View};
-
-/// The amount of detail that is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct ClassDetail {
-    /// Whether coordinates are to a tenth of a pixel, not to whole pixels.
-    pub is_fine: bool,
-    /// Whether names are written, as attributes and for hovering.
-    pub has_names: bool,
-}
+use crate::view::{Mark, View};
 
 /// A graph in SVG.
 #[derive(Debug)]
 pub(crate) struct Classes<'a> {
     view: &'a View,
     union: &'a Union,
-    style: &'a Style,
-    detail: ClassDetail,
 }
 
 /// The parts of an element's group that depend on the window: its class, its live text and more.
@@ -40,8 +26,6 @@ pub(crate) trait ElementLook {
     fn class(&self) -> String;
     /// The words of its live text.
     fn text(&self) -> String;
-    /// Writes more elements inside it, such as animations.
-    fn more(&self, _xml: &mut Xml) {}
     /// Writes its live text at a place, as one element or more; `tells_changes` where it stands only in windows in
     /// which its rate changed.
     fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
@@ -56,36 +40,15 @@ pub(crate) trait ElementLook {
 
 impl<'a> Classes<'a> {
     /// The graph of a view whose union is `union`.
-    pub(crate) fn new(
-        view: &'a View,
-        union: &'a Union,
-        style: &'a Style,
-        detail: ClassDetail,
-    ) -> Self {
-        Self {
-            view,
-            union,
-            style,
-            detail,
-        }
-    }
-
-    /// The definitions of the badges that occur, `<symbol>`s without colours of their own.
-    pub(crate) fn signs(&self, xml: &mut Xml) {
-        let parts = self.union.items.iter().chain(&self.union.arrows);
-        let marks: BTreeSet<Mark> = parts.flat_map(|p| p.marks.iter().copied()).collect();
-        xml.open("defs");
-        for mark in marks {
-            badge_shapes(xml, self.style, mark);
-        }
-        xml.close();
+    pub(crate) fn new(view: &'a View, union: &'a Union) -> Self {
+        Self { view, union }
     }
 
     /// Writes the boxes around namespaces.
     pub(crate) fn spaces(&self, xml: &mut Xml) {
         for space in &self.union.spaces {
             xml.open("g").attribute("class", "namespace");
-            self.pieces(xml, space, None);
+            Self::pieces(xml, space, None);
             xml.close().raw("\n");
         }
     }
@@ -96,13 +59,13 @@ impl<'a> Classes<'a> {
         let name = |id: u32| &*self.view.items[id as usize].name;
         let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
         let what = format!("edge {}", arrow.kind.word());
-        self.element(xml, part, &what, &ends, look, 0.8);
+        Self::element(xml, part, &what, &ends, look, 0.8);
     }
 
     /// Writes the item at this place of the view.
     pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
-        self.element(
+        Self::element(
             xml,
             part,
             item.kind.word(),
@@ -113,7 +76,6 @@ impl<'a> Classes<'a> {
     }
 
     fn element(
-        &self,
         xml: &mut Xml,
         part: &UnionElement,
         what: &str,
@@ -121,20 +83,12 @@ impl<'a> Classes<'a> {
         look: &dyn ElementLook,
         scale: f64,
     ) {
-        let what = if self.detail.has_names {
-            what
-        } else {
-            what.split(' ').next().unwrap_or(what)
-        };
         let class = format!("{what} {}", look.class());
         xml.open("g").attribute("class", class.trim_end());
-        if self.detail.has_names {
-            for (key, value) in data {
-                xml.attribute(format_args!("data-{key}"), value);
-            }
+        for (key, value) in data {
+            xml.attribute(format_args!("data-{key}"), value);
         }
-        look.more(xml);
-        self.pieces(xml, &part.group, Some((part, look)));
+        Self::pieces(xml, &part.group, Some((part, look)));
         for mark in &part.marks {
             let word = word(*mark);
             let Point { x, y } = part.badge;
@@ -154,26 +108,21 @@ impl<'a> Classes<'a> {
     }
 
     /// Writes shapes and texts; of an element with its latch before its first text, and its live text as its last.
-    fn pieces(
-        &self,
-        xml: &mut Xml,
-        group: &Group,
-        element: Option<(&UnionElement, &dyn ElementLook)>,
-    ) {
+    fn pieces(xml: &mut Xml, group: &Group, element: Option<(&UnionElement, &dyn ElementLook)>) {
         let is_text = |p: &&Piece| matches!(p, Piece::Text(_));
         let texts = group.pieces.iter().filter(is_text).count();
         let mut seen = 0;
         for piece in &group.pieces {
             let text = match piece {
                 Piece::Shape(shape) => {
-                    self.form(xml, &shape.form, None);
+                    Self::form(xml, &shape.form, None);
                     continue;
                 }
                 Piece::Text(text) => text,
             };
             seen += 1;
             if let Some((Some(latch), 1)) = element.map(|(part, _)| (&part.latch, seen)) {
-                self.form(xml, latch, Some("l"));
+                Self::form(xml, latch, Some("l"));
             }
             let place = (whole(text.at.x), whole(text.at.y));
             if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
@@ -181,7 +130,7 @@ impl<'a> Classes<'a> {
                 continue;
             }
             let name = element.and_then(|(part, _)| part.name.as_ref());
-            let name = name.filter(|_| self.detail.has_names && seen == 1);
+            let name = name.filter(|_| seen == 1);
             xml.open("text");
             if seen > 1 {
                 xml.attribute("class", "m");
@@ -193,14 +142,7 @@ impl<'a> Classes<'a> {
         }
     }
 
-    fn form(&self, xml: &mut Xml, form: &Form, class: Option<&str>) {
-        let n = |v: f64| {
-            if self.detail.is_fine {
-                tenth(v)
-            } else {
-                whole(v).to_string()
-            }
-        };
+    fn form(xml: &mut Xml, form: &Form, class: Option<&str>) {
         match form {
             Form::Rect(r, radius) => {
                 // Edges are rounded, not lengths, so that what touches goes on touching.
@@ -208,10 +150,10 @@ impl<'a> Classes<'a> {
                 if let Some(class) = class {
                     xml.attribute("class", class);
                 }
-                xml.attribute("x", n(r.x))
-                    .attribute("y", n(r.y))
-                    .attribute("width", n(r.right() - r.x))
-                    .attribute("height", n(r.bottom() - r.y));
+                xml.attribute("x", tenth(r.x))
+                    .attribute("y", tenth(r.y))
+                    .attribute("width", tenth(r.right() - r.x))
+                    .attribute("height", tenth(r.bottom() - r.y));
                 if *radius > 0.0 {
                     xml.attribute("rx", tenth(*radius));
                 }
@@ -219,19 +161,13 @@ impl<'a> Classes<'a> {
             Form::Ellipse(r) => {
                 let c = r.centre();
                 xml.open("ellipse")
-                    .attribute("cx", n(c.x))
-                    .attribute("cy", n(c.y))
-                    .attribute("rx", n(r.w / 2.0))
-                    .attribute("ry", n(r.h / 2.0));
+                    .attribute("cx", tenth(c.x))
+                    .attribute("cy", tenth(c.y))
+                    .attribute("rx", tenth(r.w / 2.0))
+                    .attribute("ry", tenth(r.h / 2.0));
             }
             Form::Path(steps) => {
-                let is_head = matches!(steps.last(), Some(Step::Close));
-                let parts = if self.detail.is_fine || is_head {
-                    10
-                } else {
-                    1
-                };
-                xml.open("path").attribute("d", path(steps, parts));
+                xml.open("path").attribute("d", path(steps, 10));
             }
         }
         xml.close_empty();
@@ -399,40 +335,6 @@ impl ClassPen {
             let aside = (x * dy - y * dx) / length;
             aside.abs() <= 0.5 && (-0.5..=length + 0.5).contains(&along)
         })
-    }
-}
-
-/// Writes the number of headlines of each window as paths in a box `wide` and 60 high, at the windows' times: what came
-/// above the line in the middle, what went below it, what changed at the bottom.
-pub(crate) fn bars(xml: &mut Xml, view: &View, wide: f64) {
-    type CountOf = fn(&Counts) -> usize;
-    let counts: [(&str, f64, f64, CountOf); 3] = [
-        ("added", 30.0, -1.0, Counts::came),
-        ("removed", 30.0, 1.0, Counts::went),
-        ("changed", 60.0, -1.0, Counts::changed),
-    ];
-    for (kind, base, up, count) in counts {
-        let of = |frame: &Frame| count(&frame.counts);
-        let most = view.frames.iter().map(of).max().unwrap_or(1) as f64;
-        let mut bars = String::new();
-        for (at, frame) in view.frames.iter().enumerate().filter(|(_, f)| of(f) > 0) {
-            // Logarithms, so that one change is seen beside a hundred.
-            let part = libm::log(of(frame) as f64) / libm::log(most.max(9.0));
-            let height = up * libm::round(6.0 + 20.0 * part);
-            let x = view.place_in_time(at) * wide;
-            let width = (view.place_in_time(at + 1) * wide - x).max(1.0);
-            let _ = write!(
-                bars,
-                "M{} {base}h{}v{height}h-{}z",
-                tenth(x),
-                tenth(width),
-                tenth(width)
-            );
-        }
-        xml.open("path")
-            .attribute("class", kind)
-            .attribute("d", bars)
-            .close_empty();
     }
 }
 

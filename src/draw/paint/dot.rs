@@ -166,10 +166,12 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
     let clusters = view.namespaces.iter().map(|space| layout::Cluster {
         parent: space.parent,
         title: Size::new(width(&space.name), LINE),
+        footer: Size::default(),
     });
     Plan {
         vertices: vertices.collect(),
         links: links.collect(),
         clusters: clusters.collect(),
+        ..Plan::default()
     }
 }

@@ -14,6 +14,17 @@ pub(crate) fn write(scene: &Scene) -> String {
     if !scene.title.is_empty() {
         xml.leaf("title", &scene.title).raw("\n");
     }
+    ground(&mut xml, scene);
+    for group in &scene.groups {
+        write_group(&mut xml, group);
+        xml.raw("\n");
+    }
+    xml.close().raw("\n");
+    xml.finish()
+}
+
+/// Writes the background of a scene, if it has one.
+pub(super) fn ground(xml: &mut Xml, scene: &Scene) {
     if scene.background != Color::NONE {
         xml.open("rect")
             .attribute("width", tenth(scene.size.w))
@@ -21,12 +32,6 @@ pub(crate) fn write(scene: &Scene) -> String {
             .attribute("fill", scene.background);
         xml.close_empty().raw("\n");
     }
-    for group in &scene.groups {
-        write_group(&mut xml, group);
-        xml.raw("\n");
-    }
-    xml.close().raw("\n");
-    xml.finish()
 }
 
 /// A document of the scene's size that holds this one group and no background, for painters that keep groups apart.
@@ -37,7 +42,7 @@ pub(crate) fn write_alone(scene: &Scene, group: &Group) -> String {
     xml.finish()
 }
 
-fn open(xml: &mut Xml, scene: &Scene) {
+pub(super) fn open(xml: &mut Xml, scene: &Scene) {
     let size = scene.size;
     let (scale, unit) = match scene.width_mm {
         Some(mm) if size.w > 0.0 => (mm / size.w, "mm"),
@@ -59,7 +64,7 @@ fn open(xml: &mut Xml, scene: &Scene) {
         .raw("\n");
 }
 
-fn write_group(xml: &mut Xml, group: &Group) {
+pub(super) fn write_group(xml: &mut Xml, group: &Group) {
     xml.open("g").attribute("class", &group.class);
     for (key, value) in &group.data {
         xml.attribute(format_args!("data-{key}"), value);

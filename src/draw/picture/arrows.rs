@@ -1,16 +1,16 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
 use super::boxes::{class, told};
-use super::measured::arrow_label;
+use super::measured::{LINE, arrow_label};
 use super::options::{self, ArrowLook};
 use super::page::GraphFit;
-use super::{badge, chips};
+use super::{badge, chips, topics};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::Route;
-use crate::view::{Arrow, Mark, Shown};
+use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
 /// The number of straight pieces in which a curve is measured.
 const PIECES: u32 = 10;
@@ -28,6 +28,8 @@ pub(crate) struct ArrowPath {
     pub(crate) id: String,
     /// The names of its ends.
     pub(crate) ends: [String; 2],
+    /// The names of its topics as they are drawn, where it stands for several.
+    pub(crate) topics: Vec<String>,
     start: Point,
     curves: Vec<[Point; 3]>,
     /// The place of its label.
@@ -45,6 +47,8 @@ pub(crate) struct ArrowPath {
 struct LabelPlace {
     area: Rect,
     side: Anchor,
+    /// Where the arrow runs: above (−1), below (1) or at a side (0).
+    line: f64,
 }
 
 impl LabelPlace {
@@ -58,7 +62,12 @@ impl LabelPlace {
             Some(p) if p.x >= area.right() => Anchor::End,
             _ => Anchor::Middle,
         };
-        Self { area, side }
+        let line = match nearest {
+            Some(p) if p.y >= area.bottom() => 1.0,
+            Some(p) if p.y <= area.y => -1.0,
+            _ => 0.0,
+        };
+        Self { area, side, line }
     }
 
     /// The middle of words of this width, which stand next to the arrow however wide the room is.
@@ -103,12 +112,28 @@ impl ArrowPath {
         Self {
             id,
             ends,
+            topics: Vec::new(),
             start,
             curves,
             label,
             badge: *spots.first().unwrap_or(&at_part(&points, length, 0.5)),
             spots,
             length,
+        }
+    }
+
+    /// The room of its label.
+    pub(super) fn label_area(&self) -> Option<Rect> {
+        self.label.map(|label| label.area)
+    }
+
+    /// Whether it runs down, or to the right.
+    fn is_forward(&self, is_upright: bool) -> bool {
+        let end = self.curves.last().map_or(self.start, |curve| curve[2]);
+        if is_upright {
+            end.y > self.start.y
+        } else {
+            end.x > self.start.x
         }
     }
 
@@ -150,11 +175,21 @@ impl Arrows<'_> {
             title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
         };
+        if arrow.kind == ArrowKind::Bundle {
+            group
+                .data
+                .push(("topics", arrow.topics_in(shown).join(" ")));
+        }
         let mut over = Group {
             id: format!("{}..over", group.id),
             ..group.clone()
         };
-        self.line(&mut group, track, &look);
+        if arrow.kind == ArrowKind::Bundle {
+            self.line(&mut group, track, &look, topics::uses(shown));
+            self.rows(&mut over, track, shown, &look);
+        } else {
+            self.line(&mut group, track, &look, [true, false]);
+        }
         if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0])
             && track.label.is_some()
         {
@@ -167,8 +202,9 @@ impl Arrows<'_> {
         (group, over)
     }
 
-    fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook) {
-        let Some(last) = track.curves.last() else {
+    /// The line with a head at its end and at its start, as `heads` says.
+    fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook, heads: [bool; 2]) {
+        let (Some(first), Some(last)) = (track.curves.first(), track.curves.last()) else {
             return;
         };
         let scale = self.fit.pen;
@@ -178,20 +214,28 @@ impl Arrows<'_> {
             n => track.curves[n - 2][2],
         };
         let along = direction(&[before, last[0], last[1]], last[2]);
+        let against = direction(&[first[2], first[1], first[0]], track.start);
         let head = (self.style.edge.arrow + look.stroke.width) * scale;
-        // The line ends inside the head, so that its own blunt end does not show beside the tip; at the same place
+        // The line ends inside a head, so that its own blunt end does not show beside the tip; at the same place
         // whatever its width.
         let short = self.style.edge.arrow * 0.7 * scale;
-        let back = Point::new(last[2].x - along.x * short, last[2].y - along.y * short);
-        let mut steps = vec![Step::Move(track.start)];
-        steps.extend(track.curves.iter().map(|curve| Step::Curve(*curve)));
-        if let Some(Step::Curve(end)) = steps.last_mut() {
-            end[1] = Point::new(
-                end[1].x - along.x * short * 0.5,
-                end[1].y - along.y * short * 0.5,
-            );
-            end[2] = back;
+        let back = |from: Point, along: Point, by: f64| {
+            Point::new(from.x - along.x * by, from.y - along.y * by)
+        };
+        let (mut start, mut curves) = (track.start, track.curves.clone());
+        if let Some(end) = curves.last_mut().filter(|_| heads[0]) {
+            *end = [
+                end[0],
+                back(end[1], along, short * 0.5),
+                back(end[2], along, short),
+            ];
         }
+        if let Some(end) = curves.first_mut().filter(|_| heads[1]) {
+            start = back(start, against, short);
+            end[0] = back(end[0], against, short * 0.5);
+        }
+        let mut steps = vec![Step::Move(start)];
+        steps.extend(curves.into_iter().map(Step::Curve));
         let color = stroke.color;
         let path = Form::Path(steps);
         if look.glow != Color::NONE {
@@ -199,13 +243,59 @@ impl Arrows<'_> {
             group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));
-        group.shape(Shape::filled(arrow_head(last[2], along, head), color));
+        let tips = [(last[2], along), (track.start, against)];
+        for (tip, along) in tips
+            .into_iter()
+            .zip(heads)
+            .filter_map(|(tip, is)| is.then_some(tip))
+        {
+            group.shape(Shape::filled(arrow_head(tip, along, head), color));
+        }
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);
             group.shape(Shape::filled(
                 Form::Ellipse(Rect::around(track.start, dot)),
                 color,
             ));
+        }
+    }
+
+    /// The rows of its topics, one below the other.
+    fn rows(&self, group: &mut Group, track: &ArrowPath, shown: &Shown, look: &ArrowLook) {
+        let Some(place) = track.label else { return };
+        let style = &self.style.edge;
+        let (size, halo) = (
+            style.size * self.fit.scale,
+            style.halo_width * self.fit.scale,
+        );
+        let rows = topics::rows(shown, &track.topics);
+        let edge = place.middle(halo);
+        let middle = rows.len() as f64 / 2.0 - 0.5;
+        // Fewer rows than in other windows stay next to the line.
+        let slack = (place.area.h - size * LINE * rows.len() as f64).max(0.0) / 2.0;
+        let y = edge.y + slack * place.line;
+        let is_upright = place.side != Anchor::Middle;
+        let is_forward = track.is_forward(is_upright);
+        for (row, at) in rows.iter().zip(0_u32..) {
+            let mark = row.mark.or(shown.mark);
+            let color = match row.mark {
+                Some(mark) => options::change(self.style, mark).color,
+                None if mark.is_some() => look.stroke.color,
+                None => look.text,
+            };
+            group.text(Text {
+                at: Point::new(edge.x, y + size * (0.36 + LINE * (f64::from(at) - middle))),
+                anchor: place.side,
+                size,
+                weight: if mark.is_some() {
+                    Weight::SemiBold
+                } else {
+                    Weight::Regular
+                },
+                color,
+                halo: Some((style.halo, halo)),
+                text: row.words(is_upright, is_forward),
+            });
         }
     }
 

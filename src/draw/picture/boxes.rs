@@ -5,14 +5,14 @@ use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Fade, Form, Group, Piece, Shape, Stroke, Text};
+use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text};
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::view::{Item, ItemKind, Mark, Shown};
 
-/// The opacity of a namespace in which nothing is there.
-const EMPTY: f64 = 0.35;
+/// The dashes of a namespace in which nothing is there.
+const EMPTY: [f64; 2] = [1.0, 4.0];
 
 /// The style, the fonts and the scale that boxes are drawn with.
 pub(crate) struct Boxes<'a> {
@@ -34,8 +34,8 @@ pub(crate) struct ItemBox {
 }
 
 impl Boxes<'_> {
-    /// The box around a namespace; pale while nothing inside it is there.
-    pub(crate) fn space(&self, space: &Space, place: Rect, id: &str, is_empty: bool) -> Group {
+    /// The box around a namespace; a faint dotted one while nothing inside it is there, with these words.
+    pub(crate) fn space(&self, space: &Space, place: Rect, id: &str, empty: Option<&str>) -> Group {
         let style = &self.style.cluster;
         let scale = self.fit.scale;
         let place = self.fit.rect(place);
@@ -44,17 +44,24 @@ impl Boxes<'_> {
             class: "namespace".to_owned(),
             data: vec![("name", space.name.clone())],
             title: space.name.clone(),
-            fade: Fade(if is_empty { EMPTY } else { 1.0 }),
             ..Group::default()
         };
         let stroke = Stroke {
             color: style.stroke,
             width: style.width,
-            dash: style.dash.clone(),
+            dash: if empty.is_some() {
+                EMPTY.to_vec()
+            } else {
+                style.dash.clone()
+            },
         };
         group.shape(Shape {
             form: Form::Rect(place, style.radius * scale),
-            fill: style.fill,
+            fill: if empty.is_some() {
+                Color::NONE
+            } else {
+                style.fill
+            },
             stroke: stroke.scaled(self.fit.pen),
         });
         group.text(Text {
@@ -64,10 +71,17 @@ impl Boxes<'_> {
             ),
             anchor: Anchor::Start,
             size: style.size * scale,
-            weight: Weight::SemiBold,
+            weight: if empty.is_some() {
+                Weight::Regular
+            } else {
+                Weight::SemiBold
+            },
             color: style.text,
             halo: None,
-            text: space.title.clone(),
+            text: empty.map_or_else(
+                || space.title.clone(),
+                |words| format!("{} {words}", space.title),
+            ),
         });
         group
     }
@@ -171,6 +185,7 @@ impl Boxes<'_> {
         let stroke = look.stroke.scaled(self.fit.pen);
         let radius = body.radius * scale;
         let form = match kind {
+            ItemKind::Node if body.is_pill() => Form::Rect(place, place.w.min(place.h) / 2.0),
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
         };
@@ -268,12 +283,9 @@ impl Boxes<'_> {
 }
 
 /// The places on the outline of a box where its badge may stand, the best first: at its top right.
-pub(super) fn corners(kind: ItemKind, place: Rect, scale: f64) -> [Point; 4] {
+pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
-    let (x, y) = match kind {
-        ItemKind::Node => (place.w * 0.36, place.h * 0.36),
-        _ => (place.w / 2.0 - 2.0 * scale, place.h / 2.0 - scale),
-    };
+    let (x, y) = (place.w / 2.0 - 7.0 * scale, place.h / 2.0 - scale);
     [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
 }
 

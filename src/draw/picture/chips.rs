@@ -63,27 +63,28 @@ pub(crate) fn inside(counts: &Counts) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
-/// The changes of a bundle in few characters: `+4 −3 ±2`, the numbers of those that came, went and changed.
-pub(crate) fn came_and_went(counts: &Counts) -> String {
-    let parts = [
-        ('+', counts.came()),
-        ('−', counts.went()),
-        ('±', counts.changed()),
-    ];
-    let told = parts.into_iter().filter(|(_, n)| *n > 0);
-    told.map(|(sign, n)| format!("{sign}{n}"))
-        .collect::<Vec<_>>()
-        .join(" ")
+/// The rate that is written, with no more digits than its messages allow; `None` for none.
+pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
+    let (hz, count) = shown.held.or(shown.hz.map(|hz| (hz, shown.count)))?;
+    measured(shown, hz, count)
 }
 
-/// The rate in a window with no more digits than its messages allow; `None` for none.
-pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
-    let hz = shown.hz.filter(|hz| *hz > 0.0)?;
-    let text = match shown.count {
-        Some(count) if count > 0 && shown.each < 2 => rate_of(count, count as f64 / hz),
-        _ => rate(hz / shown.each.max(1) as f64),
-    };
-    Some(if shown.each > 1 { text + " each" } else { text })
+/// A rate of an element, of so many messages.
+fn measured(shown: &Shown, hz: f64, count: Option<u64>) -> Option<String> {
+    if shown.each < 2 {
+        return rate_in_window(Some(hz), count);
+    }
+    let hz = Some(hz).filter(|hz| *hz > 0.0)?;
+    Some(rate(hz / shown.each as f64) + " each")
+}
+
+/// A rate with no more digits than so many messages allow; `None` for none.
+pub(crate) fn rate_in_window(hz: Option<f64>, count: Option<u64>) -> Option<String> {
+    let hz = hz.filter(|hz| *hz > 0.0)?;
+    Some(match count {
+        Some(count) if count > 0 => rate_of(count, count as f64 / hz),
+        _ => rate(hz),
+    })
 }
 
 /// The facts about an element in this window: `active, measured, 50 Hz`.
@@ -97,7 +98,7 @@ pub(crate) fn facts(shown: &Shown) -> String {
     }
     match shown.rates {
         Some((from, to)) => parts.push(rate_change(from, to)),
-        None => parts.extend(rate_in(shown)),
+        None => parts.extend(shown.hz.and_then(|hz| measured(shown, hz, shown.count))),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
         parts.push(count(usize::try_from(n).unwrap_or(usize::MAX), "message"));

@@ -281,7 +281,9 @@ fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State
         _ => Degree::Measured,
     };
     let look = options::of_box(style, body, &shown(state, degree, None));
-    let form = if round {
+    let form = if round && body.is_pill() {
+        Form::Rect(place, place.h / 2.0)
+    } else if round {
         Form::Ellipse(place)
     } else {
         Form::Rect(place, body.radius * unit)

@@ -1,6 +1,7 @@
 //! The plan to lay out: every label at its widest, every namespace that gets a box.
 
-use super::{chips, replicas};
+use super::also::{self, Footer};
+use super::{chips, replicas, topics};
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
@@ -19,6 +20,9 @@ pub(crate) const PILL_HEIGHT: f64 = 1.5;
 pub(crate) const PILL_PAD: f64 = 1.2;
 /// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
 const OWN_RATE: f64 = 0.15;
+
+/// The room above and below the name in a pill, as a part of that in an ellipse.
+const FLAT: f64 = 0.7;
 
 /// The label of a box.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,6 +72,12 @@ pub(crate) struct MeasuredGraph {
     pub(crate) spaces: Vec<Space>,
     /// Whether each arrow carries its rate.
     pub(crate) rated: Vec<bool>,
+    /// The names of the topics of each bundle as they are drawn; none for other arrows.
+    pub(crate) topics: Vec<Vec<String>>,
+    /// The window in which something is first there, by namespace.
+    pub(crate) first_seen: Vec<usize>,
+    /// The words for nodes that have no box. Those outside of all namespaces have the plan's last vertex.
+    pub(crate) footers: Vec<Footer>,
 }
 
 impl MeasuredGraph {
@@ -86,6 +96,7 @@ impl MeasuredGraph {
             vertices.push(Vertex {
                 size: drafter.size(item, &label, seconds[at].unwrap_or(0.0)),
                 outline: match item.kind {
+                    ItemKind::Node if style.node.is_pill() => Outline::Pill,
                     ItemKind::Node => Outline::Ellipse,
                     _ => Outline::Box,
                 },
@@ -93,7 +104,15 @@ impl MeasuredGraph {
             });
             labels.push(label);
         }
-        let rooms = drafter.rooms();
+        let size = style.edge.size;
+        let fitted = |arrow: &Arrow| -> Vec<String> {
+            let names = topics::names(view, arrow).into_iter();
+            names
+                .map(|name| topics::fitted(&name, fonts, size))
+                .collect()
+        };
+        let topics: Vec<Vec<String>> = view.arrows.iter().map(fitted).collect();
+        let rooms = drafter.rooms(&topics);
         let links = view.arrows.iter().zip(&rooms).map(|(arrow, room)| Link {
             from: arrow.from as usize,
             to: arrow.to as usize,
@@ -106,11 +125,25 @@ impl MeasuredGraph {
             .map(|(namespace, space)| layout::Cluster {
                 parent: namespace.parent,
                 title: drafter.title(space),
+                footer: Size::default(),
             });
+        let mut clusters: Vec<layout::Cluster> = clusters.collect();
+        let footers = also::footers(view, style, fonts);
+        for footer in &footers {
+            match footer.cluster {
+                Some(at) => clusters[at].footer = footer.room,
+                None => vertices.push(Vertex {
+                    size: footer.room,
+                    outline: Outline::Box,
+                    cluster: None,
+                }),
+            }
+        }
         let plan = Plan {
             vertices,
             links: links.collect(),
-            clusters: clusters.collect(),
+            clusters,
+            is_labelled: view.arrows.iter().any(|a| a.kind == ArrowKind::Bundle),
         };
         let rated = rooms.iter().map(Option::is_some).collect();
         Self {
@@ -118,8 +151,27 @@ impl MeasuredGraph {
             labels,
             spaces,
             rated,
+            topics,
+            footers,
+            first_seen: first_seen(view),
         }
     }
+}
+
+/// The window in which each namespace first has something inside.
+fn first_seen(view: &View) -> Vec<usize> {
+    let mut first = vec![usize::MAX; view.namespaces.len()];
+    for (item, showing) in view.items.iter().zip(&view.items_shown) {
+        let seen = showing.runs().find(|(_, shown)| shown.is_some());
+        let seen = seen.map_or(usize::MAX, |(window, _)| window as usize);
+        let mut space = item.cluster;
+        // Parents have smaller places, so that this ends.
+        while let Some(at) = space {
+            first[at] = first[at].min(seen);
+            space = view.namespaces[at].parent;
+        }
+    }
+    first
 }
 
 /// The words on the box of a namespace inside its own frame, beside the members that were kept open.
@@ -191,6 +243,10 @@ impl Measurer<'_> {
         let small = if label.second { body.small * LINE } else { 0.0 };
         let height = body.size * LINE + small;
         let depth = match item.kind {
+            ItemKind::Node if body.is_pill() => {
+                let high = height + 2.0 * body.pad_y * FLAT;
+                return Size::new((width + 1.7 * body.pad_x).max(high), high);
+            }
             ItemKind::Node => return ellipse(width, height, body),
             ItemKind::Topic => 0.0,
             ItemKind::Group | ItemKind::Namespace => self.style.stack.depth,
@@ -224,7 +280,7 @@ impl Measurer<'_> {
     }
 
     /// The room for the widest label that each arrow shows in some window.
-    fn rooms(&self) -> Vec<Option<Size>> {
+    fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
         let told = told_by_arrows(self.view);
         let nothing = Showing::default();
@@ -233,9 +289,16 @@ impl Measurer<'_> {
             .arrows
             .iter()
             .zip(&self.view.arrows_shown)
-            .zip(told);
-        let widest = all.map(|((arrow, showing), is_told)| {
+            .zip(told)
+            .zip(topics);
+        let rooms = all.map(|(((arrow, showing), is_told), names)| {
             let mut widest = None;
+            if arrow.kind == ArrowKind::Bundle {
+                let rooms = showing.looks().iter();
+                let rooms =
+                    rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
+                return rooms.reduce(|a, b| Size::new(a.w.max(b.w), a.h.max(b.h)));
+            }
             // A subscription tells its rate where its topic has another.
             let topic = self.view.items_shown.get(arrow.from as usize);
             let topic = topic.filter(|_| is_told && arrow.kind == ArrowKind::Subscribe);
@@ -256,10 +319,9 @@ impl Measurer<'_> {
                 let width = self.fonts.width(&text, style.size, weight);
                 widen(&mut widest, width + pad);
             }
-            widest
+            Some(Size::new(widest?, style.size * PILL_HEIGHT))
         });
-        let room = |width: Option<f64>| Some(Size::new(width?, style.size * PILL_HEIGHT));
-        widest.map(room).collect()
+        rooms.collect()
     }
 }
 
@@ -320,19 +382,7 @@ pub(crate) fn arrow_label(
         return None;
     }
     let topic = arrow.carries(shown).map_or_else(String::new, |t| t + " ");
-    if arrow.kind == ArrowKind::Bundle {
-        let inside = shown.inside.as_deref().map(chips::came_and_went);
-        let rate = match (shown.rates, shown.mark) {
-            (Some((before, now)), _) => Some(words::rate_change(before, now)),
-            // The mean of a window in which a rate changes is no rate of it.
-            (None, Some(Mark::Faster | Mark::Slower)) => None,
-            (None, _) => chips::rate_in(shown),
-        };
-        let inside = inside.filter(|_| shown.rates.is_none());
-        let text = topic + &[rate, inside].map(Option::unwrap_or_default).join(" ");
-        return Some((text.trim_end().to_owned(), shown.mark.is_some()));
-    }
-    if let Some((before, now)) = shown.rates {
+    if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
         return Some((topic + &words::rate_change(before, now), true));
     }
     let rate = chips::rate_in(shown);
@@ -344,10 +394,12 @@ pub(crate) fn arrow_label(
             let differs = (hz - of_topic).abs() > OWN_RATE * of_topic.max(hz);
             rate.filter(|_| differs).map(|rate| (rate, false))
         }
-        ArrowKind::Direct(_) | ArrowKind::Bundle => {
+        ArrowKind::Direct(_) => {
             let rate = rate.unwrap_or_default();
             Some(((topic + &rate).trim_end().to_owned(), false))
         }
+        // Its topics have a row each.
+        ArrowKind::Bundle => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! The page: its parts for title, graph, legend and timeline, and the scale of the graph in its part.
 
-use super::PageOptions;
+use super::{PageOptions, timeline};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Style;
 
@@ -49,7 +49,7 @@ impl PageFrame {
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
             if has_timeline {
-                timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
+                timeline = timeline::height(style, options, unit);
             }
         }
         let margin = (style.page.margin * unit)

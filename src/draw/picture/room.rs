@@ -3,7 +3,6 @@
 use super::arrows::ArrowPath;
 use super::boxes::{ItemBox, corners};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::view::ItemKind;
 
 /// The most boxes and arrows among which room is looked for: each place is held against all of them, and in a drawing
 /// of more a badge is smaller than a point.
@@ -12,20 +11,20 @@ const MOST: usize = 3000;
 /// Moves all badges of this radius to places where they cover no line and no other box, as far as there are any; those
 /// of very large drawings stay where they are.
 pub(super) fn place_badges(
-    (kinds, cards): (&[ItemKind], &mut [ItemBox]),
+    cards: &mut [ItemBox],
     tracks: &mut [ArrowPath],
     radius: f64,
     scale: f64,
 ) {
-    for (card, kind) in cards.iter_mut().zip(kinds) {
-        card.badge = corners(*kind, card.place, scale)[0];
+    for card in cards.iter_mut() {
+        card.badge = corners(card.place, scale)[0];
     }
     if cards.len() + tracks.len() > MOST {
         return;
     }
     let room = Room::new(cards, tracks, radius);
-    for (at, (card, kind)) in cards.iter_mut().zip(kinds).enumerate() {
-        let free = corners(*kind, card.place, scale);
+    for (at, card) in cards.iter_mut().enumerate() {
+        let free = corners(card.place, scale);
         card.badge = room.best(&free, (Some(at), None)).unwrap_or(card.badge);
     }
     for (at, track) in tracks.iter_mut().enumerate() {
@@ -36,6 +35,7 @@ pub(super) fn place_badges(
 
 /// All that a badge may cover.
 struct Room {
+    /// Boxes, then labels.
     boxes: Vec<Rect>,
     /// Lines with the rectangles around them.
     lines: Vec<(Rect, Vec<Point>)>,
@@ -49,7 +49,11 @@ impl Room {
             (around(&points), points)
         };
         Self {
-            boxes: cards.iter().map(|card| card.place).collect(),
+            boxes: cards
+                .iter()
+                .map(|card| card.place)
+                .chain(tracks.iter().filter_map(ArrowPath::label_area))
+                .collect(),
             lines: tracks.iter().map(line).collect(),
             radius,
         }
@@ -128,20 +132,10 @@ mod tests {
     fn a_badge_leaves_the_corner_that_a_line_runs_by() {
         let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
-        place_badges(
-            (&[ItemKind::Topic], &mut cards),
-            &mut [along(130.0)],
-            8.0,
-            1.0,
-        );
-        assert_eq!(cards[0].badge, Point::new(98.0, 1.0));
-        place_badges(
-            (&[ItemKind::Topic], &mut cards),
-            &mut [along(102.0)],
-            8.0,
-            1.0,
-        );
-        assert_eq!(cards[0].badge, Point::new(2.0, 1.0));
+        place_badges(&mut cards, &mut [along(130.0)], 8.0, 1.0);
+        assert_eq!(cards[0].badge, Point::new(93.0, 1.0));
+        place_badges(&mut cards, &mut [along(97.0)], 8.0, 1.0);
+        assert_eq!(cards[0].badge, Point::new(7.0, 1.0));
     }
 
     #[test]
@@ -150,7 +144,7 @@ mod tests {
             line(Point::new(0.0, 0.0), Point::new(200.0, 0.0)),
             line(Point::new(100.0, -30.0), Point::new(100.0, 90.0)),
         ];
-        place_badges((&[], &mut []), &mut both, 8.0, 1.0);
+        place_badges(&mut [], &mut both, 8.0, 1.0);
         assert!((both[0].badge.x - 100.0).abs() > 8.0, "{:?}", both[0].badge);
     }
 }

@@ -1,19 +1,17 @@
-//! The strip at the bottom: life lines (or messages per second where there are none), the changes, and the place of the
-//! window.
+//! The strip at the bottom: phases and rows of those that come and go (or messages per second where none do), and the
+//! place of the window.
 
-use super::course::CourseStrip;
+use super::PageOptions;
+use super::course::{CourseSizes, CourseStrip, names_width};
 use super::page::PageFrame;
 use super::title::whole;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp, round_length};
 use crate::base::words;
 use crate::draw::figure::Course;
-use crate::draw::figure::canvas::entry_data;
-use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line, polygon};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
-use crate::mission::EntryId;
-use crate::mission::ledger::Kind;
 use crate::view::{Frame, View};
 
 /// A bar stands for one window, or for several where there are more windows than room.
@@ -37,21 +35,53 @@ pub(crate) struct Timeline<'a> {
     /// The time that the axis covers.
     span: Span,
     busiest: f64,
-    /// The life lines; bars are drawn where there are none.
-    course: Option<Course>,
+    /// The phases and rows; bars are drawn where there are no rows.
+    course: Course,
+    sizes: CourseSizes,
 }
+
+/// The space above and below everything.
+const AROUND: f64 = 7.0;
 
 /// The narrowest bar in pixels.
 const NARROWEST: f64 = 2.5;
 
+/// The height of the strip: phases and rows, or bars of messages, above the axis.
+pub(crate) fn height(style: &Style, options: &PageOptions, unit: f64) -> f64 {
+    let (sizes, course) = (sizes(style, options, unit), &options.course);
+    let rows = match course.rows.len() {
+        0 => style.timeline.height * unit,
+        _ => sizes.rows(course),
+    };
+    sizes.band(course) + rows + sizes.text * 1.6 + 2.0 * AROUND * unit
+}
+
+fn sizes(style: &Style, options: &PageOptions, unit: f64) -> CourseSizes {
+    CourseSizes::new(style, unit, options.width_mm.is_some())
+}
+
 impl<'a> Timeline<'a> {
-    pub(crate) fn new(style: &'a Style, fonts: &'a Fonts, page: &PageFrame, view: &View) -> Self {
-        let unit = page.unit;
-        let strip = page.timeline;
+    pub(crate) fn new(
+        style: &'a Style,
+        fonts: &'a Fonts,
+        page: &PageFrame,
+        view: &View,
+        options: &PageOptions,
+    ) -> Self {
+        let (unit, strip) = (page.unit, page.timeline);
+        let (sizes, course) = (sizes(style, options, unit), options.course.clone());
         let margin = style.page.margin * unit;
-        let height = style.timeline.height * unit;
-        let top = strip.y + 3.0 * LANE * unit + 6.0 * unit;
-        let plot = Rect::new(margin, top, (strip.w - 2.0 * margin).max(1.0), height);
+        let names = match course.rows.len() {
+            0 => 0.0,
+            _ => names_width(&course, sizes, fonts, strip.w),
+        };
+        let top = strip.y + AROUND * unit + sizes.band(&course);
+        let height = match course.rows.len() {
+            0 => style.timeline.height * unit,
+            _ => sizes.rows(&course),
+        };
+        let left = margin + names;
+        let plot = Rect::new(left, top, (strip.w - left - margin).max(1.0), height);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -79,83 +109,70 @@ impl<'a> Timeline<'a> {
             plot,
             span,
             busiest,
-            course: None,
+            course,
+            sizes,
         }
-    }
-
-    /// The same strip with life lines in place of bars, if there are any.
-    pub(crate) fn with(mut self, course: Option<Course>) -> Self {
-        self.course = course.filter(|c| !c.rows.is_empty());
-        self
     }
 
     fn strip(&self) -> CourseStrip<'_> {
         CourseStrip {
             style: self.style,
+            fonts: self.fonts,
+            course: &self.course,
+            sizes: self.sizes,
             plot: self.plot,
             span: self.span,
             unit: self.page.unit,
         }
     }
 
-    /// The groups that are the same in every frame: ground, all bars, marks, axis.
-    pub(crate) fn ground(&self, view: &View) -> Vec<Group> {
+    fn has_rows(&self) -> bool {
+        !self.course.rows.is_empty()
+    }
+
+    /// The groups that are the same in every frame: ground, phases, rows or bars, axis.
+    pub(crate) fn ground(&self) -> Vec<Group> {
         let style = &self.style.timeline;
         let mut bars = Group::named("timeline");
         bars.shape(Shape::filled(
             Form::Rect(self.page.timeline, 0.0),
             self.style.legend.fill,
         ));
-        if let Some(course) = &self.course {
-            let top = self.page.timeline.y + 2.0 * self.page.unit;
-            self.strip().phases(&mut bars, course, top);
+        if !self.has_rows() {
+            bars.shape(Shape::filled(self.bars(0, self.bars.len()), style.future));
+            let y = self.plot.bottom();
+            let axis = line(Point::new(self.plot.x, y), Point::new(self.plot.right(), y));
+            bars.shape(Shape::line(axis, Stroke::solid(style.axis, self.page.unit)));
         }
-        match &self.course {
-            None => bars.shape(Shape::filled(self.bars(0, self.bars.len()), style.future)),
-            Some(course) => bars.shape(self.strip().bars(course, self.span, style.future)),
-        }
-        let y = self.plot.bottom();
-        let axis = line(Point::new(self.plot.x, y), Point::new(self.plot.right(), y));
-        bars.shape(Shape::line(axis, Stroke::solid(style.axis, self.page.unit)));
         let mut groups = vec![bars, self.axis()];
-        if let Some(course) = &self.course {
-            groups.push(self.strip().lives(course));
-            groups.extend(self.strip().events(course));
-        }
-        groups.extend(self.marks(view));
+        groups.extend(self.strip().ground());
         groups
     }
 
-    /// The groups that change from frame to frame: the bars up to the window at place `k`, and the head over exactly
-    /// its time.
+    /// The groups that change from frame to frame: what lives in the window at place `k` (or the bars up to it), and the
+    /// head over exactly its time.
     pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
-        let at = k / self.per_bar;
-        let mut past = Group::named("past");
-        match &self.course {
-            None => {
-                past.shape(Shape::filled(self.bars(0, at), style.past));
-                past.shape(Shape::filled(self.bars(at, at + 1), style.now));
-            }
-            Some(course) => {
-                let before = Span {
-                    start: self.span.start,
-                    end: frame.span.start,
-                };
-                past.shape(self.strip().bars(course, before, style.past));
-                past.shape(self.strip().bars(course, frame.span, style.now));
-            }
+        let shown = frame.shown();
+        let mut past = self.strip().now(shown);
+        if !self.has_rows() {
+            let at = k / self.per_bar;
+            past.shape(Shape::filled(self.bars(0, at), style.past));
+            past.shape(Shape::filled(self.bars(at, at + 1), style.now));
         }
         let mut head = Group::named("playhead");
         let unit = self.page.unit;
-        let (left, right) = (self.x(frame.span.start), self.x(frame.span.end));
-        let top = self.page.timeline.y + 2.0 * unit;
+        let (left, right) = (self.x(shown.start), self.x(shown.end));
+        let top = self.strip().top() - 2.0 * unit;
         let place = Rect::new(left, top, right - left, self.plot.bottom() - top);
         head.shape(Shape::line(
             Form::Rect(place, (2.0 * unit).min(place.w / 2.0)),
             Stroke::solid(style.head, 1.5 * unit),
         ));
-        vec![past, head]
+        let mut groups = vec![past];
+        groups.extend(self.strip().events());
+        groups.push(head);
+        groups
     }
 
     /// The x of a moment on the axis.
@@ -191,56 +208,10 @@ impl<'a> Timeline<'a> {
         Form::Path(steps)
     }
 
-    /// Signs at the times at which something came, changed or went: three lanes, one for each. Signs that would cover
-    /// each other are one, as far as they belong to one window; each knows its window and the headlines it stands
-    /// for.
-    fn marks(&self, view: &View) -> Vec<Group> {
-        let mut groups = Vec::new();
-        let radius = LANE * 0.42 * self.page.unit;
-        for (window, frame) in view.frames.iter().enumerate() {
-            for lane in 0..3 {
-                let of_lane = frame.headlines.iter().filter(|h| lane_of(h.kind) == lane);
-                let mut times: Vec<(f64, EntryId)> =
-                    of_lane.map(|h| (self.x(h.time), h.entry)).collect();
-                times.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                for (at, some) in times.chunk_by(|a, b| b.0 - a.0 < 2.0 * radius).enumerate() {
-                    let x = f64::midpoint(some[0].0, some[some.len() - 1].0);
-                    let entries: Vec<EntryId> = some.iter().map(|(_, entry)| *entry).collect();
-                    groups.push(self.mark((window, lane, at), x, radius, &entries));
-                }
-            }
-        }
-        groups
-    }
-
-    fn mark(
-        &self,
-        (window, lane, at): (usize, usize, usize),
-        x: f64,
-        radius: f64,
-        entries: &[EntryId],
-    ) -> Group {
-        let mut group = Group::named(&format!("mark-{window}-{lane}-{at}"));
-        "mark".clone_into(&mut group.class);
-        group.data = vec![("window", window.to_string())];
-        group.data.extend(entry_data(entries));
-        let paint = [
-            self.style.added.color,
-            self.style.changed.color,
-            self.style.removed.color,
-        ];
-        let y = self.page.timeline.y + (LANE * (lane as f64 + 0.5) + 4.0) * self.page.unit;
-        group.shape(Shape::filled(
-            mark(lane, Point::new(x, y), radius),
-            paint[lane],
-        ));
-        group
-    }
-
     /// The axis with round times, as far as they do not come too near to the last, which is the end.
     fn axis(&self) -> Group {
         let mut group = Group::named("axis");
-        let size = self.style.timeline.size * self.page.unit;
+        let size = self.sizes.text;
         let width = |text: &str| self.fonts.width(text, size, Weight::Regular);
         let total = self.span.nanos();
         let last = words::offset(whole(total));
@@ -263,7 +234,7 @@ impl<'a> Timeline<'a> {
     }
 
     fn tick(&self, x: f64, anchor: Anchor, text: String) -> Text {
-        let size = self.style.timeline.size * self.page.unit;
+        let size = self.sizes.text;
         Text {
             at: Point::new(x, self.plot.bottom() + size * 1.25),
             anchor,
@@ -276,9 +247,6 @@ impl<'a> Timeline<'a> {
     }
 }
 
-/// The height of a lane of marks.
-const LANE: f64 = 8.5;
-
 impl TimelineBar {
     /// The bar of some windows, up to where the next begins. Messages per second of the windows' own time, so that
     /// neither a short nor an overlapping window lies.
@@ -290,38 +258,6 @@ impl TimelineBar {
             span: Span { start, end },
             rate: messages as f64 * 1e9 / nanos.max(1.0),
         })
-    }
-}
-
-/// The lane of a headline: 0 for what came, 1 for what changed, 2 for what went.
-fn lane_of(kind: Kind) -> usize {
-    match kind {
-        Kind::Started | Kind::Appeared => 0,
-        Kind::Stopped | Kind::Vanished => 2,
-        _ => 1,
-    }
-}
-
-/// The sign of a lane: a plus for what came, a diamond for what changed, a minus for what went, as on the badges.
-pub(crate) fn mark(lane: usize, c: Point, r: f64) -> Form {
-    let at = |x: f64, y: f64| Point::new(c.x + x * r, c.y + y * r);
-    match lane {
-        0 => polygon(&[
-            at(-0.35, -1.0),
-            at(0.35, -1.0),
-            at(0.35, -0.35),
-            at(1.0, -0.35),
-            at(1.0, 0.35),
-            at(0.35, 0.35),
-            at(0.35, 1.0),
-            at(-0.35, 1.0),
-            at(-0.35, 0.35),
-            at(-1.0, 0.35),
-            at(-1.0, -0.35),
-            at(-0.35, -0.35),
-        ]),
-        1 => polygon(&[at(0.0, -1.0), at(1.0, 0.0), at(0.0, 1.0), at(-1.0, 0.0)]),
-        _ => polygon(&[at(-1.0, -0.4), at(1.0, -0.4), at(1.0, 0.4), at(-1.0, 0.4)]),
     }
 }
 

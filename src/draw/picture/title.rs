@@ -66,8 +66,16 @@ impl<'a> Title<'a> {
         let (style, unit) = (&self.style.title, self.page.unit);
         let (size, small) = (style.size * unit, style.quiet_size * unit);
         let mut below = vec![phase];
+        let empty = frame.empty.map_or_else(String::new, |time| {
+            format!("{} without a message", words::duration(time.nanos()))
+        });
         if frame.caption.is_empty() {
-            let text = self.cut(&frame.note, size, Weight::Regular, room.0);
+            let main = match frame.empty {
+                Some(_) => &empty,
+                None => &frame.note,
+            };
+            below.extend(frame.empty.map(|_| &*frame.note));
+            let text = self.cut(main, size, Weight::Regular, room.0);
             note.text(self.text(text, LINES.0, (size, Weight::Regular), style.quiet));
         } else {
             let wide = |text: &str| self.width(&self.fonts.shown(text), size, Weight::SemiBold);
@@ -75,9 +83,9 @@ impl<'a> Title<'a> {
             let text = self.cut(&text, size, Weight::SemiBold, room.0);
             headline.title = frame.fitting(|_| true);
             headline.text(self.text(text, LINES.0, (size, Weight::SemiBold), self.color(frame)));
-            below.push(&frame.note);
+            below.extend([&*frame.note, &empty]);
         }
-        if frame.messages == 0 && !self.view.compares {
+        if frame.messages == 0 && frame.empty.is_none() && !self.view.compares {
             below.push("no messages");
         }
         below.retain(|part| !part.is_empty());
@@ -119,12 +127,13 @@ impl<'a> Title<'a> {
             let is_alone = view.frames.len() > 1 && frame.index == 0;
             SIDES[usize::from(!is_alone)].to_owned()
         } else {
-            group.title = frame.span.start.rfc3339();
+            let shown = frame.shown();
+            group.title = shown.start.rfc3339();
             if view.frames.len() > 1 {
                 parts.insert(0, format!("of {}", at(end)));
             }
-            parts.push(words::date_and_clock(frame.span.start.0));
-            format!("{} – {}", at(frame.span.start), at(frame.span.end))
+            parts.push(words::date_and_clock(shown.start.0));
+            format!("{} – {}", at(shown.start), at(shown.end))
         };
         parts.retain(|part| !part.is_empty());
         let (size, small) = (style.clock_size * unit, style.quiet_size * unit);

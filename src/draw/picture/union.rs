@@ -13,7 +13,7 @@ use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Degree;
 use crate::graph::State;
-use crate::view::{Arrow, ArrowKind, ItemKind, Mark, Showing, Shown};
+use crate::view::{Arrow, ItemKind, Mark, Showing, Shown};
 
 /// The whole graph, every element once and as if it were active; a painter leaves out the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,10 +55,8 @@ pub struct UnionElement {
 /// none.
 pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
     let rate = chips::rate_in(shown).unwrap_or_default();
-    match arrow.map(|arrow| (&arrow.kind, arrow.carries(shown))) {
-        Some((ArrowKind::Direct(_), Some(topic))) => {
-            format!("{topic} {rate}").trim_end().to_owned()
-        }
+    match arrow.and_then(|arrow| arrow.carries(shown)) {
+        Some(topic) => format!("{topic} {rate}").trim_end().to_owned(),
         _ => rate,
     }
 }
@@ -99,7 +97,7 @@ impl Picture<'_> {
         Union {
             size: layout.size,
             spaces: spaces
-                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), false))
+                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), None))
                 .collect(),
             order: self.order.clone(),
             arrows: self.union_arrows(tracks, fit),

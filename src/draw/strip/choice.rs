@@ -84,6 +84,7 @@ fn busiest(view: &View, most: usize) -> Vec<usize> {
     order.sort_by_key(|k| {
         (
             *k != 0,
+            !view.is_changed(*k),
             std::cmp::Reverse(changes(view.frames[*k].counts)),
             *k,
         )

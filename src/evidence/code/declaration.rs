@@ -127,7 +127,7 @@ impl Call {
                 )
             }
         };
-        // Who publishes what an action tells, and what it is told.
+        // Who publishes what an action tells, and what it is reported.
         let action1 = |tells, told| {
             let suffix = |word: &'static str| move |t: &str| format!("{t}{word}");
             vec![

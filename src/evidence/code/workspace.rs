@@ -309,7 +309,7 @@ impl Workspace {
                 .filter(|n| !n.is_empty() && !n.contains(char::is_whitespace))
                 .collect(),
             program,
-            // What writes bags subscribes what it was told, which the code does not say.
+            // What writes bags subscribes what it was reported, which the code does not say.
             declared: if is_recorder {
                 Arc::default()
             } else {

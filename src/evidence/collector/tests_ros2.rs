@@ -106,6 +106,90 @@ fn a_graph_snapshot_names_everything() {
     );
 }
 
+/// An end of a topic in the newest form of `rosgraph_msgs`, reliable or best effort.
+fn graph_end(p: Payload, topic: &str, reliability: u8) -> Payload {
+    let p = p.text(topic).text("a/msg/T").byte(1).raw(&[0; 32]);
+    let p = p.u32(10).u32(0).u32(0).u32(0).u32(0);
+    p.byte(1).byte(reliability).byte(2).byte(1).u32(0).u32(0)
+}
+
+#[test]
+fn a_single_node_names_services_and_actions() {
+    let empty = |p: Payload, many| (0..many).fold(p, |p, _| p.u32(0));
+    let service = |p: Payload, name: &str, kind: &str| {
+        let qos = |p: Payload| p.u32(0).raw(&[0; 16]).raw(&[0; 4]).u32(0).u32(0);
+        let kind = |p: Payload| p.text(kind).byte(1).raw(&[0; 32]);
+        qos(kind(qos(kind(p.text(name)))))
+    };
+    let message = empty(Payload::cdr().text("/nav"), 2);
+    let message = graph_end(message.u32(1), "/plan", 1).u32(0).u32(1);
+    let message = service(message, "/clear", "std_srvs/srv/Empty").u32(1);
+    let message = service(
+        message,
+        "/nav/get_parameters",
+        "rcl_interfaces/srv/GetParameters",
+    );
+    let message = message.u32(0).u32(1).text("/go");
+    let message = ["send_goal", "get_result", "cancel_goal"]
+        .iter()
+        .fold(message, |p, part| service(p, part, "a/srv/S"));
+    let message = graph_end(message, "/go/_action/feedback", 1);
+    let message = graph_end(message, "/go/_action/status", 1);
+    // The definition in the bag may list the outermost fields only.
+    assert_eq!(
+        claims(
+            "/nodl/observed_node",
+            "rosgraph_msgs/msg/Node",
+            None,
+            &message
+        ),
+        [
+            "Node /nav",
+            "Publish /nav /clear",
+            "Publish /nav /go/_action/feedback",
+            "Publish /nav /go/_action/status",
+            "Publish /nav /plan",
+            "Snapshot snapshot /nodl/observed_node /nav",
+            "Type /clear std_srvs/srv/Empty",
+            "Type /go/_action/feedback a/msg/T",
+            "Type /go/_action/status a/msg/T",
+            "Type /plan a/msg/T",
+        ]
+    );
+}
+
+#[test]
+fn a_reliable_subscriber_of_a_best_effort_publisher_is_starved() {
+    let empty = |p: Payload, many| (0..many).fold(p, |p, _| p.u32(0));
+    let node = |p: Payload, name: &str| empty(p.text(name), 2);
+    let message = node(Payload::cdr().u32(2), "/a");
+    let message = empty(graph_end(message.u32(1), "/t", 2), 5);
+    let message = node(message, "/a").u32(0);
+    let message = empty(graph_end(message.u32(1), "/t", 1), 4);
+    let all = claims("/rosgraph", "rosgraph_msgs/msg/Graph", None, &message);
+    assert!(all.contains(&"Starved /a /t".to_owned()), "{all:?}");
+    assert!(all.contains(&"Duplicate /a".to_owned()), "{all:?}");
+}
+
+#[test]
+fn losses_of_the_recorder_name_the_topic_and_the_number() {
+    let message = Payload::cdr()
+        .text("/rec")
+        .u32(1)
+        .text("/scan")
+        .u64(2)
+        .u64(3);
+    assert_eq!(
+        claims(
+            "/events/rosbag2_messages_lost",
+            "rosbag2_interfaces/msg/MessagesLostEvent",
+            None,
+            &message
+        ),
+        ["Lost /scan 5"]
+    );
+}
+
 #[test]
 fn topic_statistics_tell_publishers_from_subscribers() {
     let one = |p: Payload, kind, node| {

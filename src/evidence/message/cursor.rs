@@ -176,6 +176,12 @@ impl<'a> PayloadCursor<'a> {
         Ok(Stamp::from_ros(self.u32()?, self.u32()?))
     }
 
+    /// The next duration in nanoseconds: seconds and nanoseconds of 32 bits each, of either sign.
+    pub(crate) fn duration(&mut self) -> PayloadResult<i64> {
+        let (seconds, nanos) = (i64::from(self.i32()?), i64::from(self.i32()?));
+        Ok(seconds * 1_000_000_000 + nanos)
+    }
+
     /// The next `count` numbers of `size` bytes each as they are written, aligned in CDR.
     pub(crate) fn numbers(&mut self, count: usize, size: usize) -> PayloadResult<&'a [u8]> {
         if let Some(origin) = self.origin.filter(|_| count > 0) {
@@ -226,12 +232,13 @@ impl<'a> PayloadCursor<'a> {
         Ok(count)
     }
 
-    /// Steps over a `std_msgs/Header`; the sequence number in ROS 1, 0 in ROS 2.
-    pub(crate) fn header(&mut self) -> PayloadResult<u32> {
-        let seq = if self.is_cdr() { 0 } else { self.u32()? };
+    /// Steps over a `std_msgs/Header`, which begins with a sequence number in ROS 1.
+    pub(crate) fn header(&mut self) -> PayloadResult<()> {
+        if !self.is_cdr() {
+            self.u32()?;
+        }
         self.time()?;
-        self.skip_string()?;
-        Ok(seq)
+        self.skip_string()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Known message layouts, recognised by type, and by definition or hash.
 
+use super::fields;
 use crate::bag::{Connection, Encoding};
 
 /// A message layout.
@@ -119,46 +120,21 @@ fn is_idl(definition: &str) -> bool {
 /// The messages in a definition, the outermost first: the last part of the name, then `type name` of each field,
 /// separated by `;`. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
 pub(crate) fn outline(definition: &str) -> Vec<(String, String)> {
-    let mut messages = vec![(String::new(), String::new())];
-    for line in definition.lines() {
-        let line = line.split('#').next().unwrap_or_default().trim();
-        if let Some(name) = line.strip_prefix("MSG:") {
-            messages.push((last(name.trim()).to_owned(), String::new()));
-        } else if let (Some(field), Some((_, fields))) = (field(line), messages.last_mut()) {
-            if !fields.is_empty() {
-                fields.push(';');
-            }
-            fields.push_str(&field);
-        }
-    }
+    let messages = fields::messages(definition).unwrap_or_default();
+    let fields = |message: &fields::MessageFields| {
+        let fields = message.fields.iter().map(|field| {
+            let kind = match field.kind.rsplit('/').next().unwrap_or_default() {
+                "int8" | "uint8" | "char" | "bool" => "byte",
+                other => other,
+            };
+            format!("{kind}{} {}", field.array, field.name)
+        });
+        fields.collect::<Vec<_>>().join(";")
+    };
     messages
-}
-
-fn last(name: &str) -> &str {
-    name.rsplit('/').next().unwrap_or(name)
-}
-
-/// `type name` of a line; `None` if it holds a constant or nothing.
-fn field(line: &str) -> Option<String> {
-    let (kind, rest) = line.split_once(char::is_whitespace)?;
-    let rest = rest.trim_start();
-    let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_'));
-    let (name, tail) = rest.split_at(end.unwrap_or(rest.len()));
-    if name.is_empty() || tail.trim_start().starts_with('=') {
-        return None;
-    }
-    let (kind, array) = kind.split_at(kind.find('[').unwrap_or(kind.len()));
-    let kind = last(kind.split("<=").next().unwrap_or(kind));
-    let kind = match kind {
-        "int8" | "uint8" | "char" | "bool" => "byte",
-        other => other,
-    };
-    let array = if array.starts_with("[<=") {
-        "[]"
-    } else {
-        array
-    };
-    Some(format!("{kind}{array} {name}"))
+        .iter()
+        .map(|message| (message.name.clone(), fields(message)))
+        .collect()
 }
 
 #[cfg(test)]

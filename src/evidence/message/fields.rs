@@ -1,18 +1,30 @@
 //! Messages as columns of a table: a column per field, with dots in the names of nested fields, and a list for each
 //! array around a field.
 //!
-//! A payload is read by the definition in its bag (<http://wiki.ros.org/msg>,
-//! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. Times are two
-//! fields, `sec` and `nanosec`, in ROS 1 as they are in ROS 2.
+//! A payload is read by the definition in its bag, or by [`KnownTypes`] where the bag holds none (<http://wiki.ros.org/msg>,
+//! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. A time is one
+//! column; a duration is two, `sec` and `nanosec`, in ROS 1 as in ROS 2.
 
 mod definition;
+mod known;
 
 use std::ops::Range;
 
 use super::cursor::{Malformed, PayloadCursor};
 use crate::bag::{Connection, Encoding};
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn};
 use definition::{Array, Definition, Field};
+
+pub(crate) use definition::MessageFields;
+pub(crate) use known::KnownTypes;
+
+/// The messages in a definition's text, the outermost first, without a name.
+///
+/// # Errors
+/// The reason why it cannot be used.
+pub(crate) fn messages(definition: &str) -> Result<Vec<MessageFields>, String> {
+    definition::messages(definition, "")
+}
 
 /// The deepest nesting of messages; deeper ones are hostile.
 const DEEPEST: usize = 16;
@@ -33,6 +45,8 @@ enum DecodeStep {
     One(usize, Primitive),
     /// A list of bytes is one value.
     Bytes(usize, Array),
+    /// Seconds and nanoseconds since 1970.
+    Time(usize),
     /// The list that ends on `level` of each of `columns`.
     List {
         count: Array,
@@ -57,18 +71,35 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
-    /// The decoder of a connection's messages.
+    /// The decoder of a connection's messages, and the one to try if their type is known and has changed over the years.
     ///
     /// # Errors
     /// The reason why its messages cannot be decoded.
-    pub(crate) fn new(connection: &Connection) -> Result<Self, String> {
+    pub(crate) fn new(
+        connection: &Connection,
+        types: &KnownTypes,
+    ) -> Result<(Self, Option<Self>), String> {
         if let Encoding::Other(name) = &connection.encoding {
             return Err(format!("they are encoded as `{name}`"));
         }
         let text = connection.definition.as_deref().unwrap_or_default();
-        let definition = Definition::parse(text, &connection.type_name)?;
+        let type_name = &connection.type_name;
+        let known = |is_older| Definition::known(types, type_name, is_older);
+        match (Definition::parse(text, type_name), known(false)) {
+            (Ok(definition), _) => Ok((Self::of(connection, &definition)?, None)),
+            (Err(_), Some(definition)) => {
+                let newer = Self::of(connection, &definition)?;
+                let older = known(true).map(|d| Self::of(connection, &d)).transpose()?;
+                let older = older.filter(|older| *older != newer);
+                Ok((newer, older))
+            }
+            (Err(why), None) => Err(why),
+        }
+    }
+
+    fn of(connection: &Connection, definition: &Definition) -> Result<Self, String> {
         let mut plan = DecodePlan {
-            definition: &definition,
+            definition,
             is_cdr: connection.encoding == Encoding::Cdr,
             columns: Vec::new(),
             fields: 0,
@@ -83,16 +114,27 @@ impl Decoder {
         })
     }
 
-    /// A column for each field, in the order of the definition, whose names are none of `taken`.
-    pub(crate) fn columns(&self, taken: &[&str]) -> impl Iterator<Item = TableColumn> {
+    /// A column for each field, in the order of the definition, whose names are none of `taken`. With `is_nested` they
+    /// are paths of names, with [`LIST`] behind lists.
+    pub(crate) fn columns(
+        &self,
+        taken: &[&str],
+        is_nested: bool,
+    ) -> impl Iterator<Item = TableColumn> {
         let mut names: Vec<String> = Vec::new();
-        self.columns.iter().map(move |(name, kind, levels)| {
-            let mut name = name.clone();
+        self.columns.iter().map(move |(path, kind, levels)| {
+            let mut name = path.clone();
+            if !is_nested {
+                name = path.replace(LIST, "");
+            }
             while taken.contains(&name.as_str()) || names.contains(&name) {
                 name.push('_');
             }
             names.push(name.clone());
-            TableColumn::full(name, *kind, *levels)
+            TableColumn {
+                is_nested,
+                ..TableColumn::full(name, *kind, *levels)
+            }
         })
     }
 
@@ -179,7 +221,8 @@ impl DecodePlan<'_> {
             return Ok((vec![step], bytes(1)));
         }
         let start = self.columns.len();
-        let (element, least) = self.one(message, &field.kind, name, levels + 1, depth)?;
+        let name = format!("{name}{LIST}");
+        let (element, least) = self.one(message, &field.kind, &name, levels + 1, depth)?;
         let list = DecodeStep::List {
             count,
             columns: start..self.columns.len(),
@@ -215,18 +258,20 @@ impl DecodePlan<'_> {
             "float64" => number(ColumnKind::F64, 8),
             "string" => Ok((Primitive::Text, 4)),
             "wstring" => Err("wide strings are not decoded".to_owned()),
-            "time" | "duration" if !self.is_cdr => {
-                let sec = if kind == "time" { "uint32" } else { "int32" };
-                let nanosec = if kind == "time" { "uint32" } else { "int32" };
-                let (mut steps, _) =
-                    self.one(message, sec, &format!("{name}.sec"), levels, depth)?;
-                let nanosec =
-                    self.one(message, nanosec, &format!("{name}.nanosec"), levels, depth)?;
-                steps.extend(nanosec.0);
-                return Ok((steps, 8));
+            "time" if !self.is_cdr => return Ok(self.time(name, levels)),
+            "duration" if !self.is_cdr => {
+                let mut part = |part| {
+                    let name = format!("{name}.{part}");
+                    self.one(message, "int32", &name, levels, depth)
+                };
+                let (sec, nanosec) = (part("sec")?, part("nanosec")?);
+                return Ok(([sec.0, nanosec.0].concat(), 8));
             }
             _ => {
                 let inner = self.definition.find(message, kind)?;
+                if self.definition.messages[inner].is_time() {
+                    return Ok(self.time(name, levels));
+                }
                 return self.message(inner, &format!("{name}."), levels, depth + 1);
             }
         };
@@ -238,6 +283,16 @@ impl DecodePlan<'_> {
         };
         self.columns.push((name.to_owned(), kind, levels));
         Ok((vec![DecodeStep::One(column, primitive)], least))
+    }
+}
+
+impl DecodePlan<'_> {
+    /// The step of a time.
+    fn time(&mut self, name: &str, levels: usize) -> (Vec<DecodeStep>, usize) {
+        let step = DecodeStep::Time(self.columns.len());
+        self.columns
+            .push((name.to_owned(), ColumnKind::Time, levels));
+        (vec![step], 8)
     }
 }
 
@@ -259,6 +314,19 @@ fn run(
                 let bytes = payload.bytes(count)?;
                 if let ColumnValues::Texts(to) = &mut columns[*column].values {
                     to.push(bytes);
+                }
+            }
+            DecodeStep::Time(column) => {
+                // Of 32 bits in ROS 1 unsigned, in ROS 2 signed: the same until 2038.
+                let sec = payload.u32()?;
+                let sec = if payload.is_cdr() {
+                    i64::from(sec.cast_signed())
+                } else {
+                    i64::from(sec)
+                };
+                let nanosec = i64::from(payload.u32()?);
+                if let ColumnValues::I64(to) = &mut columns[*column].values {
+                    to.push(sec * 1_000_000_000 + nanosec);
                 }
             }
             DecodeStep::List {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Conclusions, ElementKey, Proof, Validity};
 use crate::base::time::Stamp;
+use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, ClaimRecord, SourceId};
 
 impl Conclusions<'_> {
@@ -90,7 +91,7 @@ impl Conclusions<'_> {
         fact: &ClaimRecord,
         endings: &BTreeMap<Claim, Vec<Stamp>>,
     ) -> (Vec<Stamp>, Vec<Stamp>) {
-        let signs = self.times(fact);
+        let mut signs = self.times(fact);
         let ending = match fact.claim {
             Claim::Node(node) => Some(Claim::NodeGone(node)),
             Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
@@ -105,15 +106,31 @@ impl Conclusions<'_> {
         let snapshots = fact
             .snapshot
             .and_then(|name| endings.get(&Claim::Snapshot(name)));
-        ends.extend(
-            snapshots
-                .map(|taken| absences(&signs, taken))
-                .unwrap_or_default(),
-        );
+        if let Some(taken) = snapshots {
+            let mut absent = absences(&signs, taken);
+            if SOURCES.get(fact.source).is_some_and(|source| source.holds) {
+                hold(&mut signs, taken);
+                hold(&mut absent, taken);
+            }
+            ends.extend(absent);
+        }
         ends.sort_unstable();
         ends.dedup();
         (signs, ends)
     }
+}
+
+/// Adds to the times of snapshots that show something the last moments before the next ones.
+fn hold(times: &mut Vec<Stamp>, snapshots: &[Stamp]) {
+    let next = |time: &Stamp| snapshots.get(snapshots.partition_point(|t| t <= time));
+    let last: Vec<Stamp> = times
+        .iter()
+        .filter_map(next)
+        .map(|next| next.plus(-1))
+        .collect();
+    times.extend(last);
+    times.sort_unstable();
+    times.dedup();
 }
 
 /// The longest time from a client's connection to its refusal, in nanoseconds: both are logged together.

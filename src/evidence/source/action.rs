@@ -26,7 +26,7 @@ pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let seq = payload.header()?;
+    payload.header()?;
     let mut ids = Vec::new();
     for _ in 0..payload.length(17)? {
         payload.time()?;
@@ -35,7 +35,6 @@ pub(crate) fn read(
         payload.skip_string()?;
     }
     payload.finish()?;
-    heard.sequence(seq);
     let topic = heard.stream.connection.topic.shared();
     let Some(action) = topic.strip_suffix("/status") else {
         return Ok(());

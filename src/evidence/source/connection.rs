@@ -7,6 +7,9 @@ use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validi
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
+        if stream.is_about() {
+            continue;
+        }
         let proof = |what, when| Proof {
             what,
             source,

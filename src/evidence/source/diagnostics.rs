@@ -1,5 +1,5 @@
 //! Diagnostics: the name of a status begins with its node (`ns/node: …`); a node that publishes `/diagnostics_agg`
-//! subscribes `/diagnostics`.
+//! subscribes to `/diagnostics`.
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -45,7 +45,7 @@ pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let seq = payload.header()?;
+    payload.header()?;
     let mut names = Vec::new();
     for _ in 0..payload.length(4)? {
         payload.u8()?;
@@ -58,7 +58,6 @@ pub(crate) fn read(
         }
     }
     payload.finish()?;
-    heard.sequence(seq);
     let topic = heard.stream.connection.topic.as_str();
     if topic == "diagnostics" || topic.ends_with("/diagnostics") {
         for name in names {

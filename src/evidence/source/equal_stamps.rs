@@ -65,9 +65,8 @@ fn is_list(connection: &Connection) -> bool {
     LISTS.contains(&connection.type_name.replacen("/msg/", "/", 1).as_str())
 }
 
-/// Keeps the stamp of a message, together with its log time.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    let connection = &heard.stream.connection;
+/// The stamp at the beginning of a message; `None` for an empty list and for 0.
+fn stamp(connection: &Connection, first_bytes: &[u8]) -> Option<Stamp> {
     let encoding = &connection.encoding;
     let stamp = PayloadCursor::new(encoding, first_bytes).and_then(|mut payload| {
         if is_list(connection) && payload.u32()? == 0 {
@@ -78,9 +77,19 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
         }
         payload.time()
     });
-    if let (Ok(stamp), Some(time)) = (stamp, heard.time)
-        && stamp != Stamp(0)
-    {
+    stamp.ok().filter(|stamp| *stamp != Stamp(0))
+}
+
+/// Keeps the age of a message by its stamp.
+pub(crate) fn age(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
+    if let (Some(stamp), Some(time)) = (stamp(&heard.stream.connection, first_bytes), heard.time) {
+        heard.facts.age(heard.place, time, stamp);
+    }
+}
+
+/// Keeps the stamp of a message, together with its log time.
+pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
+    if let (Some(stamp), Some(time)) = (stamp(&heard.stream.connection, first_bytes), heard.time) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

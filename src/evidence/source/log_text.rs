@@ -5,7 +5,7 @@ use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind, Proof, Validity};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -24,6 +24,20 @@ pub(crate) fn read(
             Claim::SaysSubscribe(node, of)
         };
         heard.claim(claim, Degree::Stated, String::new);
+        if record.text.contains("incompatible QoS") {
+            let policy = record.text.split_once("incompatible policy: ");
+            let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
+            let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
+            let policy = heard.name(&policy);
+            let claim = if publishes {
+                Claim::Starves(node, of, policy)
+            } else {
+                Claim::Starved(node, of, policy)
+            };
+            heard.claim(claim, Degree::Stated, || {
+                format!("{} logs: {}", record.logger, record.text)
+            });
+        }
     }
     Ok(())
 }
@@ -84,9 +98,11 @@ fn named(text: &str) -> Option<(bool, &str)> {
 /// Adds edges only for topics of the bag: a text may mean a device or a file.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.claims(source) {
-        let (logger, topic, publishes) = match fact.claim {
-            Claim::SaysPublish(logger, topic) => (logger, topic, true),
-            Claim::SaysSubscribe(logger, topic) => (logger, topic, false),
+        let (logger, topic, publishes, policy) = match fact.claim {
+            Claim::SaysPublish(logger, topic) => (logger, topic, true, None),
+            Claim::SaysSubscribe(logger, topic) => (logger, topic, false, None),
+            Claim::Starves(logger, topic, policy) => (logger, topic, true, Some(policy)),
+            Claim::Starved(logger, topic, policy) => (logger, topic, false, Some(policy)),
             _ => continue,
         };
         let Some(node) = known.owner(&known.text(logger)) else {
@@ -102,6 +118,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             ElementKey::Subscribe(topic, node)
         };
         if known.denies(what) {
+            continue;
+        }
+        if let Some(policy) = policy {
+            let starved = IncidentKind::Starved(known.text(policy));
+            for time in signs {
+                known.incident(source, what, starved.clone(), time);
+            }
             continue;
         }
         let first = signs.first().copied();

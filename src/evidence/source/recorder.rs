@@ -28,7 +28,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be told apart.
+/// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be distinguished.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = known.facts.list.iter().filter(|fact| fact.source == source);
     let told = told.filter_map(|fact| match fact.claim {
@@ -49,7 +49,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     if recorders.len() != 1 {
         return;
     }
-    let topics: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
+    let robots = known.streams.iter().filter(|s| !s.is_about());
+    let topics: BTreeSet<Name> = robots.map(|s| s.topic).collect();
     for recorder in recorders {
         for topic in &topics {
             known.prove(Proof {

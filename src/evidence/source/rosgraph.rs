@@ -1,14 +1,20 @@
-//! `/rosgraph` of graph-monitor: the whole graph of ROS 2 over time, each message a snapshot.
+//! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, and `/nodl/observed_node` of
+//! nodl, each message one node.
 //!
-//! Its definition has moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`), so a message is parsed by the
-//! definition in the bag, or by the built-in one that it fits exactly.
+//! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message is parsed by
+//! the definition in the bag, or by the built-in one that it fits exactly.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree, Statement};
+use crate::base::name::UNKNOWN_NODE;
+use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
+use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
 
 /// `rosgraph_msgs/msg/Graph`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -24,26 +30,75 @@ pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout {
     ..SHAPE
 };
 
+/// `rosgraph_msgs/msg/Node`.
+pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout {
+    type_name: "rosgraph_msgs/Node",
+    ..SHAPE
+};
+
+/// The types that no form has changed, and those of the two forms of 2026, whose messages are in the order in which nodl
+/// and the core interfaces have them: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
+const COMMON: &[(&str, &str)] = &[
+    ("InterfaceType", "string name;TypeHash hash"),
+    ("TypeHash", "byte version;byte[32] value"),
+    ("QoSProfile", QOS),
+    ("QosProfile", QOS),
+    (
+        "ParameterDescriptor",
+        "string name;byte type;string description;string additional_constraints;byte read_only;byte dynamic_typing;\
+         FloatingPointRange[] floating_point_range;IntegerRange[] integer_range",
+    ),
+    (
+        "FloatingPointRange",
+        "float64 from_value;float64 to_value;float64 step",
+    ),
+    (
+        "IntegerRange",
+        "int64 from_value;int64 to_value;uint64 step",
+    ),
+    (
+        "ParameterValue",
+        "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;\
+         byte[] byte_array_value;byte[] bool_array_value;int64[] integer_array_value;\
+         float64[] double_array_value;string[] string_array_value",
+    ),
+];
 const QOS: &str = "uint32 depth;Duration deadline;Duration lifespan;byte history;byte reliability;byte durability;\
                    byte liveliness;Duration liveliness_lease_duration";
-const DESCRIPTOR: &str = "string name;byte type;string description;string additional_constraints;byte read_only;\
-                          byte dynamic_typing;FloatingPointRange[] floating_point_range;IntegerRange[] integer_range";
-const VALUE: &str = "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;\
-                     byte[] byte_array_value;byte[] bool_array_value;int64[] integer_array_value;\
-                     float64[] double_array_value;string[] string_array_value";
-const INTERFACE: &str = "string name;TypeHash hash";
-const NODE: &str = "string name;Topic[] publishers;Topic[] subscriptions;ParameterDescriptor[] parameters;\
-                    ParameterValue[] parameter_values";
-const NODE_2026: &str = "ParameterDescriptor[] parameters;Topic[] publishers;Topic[] subscriptions;\
-                         Service[] service_clients;Service[] service_servers;Action[] action_clients;\
-                         Action[] action_servers;string name;ParameterValue[] parameter_values";
+const OLD_NODE: &str = "string name;Topic[] publishers;Topic[] subscriptions;ParameterDescriptor[] parameters;\
+                        ParameterValue[] parameter_values";
+const TOPIC: (&str, &str) = ("Topic", "string name;InterfaceType type;QoSProfile qos");
 
-/// The definitions of `rosgraph_msgs` (2026) and of `rosgraph_monitor_msgs` 0.2 and 0.1.
-const KNOWN: [&[(&str, &str)]; 3] = [
+/// The types of each form besides [`COMMON`], the newest first.
+const FORMS: [&[(&str, &str)]; 4] = [
     &[
-        ("", "Node[] nodes"),
-        ("Node", NODE_2026),
-        ("Topic", "string name;InterfaceType type;QoSProfile qos"),
+        ("Graph", "Node[] nodes"),
+        (
+            "Node",
+            "string name;ParameterDescriptor[] parameters;ParameterValue[] parameter_values;Topic[] publishers;\
+             Topic[] subscriptions;Service[] service_clients;Service[] service_servers;Action[] action_clients;\
+             Action[] action_servers",
+        ),
+        TOPIC,
+        (
+            "Service",
+            "string name;InterfaceType request_type;QoSProfile request_qos;InterfaceType response_type;\
+             QoSProfile response_qos",
+        ),
+        (
+            "Action",
+            "string name;Service send_goal;Service get_result;Service cancel_goal;Topic feedback;Topic status",
+        ),
+    ],
+    &[
+        ("Graph", "Node[] nodes"),
+        (
+            "Node",
+            "ParameterDescriptor[] parameters;Topic[] publishers;Topic[] subscriptions;Service[] service_clients;\
+             Service[] service_servers;Action[] action_clients;Action[] action_servers;string name;\
+             ParameterValue[] parameter_values",
+        ),
+        TOPIC,
         (
             "Service",
             "string name;InterfaceType request_type;InterfaceType response_type",
@@ -52,118 +107,237 @@ const KNOWN: [&[(&str, &str)]; 3] = [
             "Action",
             "string name;InterfaceType request_type;InterfaceType response_type;InterfaceType feedback_type",
         ),
-        ("InterfaceType", INTERFACE),
-        ("TypeHash", "byte version;byte[32] value"),
-        ("QoSProfile", QOS),
-        ("ParameterDescriptor", DESCRIPTOR),
-        (
-            "FloatingPointRange",
-            "float64 from_value;float64 to_value;float64 step",
-        ),
-        (
-            "IntegerRange",
-            "int64 from_value;int64 to_value;uint64 step",
-        ),
-        ("ParameterValue", VALUE),
     ],
     &[
-        ("", "Time timestamp;NodeInfo[] nodes"),
-        ("NodeInfo", NODE),
+        ("Graph", "Time timestamp;NodeInfo[] nodes"),
+        ("NodeInfo", OLD_NODE),
         ("Topic", "string name;string type;QosProfile qos"),
-        ("QosProfile", QOS),
-        ("ParameterDescriptor", DESCRIPTOR),
-        (
-            "FloatingPointRange",
-            "float64 from_value;float64 to_value;float64 step",
-        ),
-        (
-            "IntegerRange",
-            "int64 from_value;int64 to_value;uint64 step",
-        ),
-        ("ParameterValue", VALUE),
     ],
     &[
-        ("", "Time timestamp;NodeInfo[] nodes"),
-        ("NodeInfo", NODE),
+        ("Graph", "Time timestamp;NodeInfo[] nodes"),
+        ("NodeInfo", OLD_NODE),
         ("Topic", "string name;QosProfile qos;string type"),
-        ("QosProfile", QOS),
-        ("ParameterDescriptor", DESCRIPTOR),
-        (
-            "FloatingPointRange",
-            "float64 from_value;float64 to_value;float64 step",
-        ),
-        (
-            "IntegerRange",
-            "int64 from_value;int64 to_value;uint64 step",
-        ),
-        ("ParameterValue", VALUE),
     ],
 ];
 
+/// Reads a snapshot of the whole graph.
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let definition = heard.stream.connection.definition.clone();
-    let graph = match definition.as_deref() {
-        Some(text) if text.contains("nodes") && !text.contains("struct ") => {
-            MessageSchema::of_text(text).read(payload)?
-        }
-        _ => guess(payload)?,
-    };
+    let graph = parsed(heard, payload, "Graph", "nodes")?;
+    snapshot(heard, graph.list("nodes"), "");
+    Ok(())
+}
+
+/// Reads a snapshot of one node.
+pub(crate) fn read_node(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let node = parsed(heard, payload, "Node", "publishers")?;
+    let name = node.text("name").to_owned();
+    snapshot(heard, &[node], &name);
+    Ok(())
+}
+
+/// A message of this type, by the definition in the bag or the first form that uses the payload up exactly.
+fn parsed(
+    heard: &SourceContext<'_>,
+    payload: &PayloadCursor<'_>,
+    name: &str,
+    field: &str,
+) -> cursor::PayloadResult<MessageValue> {
+    let text = heard.stream.connection.definition.as_deref();
+    // Some writers list the outermost fields only.
+    let own = text.filter(|text| text.contains(field) && !text.contains("struct "));
+    let own = own.map(MessageSchema::of_text);
+    let forms = FORMS.iter().filter_map(|form| {
+        let (_, fields) = form.iter().find(|(own, _)| *own == name)?;
+        let all = [("", *fields)]
+            .into_iter()
+            .chain(form.iter().chain(COMMON).copied());
+        Some(MessageSchema::of_fields(&all.collect::<Vec<_>>()))
+    });
+    let read = |schema: MessageSchema| schema.read(&mut payload.clone()).ok();
+    own.into_iter()
+        .chain(forms)
+        .find_map(read)
+        .ok_or(payload.wrong("a graph"))
+}
+
+/// An end of a topic in a snapshot.
+struct SnapshotEnd<'a> {
+    node: Name,
+    topic: Cow<'a, str>,
+    qos: Option<&'a MessageValue>,
+}
+
+/// Adds the claims of nodes in one snapshot; `of` tells snapshots of single nodes apart.
+fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
     let topic = heard.stream.connection.topic.shared();
-    let group = heard.name(&format!("snapshot {topic}"));
+    let group = heard.name(format!("snapshot {topic} {of}").trim_end());
     let now = |claim| Statement {
         claim,
         degree: Degree::Stated,
         snapshot: Some(group),
     };
-    for node in graph.list("nodes") {
+    let (mut offered, mut asked, mut seen) = (Vec::new(), Vec::new(), BTreeSet::new());
+    for node in nodes {
         let name = node.text("name");
         if name.is_empty() {
             continue;
         }
+        if name == UNKNOWN_NODE {
+            for (_, topic, kind, _) in ends(node) {
+                let (of, kind) = (heard.name(&topic), heard.name(kind));
+                heard.say(now(Claim::Topic(of)), || format!("{topic} is in the graph"));
+                heard.say(now(Claim::Type(of, kind)), String::new);
+            }
+            continue;
+        }
         let id = heard.name(name);
         heard.say(now(Claim::Node(id)), || format!("{name} is in the graph"));
-        for end in node.list("publishers") {
-            let (of, kind) = endpoint(heard, end);
-            heard.say(now(Claim::Publish(id, of)), || {
-                format!("{name} publishes {}", end.text("name"))
-            });
-            heard.say(now(Claim::Type(of, kind)), String::new);
+        if !seen.insert(name) {
+            let twice = || format!("{name} is twice in the graph");
+            heard.claim(Claim::Duplicate(id), Degree::Stated, twice);
         }
-        for end in node.list("subscriptions") {
-            let (of, kind) = endpoint(heard, end);
-            heard.say(now(Claim::Subscribe(id, of)), || {
-                format!("{name} subscribes to {}", end.text("name"))
+        for (is_sent, topic, kind, qos) in ends(node) {
+            let (of, kind) = (heard.name(&topic), heard.name(kind));
+            let (claim, verb) = if is_sent {
+                (Claim::Publish(id, of), "publishes")
+            } else {
+                (Claim::Subscribe(id, of), "subscribes to")
+            };
+            heard.say(now(claim), || format!("{name} {verb} {topic}"));
+            if !heard.facts.text(kind).is_empty() {
+                heard.say(now(Claim::Type(of, kind)), String::new);
+            }
+            let all = if is_sent { &mut offered } else { &mut asked };
+            all.push(SnapshotEnd {
+                node: id,
+                topic,
+                qos,
             });
-            heard.say(now(Claim::Type(of, kind)), String::new);
+        }
+    }
+    for end in &asked {
+        let own = offered.iter().filter(|other| other.topic == end.topic);
+        let mut policies = own.map(|other| incompatible(other.qos?, end.qos?));
+        if let Some(Some(policy)) = policies.next()
+            && policies.all(|p| p.is_some())
+        {
+            let (topic, policy) = (heard.name(&end.topic), heard.name(policy));
+            let claim = Claim::Starved(end.node, topic, policy);
+            heard.claim(claim, Degree::Stated, || {
+                "no publisher offers what it asks for".to_owned()
+            });
         }
     }
     heard.claim(Claim::Snapshot(group), Degree::Stated, String::new);
-    Ok(())
 }
 
-/// The topic of an endpoint, and its type.
-fn endpoint(
-    heard: &mut SourceContext<'_>,
-    end: &MessageValue,
-) -> (crate::evidence::claim::Name, crate::evidence::claim::Name) {
-    let kind = match end.field("type") {
+/// An end in a message: whether it is sent, the topic, its type and its quality of service.
+type MessageEnd<'a> = (bool, Cow<'a, str>, &'a str, Option<&'a MessageValue>);
+
+/// The ends of a node in the order of the message. A service is a topic that its clients write to and its server reads;
+/// of an action feedback and status are topics.
+fn ends(node: &MessageValue) -> Vec<MessageEnd<'_>> {
+    let mut all: Vec<MessageEnd<'_>> = Vec::new();
+    for (field, is_sent) in [("publishers", true), ("subscriptions", false)] {
+        let ends = node.list(field).iter();
+        all.extend(ends.map(|end| topic(end, is_sent)));
+    }
+    for (field, is_sent) in [("service_clients", true), ("service_servers", false)] {
+        for service in node.list(field) {
+            let kind = kind(service, "request_type");
+            let kind = kind.strip_suffix("_Request").unwrap_or(kind);
+            // Every node has services of its parameters, which say nothing about this one.
+            let package = kind.split('/').next().unwrap_or_default();
+            if !["rcl_interfaces", "type_description_interfaces"].contains(&package) {
+                all.push((is_sent, service.text("name").into(), kind, None));
+            }
+        }
+    }
+    for (field, is_sent) in [("action_servers", true), ("action_clients", false)] {
+        for action in node.list(field) {
+            for part in ["feedback", "status"] {
+                let unnamed = || {
+                    let name = format!("{}/_action/{part}", action.text("name"));
+                    (is_sent, name.into(), "", None)
+                };
+                all.push(
+                    action
+                        .field(part)
+                        .map_or_else(unnamed, |end| topic(end, is_sent)),
+                );
+            }
+        }
+    }
+    all.retain(|(_, name, ..)| !name.is_empty());
+    all
+}
+
+/// One end of a topic.
+fn topic(end: &MessageValue, is_sent: bool) -> MessageEnd<'_> {
+    (
+        is_sent,
+        end.text("name").into(),
+        kind(end, "type"),
+        end.field("qos"),
+    )
+}
+
+/// The name of a type, which is a text or has one.
+fn kind<'a>(end: &'a MessageValue, field: &str) -> &'a str {
+    match end.field(field) {
         Some(MessageValue::Text(kind)) => kind,
         Some(interface) => interface.text("name"),
         None => "",
-    };
-    let kind = heard.name(kind);
-    (heard.name(end.text("name")), kind)
+    }
 }
 
-/// The graph, parsed by the first definition that uses the payload up exactly.
-fn guess(payload: &mut PayloadCursor<'_>) -> cursor::PayloadResult<MessageValue> {
-    let fits = |fields: &&[(&str, &str)]| {
-        MessageSchema::of_fields(fields)
-            .read(&mut payload.clone())
-            .ok()
+/// The policy by which a subscriber gets nothing: it asks for more than is offered (DDS 1.4, section 2.2.3). Policies that
+/// are not known fit.
+fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static str> {
+    let is =
+        |qos: &MessageValue, policy, value| qos.field(policy) == Some(&MessageValue::Byte(value));
+    let nanos = |qos: &MessageValue, policy| -> Option<i128> {
+        let duration = qos.field(policy)?;
+        let part = |name| match duration.field(name) {
+            Some(MessageValue::Number(number)) => *number,
+            _ => None,
+        };
+        // 0 and the largest number of seconds stand for no limit.
+        let (sec, nanosec) = (part("sec")?, part("nanosec")?);
+        Some(sec * 1_000_000_000 + nanosec).filter(|n| *n > 0 && sec < i128::from(i32::MAX))
     };
-    KNOWN.iter().find_map(fits).ok_or(payload.wrong("a graph"))
+    if is(offered, "reliability", 2) && is(asked, "reliability", 1) {
+        return Some("reliability");
+    }
+    if is(offered, "durability", 2) && is(asked, "durability", 1) {
+        return Some("durability");
+    }
+    let asked_for = nanos(asked, "deadline")?;
+    let is_late = nanos(offered, "deadline").is_none_or(|offered| offered > asked_for);
+    is_late.then_some("deadline")
+}
+
+/// Adds the subscribers that get nothing, and the names that are used twice.
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+    for fact in known.facts.list.clone() {
+        let (what, kind) = match fact.claim {
+            _ if fact.source != source => continue,
+            Claim::Starved(node, topic, policy) => (
+                ElementKey::Subscribe(topic, node),
+                IncidentKind::Starved(known.text(policy)),
+            ),
+            Claim::Duplicate(node) => (ElementKey::Node(node), IncidentKind::Duplicate),
+            _ => continue,
+        };
+        // Each snapshot repeats it.
+        if let Some(time) = known.times(&fact).first() {
+            known.incident(source, what, kind, *time);
+        }
+    }
 }

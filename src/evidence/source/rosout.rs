@@ -16,7 +16,7 @@ pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let seq = payload.header()?;
+    payload.header()?;
     payload.u8()?;
     let name = payload.string()?;
     let message = payload.string()?;
@@ -28,7 +28,6 @@ pub(crate) fn read(
         .map(|_| payload.string())
         .collect::<cursor::PayloadResult<Vec<_>>>()?;
     payload.finish()?;
-    heard.sequence(seq);
     if name.is_empty() {
         return Ok(());
     }

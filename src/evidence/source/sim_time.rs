@@ -1,4 +1,4 @@
-//! `use_sim_time` in parameter events of ROS 2: a node that runs by simulated time subscribes `/clock`.
+//! `use_sim_time` in parameter events of ROS 2: a node that runs by simulated time subscribes to `/clock`.
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree};

@@ -2,7 +2,8 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree};
+use crate::base::time::Span;
+use crate::evidence::claim::{Claim, Degree, Measurement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 
@@ -26,13 +27,32 @@ pub(crate) fn read(
     let topic = payload.string()?;
     let publisher = payload.string()?;
     let subscriber = payload.string()?;
-    payload.time()?;
-    payload.time()?;
-    let delivered = payload.i32()?;
-    payload.bytes(2 * 4 + 6 * 8)?;
+    let (start, end) = (payload.time()?, payload.time()?);
+    let (delivered, dropped) = (payload.i32()?, payload.i32()?);
+    let traffic = payload.i32()?;
+    let mut durations = [0; 6];
+    for nanos in &mut durations {
+        *nanos = payload.duration()?;
+    }
     payload.finish()?;
     let words = || format!("{publisher} → {topic} → {subscriber}: {delivered} messages delivered");
     let of = heard.name(topic);
+    let mut end_of = |node: &str| (!node.is_empty()).then(|| heard.name(node));
+    let (from, to) = (end_of(publisher), end_of(subscriber));
+    let count = |n: i32| u64::try_from(n).ok();
+    let [period, jitter, _, age, _, oldest] = durations;
+    heard.measure(Measurement {
+        topic: of,
+        publisher: from,
+        subscriber: to,
+        span: Span { start, end },
+        count: count(delivered).unwrap_or(0),
+        drops: count(dropped),
+        bytes: count(traffic),
+        jitter_ns: Some(jitter).filter(|_| period > 0),
+        // Of messages without a header there is no age.
+        age_ns: Some(age).filter(|_| oldest != 0),
+    });
     if !publisher.is_empty() {
         let node = heard.name(publisher);
         heard.claim(Claim::Publish(node, of), Degree::Measured, words);

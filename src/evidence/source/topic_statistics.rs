@@ -3,7 +3,8 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::claim::{Claim, Degree, Measurement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
 
@@ -26,6 +27,8 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 
 /// The kind of statistic that a publisher measures; all others are a subscriber's.
 const PUBLISHED_PERIOD: u8 = 0;
+/// The kind that is the time from publishing to taking.
+const AGE: u8 = 2;
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -36,18 +39,35 @@ pub(crate) fn read(
     for _ in 0..payload.length(37)? {
         let kind = payload.u8()?;
         let (node, topic, count) = (payload.string()?, payload.string()?, payload.i32()?);
-        for _ in 0..3 {
-            payload.time()?;
-        }
-        all.push((kind, node, topic, count));
+        let mean = payload.duration()?;
+        payload.duration()?;
+        payload.duration()?;
+        all.push((kind, node, topic, count, mean));
     }
     payload.finish()?;
-    for (kind, node, topic, count) in all {
+    for (kind, node, topic, count, mean) in all {
         let (name, of) = (heard.name(node), heard.name(topic));
         let (verb, claim) = match kind {
             PUBLISHED_PERIOD => ("publishes", Claim::Publish(name, of)),
             _ => ("receives", Claim::Subscribe(name, of)),
         };
+        if kind == AGE && count > 0 {
+            heard.measure(Measurement {
+                topic: of,
+                publisher: None,
+                subscriber: Some(name),
+                // The collector reports once a second.
+                span: Span {
+                    start: Stamp(0),
+                    end: Stamp(1_000_000_000),
+                },
+                count: u64::try_from(count).unwrap_or(0),
+                drops: None,
+                bytes: None,
+                jitter_ns: None,
+                age_ns: Some(mean),
+            });
+        }
         // A statistic over no message says no more than that the endpoint is there.
         let degree = if count > 0 {
             Degree::Measured

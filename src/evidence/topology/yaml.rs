@@ -1,5 +1,6 @@
-//! Our own form of a topology: under `nodes` each node with `publishes`, `subscribes`, and `start` and `end` in seconds
-//! after the bag's start.
+//! Graphs in YAML. Our own form has under `nodes` each node with `publishes`, `subscribes`, `services`, `clients`, `actions`,
+//! `action_clients`, and `start` and `end` in seconds after the bag's start. Other tools list nodes (`/rosgraph` as
+//! `ros2 topic echo` prints it, the `architecture.yaml` of CARET), or describe a single one (`NoDL` 2).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,17 +14,63 @@ use crate::base::yaml;
 const HINT: &str =
     "write `nodes:`, then below it `/name: {publishes: [/a], subscribes: [/b], start: 0, end: 60}`";
 
+/// The part that a node has in a topic, a service or an action.
+#[derive(Clone, Copy)]
+enum EndKind {
+    Publishes,
+    Subscribes,
+    Serves,
+    Calls,
+    Acts,
+    Asks,
+}
+
+/// The keys of lists of ends: in our form, and in those of others.
+const ENDS: [(&str, EndKind); 11] = [
+    ("publishes", EndKind::Publishes),
+    ("publishers", EndKind::Publishes),
+    ("subscribes", EndKind::Subscribes),
+    ("subscriptions", EndKind::Subscribes),
+    ("services", EndKind::Serves),
+    ("service_servers", EndKind::Serves),
+    ("clients", EndKind::Calls),
+    ("service_clients", EndKind::Calls),
+    ("actions", EndKind::Acts),
+    ("action_servers", EndKind::Acts),
+    ("action_clients", EndKind::Asks),
+];
+
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     let file = TopologyYaml::new(path, text);
     let data = yaml::parse(text).map_err(|e| bad(path, e.line, e.reason, HINT))?;
-    let Some(Value::Object(nodes)) = data.get("nodes") else {
-        return Err(file.wrong("nodes", "there is no mapping `nodes`"));
-    };
     let mut topology = Topology::default();
-    for (name, value) in nodes {
-        topology.entries.extend(file.node(name, value)?);
+    match data.get("nodes") {
+        Some(Value::Object(nodes)) => {
+            for (name, value) in nodes {
+                topology.entries.extend(file.node(name, value)?);
+            }
+        }
+        Some(Value::Array(nodes)) => {
+            for node in nodes {
+                let name = text_of(node, &["name", "node_name"]);
+                let name = name.ok_or_else(|| file.wrong("nodes", "a node has no `name`"))?;
+                topology.entries.extend(file.node_of_others(name, node)?);
+            }
+        }
+        _ if data.get("nodl_version").is_some() => {
+            // The file's name is the node's: `planner.nodl.yaml`.
+            let name = crate::bag::file_name(path);
+            let name = name.split('.').next().unwrap_or_default();
+            topology.entries.extend(file.node_of_others(name, &data)?);
+        }
+        _ => return Err(file.wrong("nodes", "there is no mapping `nodes`")),
     }
     Ok(topology)
+}
+
+/// The first of these fields that is a text.
+fn text_of<'a>(value: &'a Value, keys: &[&str]) -> Option<&'a str> {
+    keys.iter().find_map(|key| value.get(key)?.as_str())
 }
 
 /// The most lines with the same beginning that are searched for the first one.
@@ -67,8 +114,10 @@ impl<'a> TopologyYaml<'a> {
             Value::Object(fields) => fields,
             _ => return Err(self.wrong(name, &format!("`{name}` holds no mapping"))),
         };
-        let known = ["publishes", "subscribes", "start", "end"];
-        if let Some(key) = fields.keys().find(|key| !known.contains(&key.as_str())) {
+        let is_known = |key: &str| {
+            ["start", "end"].contains(&key) || ENDS.iter().any(|(known, _)| *known == key)
+        };
+        if let Some(key) = fields.keys().find(|key| !is_known(key)) {
             return Err(self.wrong(key, &format!("unknown key `{key}`")));
         }
         let (from_ns, to_ns) = (
@@ -81,26 +130,49 @@ impl<'a> TopologyYaml<'a> {
             let reason = format!("the end of `{name}` lies before its start");
             return Err(self.wrong(name, &reason));
         }
-        let node = resolved(name);
-        let entry = |element| TopologyEntry {
-            element,
-            from_ns,
-            to_ns,
-            declared: false,
-            place: place(self.path, self.line(name)),
-        };
-        let mut entries = vec![entry(NamedElement::Node(node.clone()))];
-        for topic in self.names(fields.get("publishes"), name)? {
-            entries.push(entry(NamedElement::Publish(node.clone(), topic)));
-        }
-        for topic in self.names(fields.get("subscribes"), name)? {
-            entries.push(entry(NamedElement::Subscribe(node.clone(), topic)));
+        let mut entries = self.node_of_others(name, value)?;
+        for entry in &mut entries {
+            (entry.from_ns, entry.to_ns) = (from_ns, to_ns);
         }
         Ok(entries)
     }
 
+    /// A node with its ends; other keys mean nothing here.
+    fn node_of_others(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
+        let node = resolved(name);
+        let entry = |element| TopologyEntry {
+            element,
+            from_ns: None,
+            to_ns: None,
+            declared: false,
+            place: place(self.path, self.line(name)),
+        };
+        let mut entries = vec![entry(NamedElement::Node(node.clone()))];
+        for (key, kind) in ENDS {
+            for topic in self.names(value.get(key), &node)? {
+                let publishes = |topic| NamedElement::Publish(node.clone(), topic);
+                let subscribes = |topic| NamedElement::Subscribe(node.clone(), topic);
+                let parts = || ["feedback", "status"].map(|part| format!("{topic}/_action/{part}"));
+                match kind {
+                    EndKind::Publishes | EndKind::Calls => entries.push(entry(publishes(topic))),
+                    EndKind::Subscribes | EndKind::Serves => entries.push(entry(subscribes(topic))),
+                    EndKind::Acts => entries.extend(parts().map(publishes).map(entry)),
+                    EndKind::Asks => entries.extend(parts().map(subscribes).map(entry)),
+                }
+            }
+        }
+        Ok(entries)
+    }
+
+    /// The names in a list: texts, or mappings with a name; a private name is below its node.
     fn names(&self, value: Option<&Value>, node: &str) -> Result<Vec<String>> {
-        let name = |value: &Value| value.as_str().map(resolved);
+        let name = |value: &Value| {
+            let text = value.as_str().or(text_of(value, &["name", "topic_name"]))?;
+            Some(match text.strip_prefix('~') {
+                Some(private) => format!("{node}/{}", private.trim_start_matches('/')),
+                None => resolved(text),
+            })
+        };
         let names = match value {
             None | Some(Value::Null) => Some(Vec::new()),
             Some(Value::Array(list)) => list.iter().map(name).collect(),
@@ -147,6 +219,42 @@ mod tests {
             .iter()
             .find(|e| e.element == NamedElement::Node("/planner".into()));
         assert_eq!(planner.unwrap().from_ns, Some(2_500_000_000));
+    }
+
+    /// The elements of a file as lines.
+    fn lines(name: &str, text: &str) -> Vec<String> {
+        let entries = read(Path::new(name), text).unwrap().entries;
+        let line = |e: TopologyEntry| match e.element {
+            NamedElement::Publish(node, topic) => format!("{node} > {topic}"),
+            NamedElement::Subscribe(node, topic) => format!("{node} < {topic}"),
+            NamedElement::Node(name) | NamedElement::Topic(name) => name,
+        };
+        entries.into_iter().map(line).collect()
+    }
+
+    #[test]
+    fn graphs_of_other_tools_are_read() {
+        let nodl = "nodl_version: 2\npublishers:\n  - {name: ~/plan, type: nav_msgs/msg/Path}\n\
+                    service_servers:\n  - {name: /clear, type: std_srvs/srv/Empty}\n";
+        assert_eq!(
+            lines("planner.nodl.yaml", nodl),
+            ["/planner", "/planner > /planner/plan", "/planner < /clear"]
+        );
+        let rosgraph = "nodes:\n- name: /a\n  parameters: []\n  subscriptions:\n  - name: /t\n    qos: {depth: 1}\n\
+                        - name: /b\n  action_clients:\n  - name: /go\n";
+        assert_eq!(
+            lines("graph.yaml", rosgraph),
+            [
+                "/a",
+                "/a < /t",
+                "/b",
+                "/b < /go/_action/feedback",
+                "/b < /go/_action/status"
+            ]
+        );
+        let caret = "named_paths: []\nexecutors: []\nnodes:\n- node_name: /a\n  callbacks: []\n  publishes:\n\
+                     \x20 - topic_name: /t\n    callback_names: [x]\n";
+        assert_eq!(lines("architecture.yaml", caret), ["/a", "/a > /t"]);
     }
 
     #[test]

@@ -60,7 +60,7 @@ struct PageData<'a> {
     sides: Option<[&'static str; 2]>,
     /// The window to begin with.
     still: usize,
-    /// The least relative change of a rate that is told.
+    /// The least relative change of a rate that is reported.
     change: f64,
 }
 
@@ -88,7 +88,7 @@ struct GraphData<'a> {
     holds: Vec<Vec<u32>>,
 }
 
-/// The headlines of a window: its place, the number of headlines, the words of the three chips, and for each of the
+/// The headlines of a window, and what is back in it: its place, the number of headlines, the words of the three chips, and for each of the
 /// first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1 for one that is not
 /// drawn), its words, its place in the log.
 #[derive(Serialize)]
@@ -237,10 +237,25 @@ fn graph<'a>(
 fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<ToldData> {
     let mission = page.sequence.mission;
     let frames = page.whole.view.frames.iter().enumerate();
-    let frames = frames.filter(|(_, frame)| !frame.headlines.is_empty());
+    let frames = frames.filter(|(_, frame)| frame.is_changed());
     let parts = mission.ledger.all_parts();
     let told = |(at, frame): (usize, &Frame)| {
-        let chips = chips(&frame.counts).map(|(text, _)| text);
+        let mut chips = chips(&frame.counts).map(|(text, _)| text);
+        let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
+        let returns: Vec<_> = frame
+            .lasting
+            .iter()
+            .filter_map(|last| {
+                let (end, away) = (last.ended?, last.ended?.since(last.since));
+                let (node, topic) = mission.elements.names(last.what);
+                let name = visible(node.or(topic).unwrap_or_default());
+                let text = format!("{name} is back after {}", words::duration(away));
+                Some((clock.secs(end), 2, place(&last.what), text, last.entry))
+            })
+            .collect();
+        if frame.headlines.is_empty() {
+            chips[2] = format!("{} back", returns.len());
+        }
         let lines = frame
             .headlines
             .iter()
@@ -248,11 +263,12 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
             .filter_map(|headline| {
                 let entry = mission.ledger.entries.get(headline.entry as usize)?;
                 let own = parts.get(&headline.entry).map_or(&[][..], |p| &p[..]);
-                let what = places.get(&headline.what).map_or(-1, |at| i64::from(*at));
+                let what = place(&headline.what);
                 let sentence = sentence_with(mission, own, entry);
                 let time = clock.secs(entry.time);
                 Some((time, sign(entry.kind), what, sentence, headline.entry))
-            });
+            })
+            .chain(returns);
         ToldData(at, frame.counts.total(), chips, lines.collect())
     };
     frames.map(told).collect()

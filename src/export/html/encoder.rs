@@ -39,9 +39,11 @@ fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     let board = overview.as_ref().map_or("", |o| &o.title);
     let title = sequence.picture.title().unwrap_or(board);
     let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
+    // The timeline of topics has a row for each, whatever a graph would draw as one.
+    let each = sequence.unfolded.map_or(sequence.view, |u| u.view);
     let page = HtmlPage {
         sequence,
-        whole: whole.map_or_else(|| PageGraph::new(sequence.view, Union::default()), graph),
+        whole: whole.map_or_else(|| PageGraph::new(each, Union::default()), graph),
         folded: folded.map(graph),
         style: chosen,
         dark: dark.as_ref(),

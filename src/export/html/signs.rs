@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::draw::figure::course::LifeLines;
+use crate::draw::figure::marks::Sign;
 use crate::draw::paint::classes::badge_shapes;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{LegendSign, signs};
@@ -54,12 +56,57 @@ pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
     out
 }
 
+/// The meaning of the marks that occur on the timeline, as HTML.
+pub(super) fn timeline(lives: Option<&LifeLines>) -> String {
+    let Some(lives) = lives else {
+        return String::new();
+    };
+    let has = |sign: fn(&Sign) -> bool| lives.marks.iter().any(|mark| sign(&mark.sign));
+    let signs = [
+        (
+            has(|sign| matches!(sign, Sign::Start)),
+            "start",
+            "M18 3v14",
+            "begins",
+        ),
+        (
+            has(|sign| matches!(sign, Sign::End)),
+            "end",
+            "M13 5l10 10m0 -10l-10 10",
+            "ends",
+        ),
+        (
+            has(|sign| matches!(sign, Sign::Dot)),
+            "event",
+            "M13 10l5 -5l5 5l-5 5z",
+            "changes",
+        ),
+        (
+            !lives.handovers.is_empty(),
+            "hand",
+            "M18 3V17m-3 -4l3 4l3 -4",
+            "changes hands",
+        ),
+    ];
+    let mut out = String::new();
+    for (_, class, path, words) in signs.iter().filter(|(occurs, ..)| *occurs) {
+        let _ = write!(
+            out,
+            "<span><svg viewBox=\"0 0 40 20\" class=\"marks\"><path class=\"{class}\" d=\"{path}\"/></svg> {words}</span>"
+        );
+    }
+    out
+}
+
 fn picture(sign: &LegendSign) -> String {
     let front = BOX
         .replace("y=\"4\"", "y=\"7\"")
         .replace("\"26\"", "\"23\"");
     match sign {
-        LegendSign::Node => group("node", "<ellipse cx=\"18\" cy=\"10\" rx=\"15\" ry=\"7\"/>"),
+        LegendSign::Node => group(
+            "node",
+            "<rect x=\"3\" y=\"3\" width=\"30\" height=\"14\" rx=\"7\"/>",
+        ),
         LegendSign::Topic => group("topic", BOX),
         LegendSign::Hub => group("topic", &format!("{BOX}{LINE}")),
         LegendSign::Group => group("topic", &format!("{BOX}{front}")),

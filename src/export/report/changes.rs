@@ -11,7 +11,7 @@ use crate::view::{Frame, Headline, View};
 
 /// The largest number of names given of things of one kind.
 const MOST_NAMES: usize = 12;
-/// The largest number of things of a window that are told one by one.
+/// The largest number of things of a window that are reported one by one.
 const MOST_TOLD: usize = 12;
 
 /// The phases, folded; nothing where there is only one.
@@ -51,7 +51,7 @@ pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> 
     out
 }
 
-/// The kinds of headlines of which several are told together, with their words.
+/// The kinds of headlines of which several are reported together, with their words.
 const TOGETHER: [(Kind, &str, &str); 5] = [
     (Kind::Started, "node", "started"),
     (Kind::Stopped, "node", "stopped"),
@@ -85,7 +85,7 @@ fn told(mission: &Mission, frame: &Frame) -> String {
     parts.join("; ")
 }
 
-/// Whether headlines of this kind are told together; topics of unknown publishers come and go by themselves.
+/// Whether headlines of this kind are reported together; topics of unknown publishers come and go by themselves.
 fn is_together(headline: &Headline) -> bool {
     let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
     kinds && !matches!(headline.what, Element::Topic(_))

@@ -181,7 +181,7 @@ pub(super) fn evidence(mission: &Mission) -> String {
         with.saturating_sub(info.topics_without_subscriber),
     );
     for line in &info.advice {
-        let _ = writeln!(out, "- to know more: {}", plain(line));
+        let _ = writeln!(out, "- to learn more: {}", plain(line));
     }
     for bag in mission.bags.iter().take(50) {
         let state = if bag.complete {

@@ -17,7 +17,22 @@ pub(crate) struct Folder {
     hidden: TempDir,
     /// The guard that removes the hidden folder when a signal ends the process.
     _left: Leftover,
+    /// Dropped after the hidden folder, which stands inside it.
+    _made: Made,
     names: Vec<String>,
+}
+
+/// Folders that were made for the files, the outermost first. Those still empty when it is dropped are removed.
+#[derive(Debug)]
+struct Made(Vec<PathBuf>);
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // Fails where files have appeared, as it should.
+            let _ = fs::remove_dir(folder);
+        }
+    }
 }
 
 impl Folder {
@@ -26,6 +41,11 @@ impl Folder {
     /// # Errors
     /// Where the system refuses.
     pub(crate) fn create(path: &Path) -> Result<Self> {
+        let missing = path
+            .ancestors()
+            .take_while(|f| !f.as_os_str().is_empty() && !f.exists());
+        let mut missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+        missing.reverse();
         fs::create_dir_all(path).map_err(Error::io("make the folder", path))?;
         let mut builder = tempfile::Builder::new();
         let hidden = builder
@@ -37,6 +57,7 @@ impl Folder {
             path: path.to_owned(),
             _left: Leftover::at(hidden.path()),
             hidden,
+            _made: Made(missing),
             names: Vec::new(),
         })
     }
@@ -133,7 +154,7 @@ mod tests {
             folder
         };
         drop(write(b"lost"));
-        assert_eq!(fs::read_dir(dir.path().join("t")).unwrap().count(), 0);
+        assert!(!dir.path().join("t").exists());
         write(b"old").commit().unwrap();
         write(b"new").commit().unwrap();
         assert_eq!(fs::read(dir.path().join("t/b")).unwrap(), b"new!");

@@ -7,7 +7,7 @@ use crate::base::table::{ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::graph::diff::Change;
-use crate::graph::{Edge, EdgeState, Element, NodeId};
+use crate::graph::{Edge, EdgeState, Element, Measures, NodeId, NodeLoad};
 use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Mission, Window};
 
@@ -46,6 +46,10 @@ pub(super) const TABLES: &[Table] = &[
             ("evidence", ColumnKind::Text),
             ("n", ColumnKind::I64),
             ("hz", ColumnKind::F64),
+            ("bytes", ColumnKind::I64),
+            ("drops", ColumnKind::I64),
+            ("jitter_s", ColumnKind::F64),
+            ("age_s", ColumnKind::F64),
             ("first_ns", ColumnKind::Time),
             ("last_ns", ColumnKind::Time),
         ],
@@ -69,6 +73,9 @@ pub(super) const TABLES: &[Table] = &[
             ("hz", ColumnKind::F64),
             ("median_period_s", ColumnKind::F64),
             ("max_gap_s", ColumnKind::F64),
+            ("drops", ColumnKind::I64),
+            ("jitter_s", ColumnKind::F64),
+            ("age_s", ColumnKind::F64),
             ("qos", ColumnKind::Text),
             ("first_ns", ColumnKind::Time),
             ("last_ns", ColumnKind::Time),
@@ -89,6 +96,12 @@ pub(super) const TABLES: &[Table] = &[
             ("degree", ColumnKind::Text),
             ("evidence", ColumnKind::Text),
             ("hz", ColumnKind::F64),
+            ("messages_in", ColumnKind::I64),
+            ("messages_out", ColumnKind::I64),
+            ("bytes_in", ColumnKind::I64),
+            ("bytes_out", ColumnKind::I64),
+            ("topics_in", ColumnKind::I64),
+            ("topics_out", ColumnKind::I64),
             ("lifecycle", ColumnKind::Text),
             ("first_ns", ColumnKind::Time),
             ("last_ns", ColumnKind::Time),
@@ -189,7 +202,15 @@ fn bags(mission: &Mission, row: RowTaker<'_>) {
 fn nodes(mission: &Mission, row: RowTaker<'_>) {
     for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
-        for state in &graph.nodes {
+        for (state, load) in graph.nodes.iter().zip(graph.loads(&mission.elements)) {
+            let [
+                messages_in,
+                messages_out,
+                bytes_in,
+                bytes_out,
+                topics_in,
+                topics_out,
+            ] = load_cells(Some(load));
             let node = &mission.elements.nodes[state.id as usize];
             row(&[
                 win.clone(),
@@ -202,6 +223,12 @@ fn nodes(mission: &Mission, row: RowTaker<'_>) {
                 TableCell::text(state.degree.word()),
                 words(node.evidence),
                 TableCell::known(state.hz, TableCell::Float),
+                messages_in,
+                messages_out,
+                bytes_in,
+                bytes_out,
+                topics_in,
+                topics_out,
                 text(state.lifecycle.as_deref()),
                 time(node.first),
                 time(node.last),
@@ -215,6 +242,7 @@ fn topics(mission: &Mission, row: RowTaker<'_>) {
         let [win, start, end, length] = cells_of(window);
         for state in &graph.topics {
             let topic = &mission.elements.topics[state.id as usize];
+            let [drops, jitter, age] = measure_cells(state.measures);
             row(&[
                 win.clone(),
                 start.clone(),
@@ -230,6 +258,9 @@ fn topics(mission: &Mission, row: RowTaker<'_>) {
                 TableCell::known(state.hz, TableCell::Float),
                 TableCell::known(state.median_period_s, TableCell::Float),
                 TableCell::known(state.max_gap_s, TableCell::Float),
+                drops,
+                jitter,
+                age,
                 text(topic.qos.as_deref()),
                 time(topic.first),
                 time(topic.last),
@@ -243,6 +274,7 @@ fn edges(mission: &Mission, row: RowTaker<'_>) {
     for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
         let mut edge = |what: &'static str, edge: &Edge, state: &EdgeState| {
+            let [drops, jitter, age] = measure_cells(state.measures);
             row(&[
                 win.clone(),
                 start.clone(),
@@ -256,6 +288,10 @@ fn edges(mission: &Mission, row: RowTaker<'_>) {
                 words(edge.evidence),
                 TableCell::known(state.count, TableCell::count),
                 TableCell::known(state.hz, TableCell::Float),
+                TableCell::known(state.bytes, TableCell::count),
+                drops,
+                jitter,
+                age,
                 time(edge.first),
                 time(edge.last),
             ]);
@@ -385,6 +421,7 @@ fn detail<'a>(mission: &Mission, entry: &'a Entry) -> DetailCells<'a> {
     match &entry.detail {
         Detail::None => NO_DETAIL,
         Detail::Rates { from_hz, to_hz } => rates(*from_hz, *to_hz),
+        Detail::Count(many) => values("", many.to_string()),
         Detail::Senders { from, to } => values(names(mission, from), names(mission, to)),
         Detail::Values { from, to } => values(&**from, &**to),
     }
@@ -425,6 +462,30 @@ fn cells_of(window: &Window) -> [TableCell<'static>; 4] {
         start,
         end,
         TableCell::Int(span.nanos()),
+    ]
+}
+
+/// `drops jitter_s age_s`.
+pub(super) fn measure_cells(measures: Measures) -> [TableCell<'static>; 3] {
+    [
+        TableCell::known(measures.drops, TableCell::count),
+        TableCell::known(measures.jitter_s, TableCell::Float),
+        TableCell::known(measures.age_s, TableCell::Float),
+    ]
+}
+
+/// `messages_in messages_out bytes_in bytes_out topics_in topics_out`.
+pub(super) fn load_cells(load: Option<NodeLoad>) -> [TableCell<'static>; 6] {
+    let cell = |value: fn(NodeLoad) -> Option<u64>| {
+        TableCell::known(load.and_then(value), TableCell::count)
+    };
+    [
+        cell(|load| Some(load.messages_in)),
+        cell(|load| Some(load.messages_out)),
+        cell(|load| load.bytes_in),
+        cell(|load| load.bytes_out),
+        cell(|load| Some(load.topics_in.into())),
+        cell(|load| Some(load.topics_out.into())),
     ]
 }
 

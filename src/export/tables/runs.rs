@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use super::mission::{RowTaker, text, time, words};
+use super::mission::{RowTaker, load_cells, measure_cells, text, time, words};
 use crate::base::table::TableCell;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::diff::Change;
-use crate::graph::{self, Edge, Element, State};
+use crate::graph::{self, Edge, Element, Measures, State};
 use crate::mission::Mission;
 
 /// Neighbouring windows in which an element has one state, and between which the ledger tells no change of its rate.
@@ -21,6 +21,7 @@ struct StateRun {
     bytes: Option<u64>,
     gap: Option<f64>,
     median: Option<f64>,
+    measures: Measures,
 }
 
 impl StateRun {
@@ -35,6 +36,7 @@ impl StateRun {
             bytes: row.bytes,
             gap: row.gap.value(),
             median: row.median.value(),
+            measures: row.measures(),
         }
     }
 
@@ -43,12 +45,16 @@ impl StateRun {
         self.last + 1 == at && look == (row.state, row.degree, row.lifecycle)
     }
 
-    /// Takes in the next window, of which a median and the gap to the one before are not known.
+    /// Takes in the next window, of which a median, the gap to the one before, jitter and age of both are not known.
     fn take(&mut self, at: usize, row: &graph::Row) {
         self.last = at;
         self.count = add(self.count, row.count);
         self.bytes = add(self.bytes, row.bytes);
         (self.gap, self.median) = (None, None);
+        self.measures = Measures {
+            drops: add(self.measures.drops, row.drops),
+            ..Measures::default()
+        };
     }
 
     /// Its first window, its times, and its length.
@@ -113,6 +119,14 @@ pub(super) fn nodes(mission: &Mission, row: RowTaker<'_>) {
         for run in runs(mission, &turns, Element::Node(id)) {
             let [win, start, end, length] = run.cells(mission);
             let lifecycle = mission.graphs.lifecycle_of(run.lifecycle);
+            let [
+                messages_in,
+                messages_out,
+                bytes_in,
+                bytes_out,
+                topics_in,
+                topics_out,
+            ] = load_cells(None);
             row(&[
                 win,
                 start,
@@ -124,6 +138,12 @@ pub(super) fn nodes(mission: &Mission, row: RowTaker<'_>) {
                 TableCell::text(run.degree.word()),
                 words(node.evidence),
                 TableCell::known(run.sent(mission).1, TableCell::Float),
+                messages_in,
+                messages_out,
+                bytes_in,
+                bytes_out,
+                topics_in,
+                topics_out,
                 text(lifecycle),
                 time(node.first),
                 time(node.last),
@@ -138,6 +158,7 @@ pub(super) fn topics(mission: &Mission, row: RowTaker<'_>) {
         for run in runs(mission, &turns, Element::Topic(id)) {
             let [win, start, end, length] = run.cells(mission);
             let (count, hz) = run.sent(mission);
+            let [drops, jitter, age] = measure_cells(run.measures);
             row(&[
                 win,
                 start,
@@ -153,6 +174,9 @@ pub(super) fn topics(mission: &Mission, row: RowTaker<'_>) {
                 TableCell::known(hz, TableCell::Float),
                 TableCell::known(run.median, TableCell::Float),
                 TableCell::known(run.gap, TableCell::Float),
+                drops,
+                jitter,
+                age,
                 text(topic.qos.as_deref()),
                 time(topic.first),
                 time(topic.last),
@@ -179,6 +203,7 @@ fn edge_rows(
     for run in runs(mission, turns, what) {
         let [win, start, end, length] = run.cells(mission);
         let (count, hz) = run.sent(mission);
+        let [drops, jitter, age] = measure_cells(run.measures);
         row(&[
             win,
             start,
@@ -192,6 +217,10 @@ fn edge_rows(
             words(edge.evidence),
             TableCell::known(count, TableCell::count),
             TableCell::known(hz, TableCell::Float),
+            TableCell::known(run.bytes.filter(|_| count.is_some()), TableCell::count),
+            drops,
+            jitter,
+            age,
             time(edge.first),
             time(edge.last),
         ]);

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{length, list, mapping, scalar, two_digits};
 use crate::base::rhythm::{CLOSING_NS, FEWEST, GAP_NS};
 use crate::base::time::Stamp;
+use crate::base::words;
 use crate::evidence::Degree;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
@@ -61,6 +62,8 @@ pub(crate) struct TopicLine {
     /// The longest silence in nanoseconds.
     pub(crate) max_gap: Option<i64>,
     pub(crate) is_latched: bool,
+    /// The rates that no rule would hold, for the reader.
+    pub(crate) unjudged: Option<String>,
 }
 
 impl NodeLine {
@@ -84,6 +87,12 @@ impl NodeLine {
 }
 
 impl TopicLine {
+    /// The rest of the line, for the reader.
+    pub(crate) fn comment(&self) -> String {
+        let rates = self.unjudged.as_ref();
+        rates.map_or_else(String::new, |rates| format!("  # {rates}: not judged"))
+    }
+
     /// The text behind the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
         let mut pairs = Vec::new();
@@ -157,7 +166,7 @@ fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
         .iter()
         .filter_map(|s| Some((s, s.facts.ended(s.nodes)?)));
     let ends: Vec<(i64, bool)> = ends
-        .map(|(s, (end, is_sure))| (since(s, end), is_sure))
+        .map(|(s, (end, doubt))| (since(s, end), doubt <= CLOSING_NS))
         .collect();
     let is_sure = ends.iter().all(|(_, is_sure)| *is_sure);
     let ends: Vec<i64> = ends.into_iter().map(|(end, _)| end).collect();
@@ -307,11 +316,14 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
     let stays = times
         .stays(tails.max().unwrap_or(0))
         .filter(|_| hz.is_none());
+    let mean_hz = mean(seen, hz).filter(|_| is_timed);
+    let is_judged = hz.is_some() || mean_hz.is_some() || is_latched;
     TopicLine {
         optional: false,
         within: times.within(&began).filter(|_| is_timed),
         may_end: times.may_end(&ends, true).or(stays).filter(|_| is_timed),
-        mean_hz: mean(seen, hz).filter(|_| is_timed),
+        unjudged: (!is_judged).then(|| unjudged(seen, &rates.concat())),
+        mean_hz,
         max_gap: longest(seen, may_end).filter(|_| is_timed),
         kind: kinds.and_then(|kinds| kinds.into_iter().next()),
         by: same(&|s| s.by()).filter(|by| !by.is_empty()),
@@ -348,6 +360,19 @@ fn mean(seen: &[TopicInRun<'_>], hz: Option<Range>) -> Option<Range> {
         from: Some(rounded(least - room, libm::floor)),
         to: Some(rounded(most + room, libm::ceil)),
     })
+}
+
+/// The rates that a topic had, from the least to the most; where they show nothing, the number of its messages.
+fn unjudged(seen: &[TopicInRun<'_>], rates: &[Rate]) -> String {
+    let values = || rates.iter().map(Rate::hz);
+    let (least, most) = values().fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+    let counts = seen.iter().map(|s| s.facts.messages(s.id));
+    let count = counts.max().unwrap_or(0);
+    if count < FEWEST || rates.len() < 2 {
+        return words::count(usize::try_from(count).unwrap_or(usize::MAX), "message");
+    }
+    let [least, most] = [least, most].map(|hz| Some(words::significant(hz, 2)));
+    words::rate_range(least, most)
 }
 
 /// The longest silence of the runs with headroom, in nanoseconds, unless it is so long that it shows nothing.

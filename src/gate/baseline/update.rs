@@ -64,7 +64,7 @@ pub(crate) fn update(
     if wanted.len() > MOST {
         return Err(Error::usage(
             format!(
-                "{} of `{}` no longer hold, as if it were of another robot",
+                "{} of `{}` no longer hold, as if it described another robot",
                 words::count(wanted.len(), "fact"),
                 path.display()
             ),
@@ -100,7 +100,7 @@ fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
     let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
     Err(Error::usage(
         format!("`--only {name}` is neither in the file nor in the bag{near}"),
-        "name a node or topic as it stands there",
+        "use the exact name of a node or topic",
     ))
 }
 

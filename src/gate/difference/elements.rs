@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Difference, Where};
-use crate::base::rhythm::FEWEST;
+use crate::base::rhythm::{CLOSING_NS, FEWEST};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::Degree;
@@ -12,6 +12,8 @@ use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::ledger::Kind;
 
+/// An end is certain if the silence after it is so many times as long as its time is uncertain.
+const DOUBTS: i64 = 8;
 /// The number of standard deviations beyond which rates differ by more than chance.
 const SIGMAS: f64 = 3.0;
 
@@ -111,9 +113,18 @@ fn node(
         all.push(Difference::changed("lifecycle", name, *one, *other));
     }
     let (one, other) = (a.ended(first), b.ended(second));
-    let ended = one.or(other);
-    if one.is_some() != other.is_some() && ended.is_some_and(|(_, is_sure)| is_sure) {
-        let told = |facts: &Facts<'_>, end: Option<(Stamp, bool)>| match end {
+    // What is silent at times may be silent at the end: its end is one where the silence is far longer than its doubt.
+    let is_over = |facts: &Facts<'_>, (end, doubt): (Stamp, i64)| {
+        let rest = facts.mission.span.end.since(end);
+        doubt <= CLOSING_NS || doubt.saturating_mul(DOUBTS) <= rest
+    };
+    let ended = match (one, other) {
+        (Some(end), None) => is_over(a, end),
+        (None, Some(end)) => is_over(b, end),
+        _ => false,
+    };
+    if ended {
+        let told = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
             Some((end, _)) => format!("ends at {}", facts.clock(end)),
             None => "stays".to_owned(),
         };

@@ -72,7 +72,7 @@ fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
     }
 }
 
-/// The events that one mission tells and the other does not, about elements of both. Starts and stops are told of the
+/// The events that one mission tells and the other does not, about elements of both. Starts and stops are reported of the
 /// elements.
 fn only(own: &[ToldEntry], other: &[ToldEntry], facts: &Facts<'_>, side: Where) -> Vec<Difference> {
     let known: BTreeSet<&Key> = other.iter().map(|t| &t.key).collect();
@@ -102,7 +102,7 @@ fn name((kind, name, count): &Key) -> String {
 }
 
 /// The difference of an entry that stands at another time of the other mission, if it does. Where `shift`, by which the
-/// entry before stood later, is also this one's, all that follows is later, and that was told of the first.
+/// entry before stood later, is also this one's, all that follows is later, and that was reported of the first.
 fn moved(
     (a, one): (&Facts<'_>, &ToldEntry),
     (b, other): (&Facts<'_>, &ToldEntry),

@@ -90,11 +90,17 @@ fn summary(subject: &DiffSubject, all: &[Difference]) -> String {
     format!("{} and {}: {many}{unknown}", subject.first, subject.second)
 }
 
+/// The differences that both missions can tell, then the others.
+fn known_first(all: &[Difference]) -> impl Iterator<Item = &Difference> {
+    let (known, unknown): (Vec<_>, Vec<_>) = all.iter().partition(|d| d.is_known);
+    known.into_iter().chain(unknown)
+}
+
 fn text(subject: &DiffSubject, all: &[Difference]) -> String {
     let long = all.iter().map(|d| visible(&d.name).chars().count()).max();
     let width = long.unwrap_or(0).min(60);
     let mut out = String::new();
-    for one in all {
+    for one in known_first(all) {
         let (sign, kind, name) = (sign(one), one.kind, visible(&one.name));
         let how = how(subject, one);
         // Writing into a string does not fail.
@@ -144,7 +150,7 @@ fn json(subject: &DiffSubject, all: &[Difference]) -> String {
         schema: "bagreel.diff/1",
         first: &subject.first,
         second: &subject.second,
-        differences: all.iter().map(row).collect(),
+        differences: known_first(all).map(row).collect(),
     };
     crate::mission::info::json(&report)
 }
@@ -156,32 +162,46 @@ fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
     if all.is_empty() {
         return out;
     }
+    let (known, unknown): (Vec<_>, Vec<_>) = all.iter().partition(|d| d.is_known);
+    table(subject, &known, &mut out);
+    if !unknown.is_empty() {
+        let many = words::count(unknown.len(), "row");
+        let _ = writeln!(
+            out,
+            "<details><summary>{many} that one of them cannot tell</summary>\n"
+        );
+        table(subject, &unknown, &mut out);
+        out.push_str("</details>\n");
+    }
+    out
+}
+
+/// Writes a table of differences, as far as there is room.
+fn table(subject: &DiffSubject, rows: &[&Difference], out: &mut String) {
+    if rows.is_empty() {
+        return;
+    }
+    let (first, second) = (code(&subject.first), code(&subject.second));
     let _ = writeln!(
         out,
-        "| | what | name | {} | {} |\n|---|---|---|---|---|",
-        code(&subject.first),
-        code(&subject.second)
+        "| | what | name | {first} | {second} |\n|---|---|---|---|---|"
     );
-    for (at, one) in all.iter().enumerate() {
-        let cell = |text: &str| {
-            if text.is_empty() {
-                "–".to_owned()
-            } else {
-                plain(text)
-            }
-        };
+    let cell = |text: &str| {
+        if text.is_empty() {
+            "–".to_owned()
+        } else {
+            plain(text)
+        }
+    };
+    for (at, one) in rows.iter().enumerate() {
+        let (sign, name) = (sign(one), code(&one.name));
         let (first, second) = (cell(&one.first), cell(&one.second));
-        let row = format!(
-            "| {} | {} | {} | {first} | {second} |\n",
-            sign(one),
-            one.kind,
-            code(&one.name)
-        );
+        let row = format!("| {sign} | {} | {name} | {first} | {second} |\n", one.kind);
         if out.len() + row.len() > MOST {
-            let _ = writeln!(out, "\n{} more left out.", all.len() - at);
+            let _ = writeln!(out, "\n{} more left out.", rows.len() - at);
             break;
         }
         out.push_str(&row);
     }
-    out
+    out.push('\n');
 }

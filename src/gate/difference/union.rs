@@ -10,7 +10,7 @@ use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{
-    Edge, EdgeState, Element, Elements, Graph, Node, NodeState, State, Topic, TopicState,
+    Edge, EdgeState, Element, Elements, Graph, Measures, Node, NodeState, State, Topic, TopicState,
 };
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger, sorted};
 use crate::mission::{Mission, Window};
@@ -160,6 +160,7 @@ pub(crate) fn union(
         ledger: Ledger {
             entries: sorted(entries.all(), &elements).0,
             phases: Vec::new(),
+            interruptions: Vec::new(),
             compares: true,
         },
         elements,
@@ -253,6 +254,8 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
             degree: *degree,
             count: None,
             hz: None,
+            bytes: None,
+            measures: Measures::default(),
         })
     };
     Graph {
@@ -282,6 +285,7 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
                     hz: topic.hz,
                     median_period_s: None,
                     max_gap_s: None,
+                    measures: Measures::default(),
                 })
             })
             .collect(),

@@ -188,11 +188,7 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn length(&self, key: &str) -> Result<Option<At<i64>>> {
-        self.read(
-            key,
-            "write a length of time: `20s`, `500ms`, `1m`",
-            parse_nanos,
-        )
+        self.read(key, "write a duration: `20s`, `500ms`, `1m`", parse_nanos)
     }
 
     /// The stretch in which something may end: all of the mission if it is `true`.
@@ -220,12 +216,12 @@ impl<'a> Fields<'a> {
                 value: During::until(length.value),
             }));
         }
-        let hint = "write a stretch of time: `1:30..2m`, `..20s`";
+        let hint = "write an interval: `1:30..2m`, `..20s`";
         self.read("within", hint, During::parse)
     }
 
     pub(super) fn during(&self) -> Result<Option<During>> {
-        let hint = "write a stretch of time: `1:30..2m`, `-30s..`";
+        let hint = "write an interval: `1:30..2m`, `-30s..`";
         Ok(self.read("during", hint, During::parse)?.map(|d| d.value))
     }
 

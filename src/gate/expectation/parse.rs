@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::fields::{Document, Fields};
 use super::{
-    AllowedFinding, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, Rule, SCHEMA,
-    TopicFacts, Unlisted, While, YamlPlace,
+    AllowedFinding, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, REMARKS, Rule,
+    SCHEMA, TopicFacts, Unlisted, While, YamlPlace,
 };
 use crate::base::error::Result;
 use crate::base::time::{Moment, Period, Stamp};
@@ -21,6 +21,9 @@ const POLICY: &[&str] = &[
     "unexpected_nodes",
     "unexpected_topics",
     "unexpected_publishers",
+    REMARKS[0].0,
+    REMARKS[1].0,
+    REMARKS[2].0,
 ];
 const NODE: &[&str] = &[
     "forbidden",
@@ -131,7 +134,7 @@ pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
         document.bad(at, bad.reason, "it is YAML: `name: {key: value}`")
     })?;
     let fields = document.fields(&whole, "the file", FILE)?;
-    let hint = format!("the first line is `schema: {SCHEMA}`");
+    let hint = format!("the first line must be `schema: {SCHEMA}`");
     let schema = fields.need("schema", &hint)?;
     let is_known = |text: &str| (text == SCHEMA).then_some(());
     fields.read("schema", &hint, is_known)?;
@@ -157,6 +160,7 @@ fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
         nodes: Unlisted::Allow,
         topics: Unlisted::Allow,
         publishers: Unlisted::Error,
+        remarks: [Unlisted::Warn; REMARKS.len()],
     };
     let Some(part) = file.get("policy") else {
         return Ok(policy);
@@ -176,6 +180,9 @@ fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
     policy.nodes = closed(POLICY[0], policy.nodes)?;
     policy.topics = closed(POLICY[1], policy.topics)?;
     policy.publishers = closed(POLICY[2], policy.publishers)?;
+    for ((key, ..), remark) in REMARKS.iter().zip(&mut policy.remarks) {
+        *remark = closed(key, *remark)?;
+    }
     Ok(policy)
 }
 
@@ -273,7 +280,7 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
     let Some((form, with)) = form else {
         let keys: Vec<&str> = FORMS.iter().map(|(key, _)| *key).collect();
         let hint = format!("a rule has one of {}", keys.join(", "));
-        return Err(document.bad(part.at, "the rule is about nothing", hint));
+        return Err(document.bad(part.at, "the rule has no subject", hint));
     };
     let allowed = [&["id", form], *with].concat();
     if let Some((key, at)) = fields.other(&allowed) {
@@ -297,7 +304,7 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
     };
     if is_empty {
         let hint = format!("with `{form}` go {}", with.join(", "));
-        return Err(document.bad(part.at, format!("the rule `{id}` asks for nothing"), hint));
+        return Err(document.bad(part.at, format!("the rule `{id}` has no condition"), hint));
     }
     Ok(Rule {
         id,
@@ -403,7 +410,7 @@ fn allowance(document: Document<'_>, part: &YamlPart) -> Result<AllowedFinding> 
     let word = document.text(finding, "`finding`")?;
     let kind = FindingKind::from_word(word);
     let unknown = || document.unknown(finding.at, "finding", word, FindingKind::words());
-    let hint = "every allowance says why, for those who come after";
+    let hint = "every allowance needs a `why`";
     fields.need("why", hint)?;
     fields.need("name", "name the node or topic")?;
     let date = "write a date: `2027-01-31`, or RFC 3339";
@@ -486,8 +493,8 @@ mod tests {
             ("nodes: [/a]", "line 2, column 8: `nodes` is not a mapping"),
             ("nodes:\n  /a: {}\n  /a: {}", "line 4"),
             ("rules:\n  - {node: /a, restarts: ..1}", "`id` is missing"),
-            ("rules:\n  - {id: x}", "the rule is about nothing"),
-            ("rules:\n  - {id: x, node: /a}", "asks for nothing"),
+            ("rules:\n  - {id: x}", "the rule has no subject"),
+            ("rules:\n  - {id: x, node: /a}", "has no condition"),
             (
                 "rules:\n  - {id: x, node: /a, hz: 5..}",
                 "`hz` does not go with `node`",

@@ -1,10 +1,13 @@
 //! The judgement of elements that the file does not name: allowed, or findings where its policy forbids them.
 
 use super::Judge;
-use crate::gate::expectation::Demand;
-use crate::gate::finding::{Finding, FindingKind};
+use crate::base::time::Span;
+use crate::gate::expectation::{Demand, REMARKS};
+use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::pattern::{NamePatterns, Pattern};
 use crate::graph::NodeId;
+use crate::mission::events::sentence;
+use crate::mission::ledger::Kind;
 
 impl Judge<'_> {
     /// Judges the elements that are not named.
@@ -18,6 +21,33 @@ impl Judge<'_> {
             let found = self.strange_topics();
             self.note("unexpected topics", policy.at, found);
         }
+        for ((title, kind, finding), severity) in REMARKS.iter().zip(policy.remarks) {
+            let found = severity
+                .severity()
+                .map(|severity| self.remarks(*kind, *finding, severity));
+            if let Some(found) = found.filter(|found| !found.is_empty()) {
+                self.note(title.replace('_', " "), policy.at, found);
+            }
+        }
+    }
+
+    /// The findings of one kind of remark in the event log.
+    fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
+        let mission = self.facts.mission;
+        let own = (0..).zip(&mission.ledger.entries);
+        let own = own.filter(|(_, entry)| entry.kind == kind && !entry.quiet);
+        let found = own.map(|(id, entry)| {
+            let (node, topic) = mission.elements.names(entry.what);
+            let says = sentence(mission, id, entry);
+            let name = topic.or(node).unwrap_or_default();
+            let mut found = Finding::new(finding, name, self.expectation.policy.at, says);
+            found.severity = severity;
+            found.at(Span {
+                start: entry.time,
+                end: entry.until.unwrap_or(entry.time).plus(1),
+            })
+        });
+        found.collect()
     }
 
     fn strange_nodes(&self) -> Vec<Finding> {

@@ -48,7 +48,7 @@ impl Judge<'_> {
         let Some(range) = facts.mean_hz.as_ref().map(|hz| hz.value) else {
             return Vec::new();
         };
-        // What is told of windows is told.
+        // What is reported of windows is reported.
         if !self.rate(topic, facts, at).is_empty() {
             return Vec::new();
         }
@@ -142,7 +142,7 @@ impl Judge<'_> {
         vec![finding]
     }
 
-    /// The findings where no window is judged: none for a condition that never held, else that it cannot be told.
+    /// The findings where no window is judged: none for a condition that never held, else that it cannot be reported.
     fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         if facts.whilst.is_some() {
             return Vec::new();

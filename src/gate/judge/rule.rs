@@ -13,7 +13,7 @@ use crate::graph::history::Bound;
 use crate::mission::events::sentence;
 use crate::mission::ledger::Entry;
 
-/// The time in nanoseconds by which a reaction may be told before its cause: the last sign of a node that is gone comes
+/// The time in nanoseconds by which a reaction may be reported before its cause: the last sign of a node that is gone comes
 /// a period before its end.
 const BEFORE_NS: i64 = 1_000_000_000;
 /// The number of entries that are written out.
@@ -233,7 +233,8 @@ impl Judge<'_> {
     fn changes(&self, at: YamlPlace, during: Option<During>, many: Range) -> Vec<Finding> {
         let whole = self.facts.mission.span;
         let span = during.map_or(whole, |d| d.on(whole));
-        let entries: Vec<_> = self.facts.mission.ledger.headlines(span).collect();
+        let headlines = self.facts.mission.ledger.headlines(span);
+        let entries: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
         if many.holds(entries.len() as f64) {
             return Vec::new();
         }

@@ -9,7 +9,7 @@ use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
 
-/// The number of names that are told in one line.
+/// The number of names that are reported in one line.
 pub(super) const NAMED: usize = 6;
 
 impl Judge<'_> {
@@ -168,8 +168,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let expected = &kind.value;
         if types.is_empty() {
-            let says =
-                format!("cannot tell whether {name} is a {expected}: this bag tells no type of it");
+            let says = format!("cannot tell whether {name} is a {expected}: its type is unknown");
             return vec![Finding::unknown(FindingKind::TopicType, name, at, says)];
         }
         if other.is_empty() {
@@ -233,9 +232,8 @@ impl Judge<'_> {
         let who = wanted.value.as_str();
         let kind = FindingKind::PublisherMissing;
         if !self.facts.tells_publishers(topic) {
-            let says = format!(
-                "cannot tell whether {who} publishes {name}: this bag does not say who does"
-            );
+            let says =
+                format!("cannot tell whether {who} publishes {name}: its publishers are unknown");
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
             return Finding::unknown(kind, name, wanted.at, says).hint(hint);
         }
@@ -290,7 +288,7 @@ impl Judge<'_> {
             let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
             return Some(Finding::unknown(kind, name, wanted.at, says).hint(hint));
         }
-        let says = format!("{who} does not subscribe {name}");
+        let says = format!("{who} does not subscribe to {name}");
         let mut finding = Finding::new(kind, name, wanted.at, says).saw("nothing", who);
         if is_absent {
             finding.cause = Some(absence(who));
@@ -312,8 +310,7 @@ impl Judge<'_> {
                 vec![Finding::new(FindingKind::TopicQos, name, at, says).saw(word(seen), expected)]
             }
             None => {
-                let says =
-                    format!("cannot tell whether {name} is {expected}: this bag does not say");
+                let says = format!("cannot tell whether {name} is {expected}: unknown in this bag");
                 vec![Finding::unknown(FindingKind::TopicQos, name, at, says)]
             }
         }

@@ -52,7 +52,7 @@ fn annotation(
     let _ = writeln!(
         out,
         "::{command} file={},line={},title={}::{}",
-        property(&subject.file),
+        property(&subject.tracked),
         finding.place.line.max(1),
         property(finding.kind.word()),
         data(&says.join("\n"))

@@ -46,7 +46,7 @@ fn issue<'a>(subject: &'a Subject<'_>, finding: &'a Finding) -> Issue<'a> {
             Severity::Unknown | Severity::Allowed => "info",
         },
         location: Location {
-            path: &subject.file,
+            path: &subject.tracked,
             lines: Lines {
                 begin: finding.place.line.max(1),
             },

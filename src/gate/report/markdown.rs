@@ -17,7 +17,7 @@ const MOST_ROWS: usize = 96 << 10;
 const MOST_LISTED: usize = 24 << 10;
 /// The number of findings that are open; the rest is folded.
 const SHOWN: usize = 12;
-/// The largest number of causes that are told.
+/// The largest number of causes that are reported.
 const CAUSES: usize = 3;
 
 /// The report; ends in a new line.
@@ -54,7 +54,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         &mut out,
     );
     list(&told(&[Severity::Allowed]), "Allowed", &mut out);
-    let _ = writeln!(out, "<!-- bagreel:{} -->", mark(&subject.name()));
+    let (bag, file) = (mark(&subject.name()), mark(&subject.tracked));
+    let _ = writeln!(out, "<!-- bagreel:{bag}:{file} -->");
     out
 }
 
@@ -244,9 +245,9 @@ fn mark(name: &str) -> String {
         .chars()
         .map(|c| if harmless(c) { c } else { '_' })
         .collect();
-    let mark = mark
-        .trim_end_matches(".mcap")
-        .trim_end_matches(".bag")
-        .trim_end_matches(".db3");
+    let endings = [".mcap", ".bag", ".db3", ".yaml", ".yml"];
+    let mark = endings
+        .iter()
+        .fold(mark.as_str(), |mark, ending| mark.trim_end_matches(ending));
     mark.chars().take(100).collect()
 }

@@ -66,7 +66,7 @@ fn result(subject: &Subject<'_>, finding: &Finding) -> Value {
         "level": level,
         "message": {"text": finding.told("\n")},
         "locations": [{"physicalLocation": {
-            "artifactLocation": {"uri": address(&subject.file)},
+            "artifactLocation": {"uri": address(&subject.tracked)},
             "region": {
                 "startLine": finding.place.line.max(1),
                 "startColumn": finding.place.column.max(1),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 
 use super::history::{History, Record};
+use super::measures::WindowMeasures;
 use super::rates::{Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
@@ -14,8 +15,8 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::graph::{
-    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Element, Graphs, GraphsWriter,
-    NodeState, Row, State, TopicState, per_second,
+    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Element, Graphs, GraphsWriter, Measures,
+    NodeState, Number, Row, State, TopicState, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -39,10 +40,13 @@ pub(crate) fn graphs(
     windows: &[Span],
     grace: usize,
 ) -> Result<Windowed> {
+    let sorted = SortedWindows(windows);
+    let measures = WindowMeasures::new(recorded, findings, history, &sorted);
     let mut all = GraphAssembly {
+        measures: measures.map_err(spool_error)?,
         graphs: GraphsWriter::new(windows.to_vec()),
         messages: vec![0; windows.len()],
-        windows: SortedWindows(windows),
+        windows: sorted,
         grace,
         findings,
         history,
@@ -61,6 +65,8 @@ pub(crate) fn graphs(
 }
 
 struct GraphAssembly<'a> {
+    /// What statistics and header stamps say.
+    measures: WindowMeasures,
     graphs: GraphsWriter,
     messages: Vec<u64>,
     windows: SortedWindows<'a>,
@@ -112,10 +118,11 @@ impl GraphAssembly<'_> {
             let sent = self.sent.entry(node).or_insert_with(|| vec![0; many]);
             let mut column = ColumnWriter::default();
             for sum in sums {
-                let count: u64 = places.iter().map(|place| sum.streams[*place]).sum();
+                let of = |all: &Vec<u64>| places.iter().map(|place| all[*place]).sum();
+                let count: u64 = of(&sum.streams);
                 sent[sum.window] += count;
                 if count > 0 {
-                    column.push(sum.window, counted(count));
+                    column.push(sum.window, counted(count, count == sum.count, sum, of));
                 }
             }
             self.published.insert((node, topic), column.finish());
@@ -143,6 +150,10 @@ impl GraphAssembly<'_> {
                 hz: per_second(count, *window),
                 median_period_s: sum.and_then(|sum| sum.median_period_s),
                 max_gap_s: sum.and_then(|sum| sum.max_gap_s),
+                measures: Measures {
+                    jitter_s: sum.and_then(|sum| sum.jitter_s),
+                    ..self.measures.of(Element::Topic(id), at)
+                },
             };
             states.push(at, Row::new(state.state, state.degree));
             self.graphs.topic(at, &state);
@@ -187,13 +198,24 @@ impl GraphAssembly<'_> {
             let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
             let mut sent = sent.map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
-                let count = sent.as_mut().map(|counts| {
-                    let row = counts.next();
-                    row.and_then(|row| row.count).unwrap_or(0)
-                });
+                let row = sent.as_mut().map(ColumnCursor::next);
+                let own = row.flatten();
+                let count = row.map(|row| row.and_then(|row| row.count).unwrap_or(0));
                 if self.sees(record, *window) {
                     let state = record.state(*window, count.is_some_and(|n| n > 0));
-                    let state = edge_state(id, record.degree, state, *window, count);
+                    let what = Element::Publish(id);
+                    let state = EdgeState {
+                        bytes: own
+                            .and_then(|row| row.bytes)
+                            .or(self.measures.bytes(what, at)),
+                        measures: Measures {
+                            jitter_s: own
+                                .and_then(|row| row.jitter.value())
+                                .or(self.measures.of(what, at).jitter_s),
+                            ..self.measures.of(what, at)
+                        },
+                        ..edge_state(id, record.degree, state, *window, count)
+                    };
                     self.graphs.publish(at, &state);
                 }
             }
@@ -218,7 +240,12 @@ impl GraphAssembly<'_> {
                     Some(row) => row.state,
                     None => State::Silent,
                 };
-                let state = edge_state(id, record.degree, state, *window, None);
+                let what = Element::Subscribe(id);
+                let state = EdgeState {
+                    bytes: self.measures.bytes(what, at),
+                    measures: self.measures.of(what, at),
+                    ..edge_state(id, record.degree, state, *window, None)
+                };
                 self.graphs.subscribe(at, &state);
             }
         }
@@ -240,9 +267,12 @@ impl GraphAssembly<'_> {
     }
 }
 
-fn counted(count: u64) -> Row {
+/// The messages of one publisher of a topic, with their bytes, and with the topic's jitter if all are its own.
+fn counted(count: u64, is_sole: bool, sum: &Sums, of: impl Fn(&Vec<u64>) -> u64) -> Row {
     Row {
         count: Some(count),
+        bytes: sum.stream_bytes.as_ref().map(of),
+        jitter: Number::of(sum.jitter_s.filter(|_| is_sole)),
         ..Row::new(State::Active, Degree::Measured)
     }
 }
@@ -260,6 +290,8 @@ fn edge_state(
         degree,
         count,
         hz: count.and_then(|n| per_second(n, window)),
+        bytes: None,
+        measures: Measures::default(),
     }
 }
 

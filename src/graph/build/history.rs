@@ -1,25 +1,25 @@
 //! The elements of the mission with everything that does not depend on windows: their lives, sending and silences.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
 use super::liveness::{Lifetime, Liveness};
 use super::merged::fall_silent;
-use super::senders::{Traffic, traffic};
+use super::recordings::{doubled, hide, pauses};
+use super::restarts::restarts;
+use super::senders::{Sender as TopicSender, Traffic};
 use super::settle::settle;
 use super::tracks::{Tracks, tracks};
 use crate::base::error::Result;
 use crate::base::role::role;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::ElementKey;
-use crate::graph::history::{
-    Bound, Life, Sender, Sending, Stretch, Transition, all_silent, silences,
-};
+use crate::evidence::proof::{ElementKey, IncidentKind};
+use crate::evidence::{Degree, Evidence};
+use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
 use crate::graph::{Edge, Element, Elements, Node, NodeId, PerElement, State, Topic, TopicId};
 
 /// The history of a mission: its elements, each with its lives, and all sending, in continuous time.
@@ -31,12 +31,28 @@ pub(crate) struct History {
     pub(crate) records: PerElement<Record>,
     /// The messages of every sender.
     pub(crate) sending: Sending,
+    /// The times at which nothing was recorded, sorted.
+    pub(crate) pauses: Vec<Span>,
+    /// The nodes that several recordings show at the same time.
+    pub(crate) doubled: Vec<NodeId>,
     /// Transitions of lifecycle states, sorted by time.
     pub(crate) transitions: Vec<Transition>,
+    /// Statements besides who is in the graph, by element.
+    pub(crate) incidents: Vec<Incident>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
     /// The places of each topic's streams.
     pub(crate) streams: BTreeMap<Name, Vec<usize>>,
+}
+
+/// A statement about an element besides its being there.
+#[derive(Clone, Debug)]
+pub(crate) struct Incident {
+    pub(crate) what: Element,
+    pub(crate) kind: IncidentKind,
+    pub(crate) time: Stamp,
+    pub(crate) until: Option<Stamp>,
+    pub(crate) evidence: Evidence,
 }
 
 /// The record of one element over the mission.
@@ -74,6 +90,11 @@ impl Record {
         }
     }
 
+    /// The times at which it was silent although it lived; `None` for a silence to the end.
+    pub(crate) fn silences(&self) -> &[(Stamp, Option<Stamp>)] {
+        &self.silences
+    }
+
     /// The intervals in which it exists, half-open.
     pub(crate) fn spans(&self) -> impl Iterator<Item = Span> + '_ {
         self.lives.iter().map(|life| life.span)
@@ -98,31 +119,38 @@ impl Record {
     }
 }
 
-/// Makes the history from everything recorded and concluded.
+/// Makes the history from everything recorded and concluded, and from the sending of all senders (`traffic`).
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn made(recorded: &Recorded, findings: &Findings) -> Result<History> {
-    of_elements(recorded, findings).map_err(spool_error)
+pub(crate) fn made(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> Result<History> {
+    of_elements(recorded, findings, traffic).map_err(spool_error)
 }
 
-fn of_elements(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
-    let traffic = traffic(recorded, findings)?;
-    let mut tracks = tracks(recorded, findings, &traffic)?;
-    fall_silent(&mut tracks, &traffic, findings);
-    let (proofs, restarts) = (&findings.proofs, &findings.restarts);
-    settle(&mut tracks, proofs, restarts, findings.mission);
-    Ok(assembled(tracks, &traffic, findings))
+fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> io::Result<History> {
+    let doubled = doubled(recorded, &findings.streams);
+    let restarts = restarts(recorded, findings, traffic, &doubled)?;
+    let mut tracks = tracks(recorded, findings, traffic, &restarts)?;
+    fall_silent(&mut tracks, traffic, findings);
+    settle(&mut tracks, &findings.proofs, &restarts, findings.mission);
+    let pauses = pauses(traffic, &restarts, &findings.streams);
+    Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
 }
 
 /// Lists every element. Tracks come in the order of the elements' names.
-fn assembled(tracks: Tracks, traffic: &Traffic, findings: &Findings) -> History {
+fn assembled(
+    tracks: Tracks,
+    traffic: &Traffic,
+    findings: &Findings,
+    (pauses, doubled): (Vec<Span>, BTreeSet<Name>),
+) -> History {
     let streams = traffic
         .iter()
         .map(|(topic, of)| (*topic, of.streams.clone()));
     let mut all = Assembly {
         history: History {
             streams: streams.collect(),
+            pauses,
             ..roomy(&tracks)
         },
         findings,
@@ -145,6 +173,11 @@ fn assembled(tracks: Tracks, traffic: &Traffic, findings: &Findings) -> History 
     }
     all.senders();
     all.transitions();
+    all.incidents();
+    let ids = doubled
+        .iter()
+        .filter_map(|node| all.history.node_ids.get(node));
+    all.history.doubled = ids.copied().collect();
     all.history
 }
 
@@ -170,12 +203,12 @@ fn roomy(tracks: &Tracks) -> History {
 }
 
 /// The messages that each node sends, without latched ones.
-fn sent(traffic: &Traffic) -> BTreeMap<Name, Vec<&[Stretch]>> {
-    let mut sent: BTreeMap<Name, Vec<&[Stretch]>> = BTreeMap::new();
+fn sent(traffic: &Traffic) -> BTreeMap<Name, Vec<&TopicSender>> {
+    let mut sent: BTreeMap<Name, Vec<&TopicSender>> = BTreeMap::new();
     let senders = traffic.values().flat_map(|of| &of.list);
     for sender in senders.filter(|sender| !sender.latched) {
         if let Some(node) = sender.node {
-            sent.entry(node).or_default().push(&sender.stretches);
+            sent.entry(node).or_default().push(sender);
         }
     }
     sent
@@ -188,7 +221,7 @@ struct Assembly<'a> {
     /// The number of known publishers of each topic.
     publishers: BTreeMap<Name, u32>,
     /// The messages that each node sends, without latched ones.
-    sent: BTreeMap<Name, Vec<&'a [Stretch]>>,
+    sent: BTreeMap<Name, Vec<&'a TopicSender>>,
 }
 
 impl Assembly<'_> {
@@ -223,6 +256,34 @@ impl Assembly<'_> {
         }
         let order = |t: &Transition| (t.time, t.node);
         self.history.transitions.sort_by_key(order);
+    }
+
+    /// Adds the statements about elements that exist.
+    fn incidents(&mut self) {
+        let all = &mut self.history;
+        for incident in &self.findings.incidents {
+            let node = |name: &Name| all.node_ids.get(name).copied();
+            let topic = |name: &Name| all.topic_ids.get(name).copied();
+            let what = match &incident.what {
+                ElementKey::Node(name) => node(name).map(Element::Node),
+                ElementKey::Topic(name) => topic(name).map(Element::Topic),
+                ElementKey::Publish(name, of) => node(name)
+                    .zip(topic(of))
+                    .and_then(|(node, topic)| all.elements.publication(node, topic))
+                    .map(Element::Publish),
+                ElementKey::Subscribe(of, name) => node(name)
+                    .zip(topic(of))
+                    .and_then(|(node, topic)| all.elements.subscription(topic, node))
+                    .map(Element::Subscribe),
+            };
+            all.incidents.extend(what.map(|what| Incident {
+                what,
+                kind: incident.kind.clone(),
+                time: incident.time,
+                until: incident.until,
+                evidence: Evidence::row(incident.source),
+            }));
+        }
     }
 
     fn node(&mut self, name: Name, track: &Liveness) {
@@ -291,10 +352,9 @@ impl Assembly<'_> {
         let edge = self.edge(node, topic, track);
         let senders = self.traffic.get(&topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
-        let stretches = sender.map_or(&[][..], |s| &s.stretches);
+        let silent = self.silences(sender.into_iter(), &spans(track));
         let all = &mut self.history;
         all.elements.publishes.push(edge);
-        let silent = silences(stretches, &spans(track));
         let record = Record::new(track, self.findings.mission, silent);
         all.records.push(Element::Publish(0), record);
     }
@@ -322,17 +382,27 @@ impl Assembly<'_> {
 
     /// The times at which all senders of a topic are silent.
     fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let Some(of) = self.traffic.get(&topic) else {
-            return Vec::new();
-        };
-        let of: Vec<&[Stretch]> = of.list.iter().map(|s| &s.stretches[..]).collect();
-        all_silent(&of, lives)
+        let all = self.traffic.get(&topic).into_iter().flat_map(|of| &of.list);
+        self.silences(all.filter(|sender| !sender.latched), lives)
     }
 
     /// The times at which a node is silent on all its topics.
     fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let of = self.sent.get(&node).map_or(&[][..], Vec::as_slice);
-        all_silent(of, lives)
+        let of = self.sent.get(&node).into_iter().flatten().copied();
+        self.silences(of, lives)
+    }
+
+    /// The times at which some senders are silent, as far as their recordings reach and were not paused.
+    fn silences<'s>(
+        &self,
+        senders: impl Iterator<Item = &'s TopicSender> + Clone,
+        lives: &[Span],
+    ) -> Vec<(Stamp, Option<Stamp>)> {
+        let lives = TopicSender::within(senders.clone(), lives);
+        let of: Vec<&[Stretch]> = senders.map(|sender| &sender.stretches[..]).collect();
+        let mut silent = all_silent(&of, &lives);
+        silent.retain(|silence| !hide(&self.history.pauses, *silence));
+        silent
     }
 }
 

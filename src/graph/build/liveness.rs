@@ -1,11 +1,11 @@
 //! The lives of elements: from the first sign to the last, extended by latched messages, ended by proofs of an end.
 
+use super::restarts::Restart;
 use crate::base::rhythm::{
     ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, REGISTRATION_NS, SHUTDOWN_NS,
     UNUSUAL,
 };
 use crate::base::time::Stamp;
-use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::history::{Bound, Stretch};
 
@@ -98,6 +98,8 @@ pub(crate) struct Liveness {
     pub(crate) heard: Option<Stamp>,
     /// The rhythms of its messages.
     pub(crate) pulses: Vec<Pulse>,
+    /// The first and the last moment of the recordings of its messages; `None` for the whole mission.
+    pub(crate) recording: Option<(Stamp, Stamp)>,
     /// The number of senders whose messages prove it, and the number of those that are latched.
     pub(crate) senders: (u32, u32),
     /// Whether there are more proofs than latched messages.
@@ -122,6 +124,7 @@ impl Default for Liveness {
             ends: Vec::new(),
             heard: None,
             pulses: Vec::new(),
+            recording: None,
             senders: (0, 0),
             speaks: false,
             lasts: false,
@@ -158,11 +161,20 @@ impl Liveness {
         self.signs.extend(&other.signs);
         self.heard = self.heard.max(other.heard);
         self.pulses.extend(&other.pulses);
+        self.reach(other.recording);
         self.senders.0 += other.senders.0;
         self.senders.1 += other.senders.1;
         self.speaks |= other.speaks;
         self.lasts |= other.lasts;
         self.extent = self.extent.max(other.extent.min(Extent::Whole));
+    }
+
+    /// Widens the time of the recordings by that of another one.
+    pub(crate) fn reach(&mut self, recording: Option<(Stamp, Stamp)>) {
+        if let Some((from, to)) = recording {
+            let all = self.recording.get_or_insert((from, to));
+            *all = (all.0.min(from), all.1.max(to));
+        }
     }
 
     /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence.
@@ -175,7 +187,8 @@ impl Liveness {
             return;
         }
         self.lives = lives(&self.signs, &self.ends);
-        let end = self.end(mission.1);
+        let (start, recorded) = self.recording.unwrap_or(mission);
+        let end = self.end(recorded.min(mission.1));
         if let Some(life) = self.lives.last_mut().filter(|life| life.ended.is_none()) {
             life.ended = end.filter(|end| end.time >= life.from);
             life.to = life.ended.map_or(mission.1, |end| end.time);
@@ -186,7 +199,7 @@ impl Liveness {
                 .iter()
                 .filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
             let period = rhythm.map(|p| p.period).min();
-            life.begin(mission.0, period);
+            life.begin(mission.0, start.max(mission.0), period);
         }
     }
 
@@ -368,9 +381,10 @@ impl Lifetime {
     }
 
     /// Sets the beginning of a first life, after nothing: with a rhythm it began shortly before its first sign.
-    fn begin(&mut self, mission: Stamp, period: Option<i64>) {
+    /// `recording` is the start of its own recording, one of several.
+    fn begin(&mut self, mission: Stamp, recording: Stamp, period: Option<i64>) {
         let late = period.unwrap_or(0);
-        if self.from.since(mission) <= FOUND_NS.saturating_add(late) {
+        if self.from.since(recording) <= FOUND_NS.saturating_add(late) {
             (self.from, self.began) = (mission, None);
         } else if let Some(began) = &mut self.began {
             let sooner = DISCOVERY_NS.saturating_add(late);

@@ -20,12 +20,12 @@ pub(crate) fn fall_silent(
     traffic: &Traffic,
     findings: &Findings,
 ) {
-    let end = findings.mission.1;
     for (topic, nodes) in publishers(tracks) {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
         for (node, stretches) in turns(&nodes, sender, findings) {
+            let end = sender.recording.1.min(findings.mission.1);
             let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
             if let (Some(pulse), Some(track)) =
                 (pulse, tracks.get_mut(&ElementKey::Publish(node, topic)))

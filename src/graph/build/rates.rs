@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::sync::Arc;
 
+use super::measures::seconds;
 use super::windows::SortedWindows;
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
@@ -17,8 +18,12 @@ pub(crate) struct Sums {
     pub(crate) bytes: Option<u64>,
     pub(crate) median_period_s: Option<f64>,
     pub(crate) max_gap_s: Option<f64>,
+    /// The standard deviation of the time between messages; `None` with fewer than three.
+    pub(crate) jitter_s: Option<f64>,
     /// The number of messages of each stream of the topic.
     pub(crate) streams: Vec<u64>,
+    /// Their bytes, each stream's, if known.
+    pub(crate) stream_bytes: Option<Vec<u64>>,
 }
 
 /// The number of messages of a topic in a window.
@@ -64,6 +69,7 @@ struct OpenWindow {
     longest: Option<i64>,
     gaps: Vec<i64>,
     streams: Vec<u64>,
+    stream_bytes: Vec<u64>,
 }
 
 /// The most gaps kept per window for their median (8 MB); a window with more has no median.
@@ -114,6 +120,7 @@ impl OpenWindow {
             longest: None,
             gaps: Vec::new(),
             streams: vec![0; streams],
+            stream_bytes: vec![0; streams],
         }
     }
 
@@ -121,6 +128,8 @@ impl OpenWindow {
         self.count += 1;
         self.bytes = self.bytes.saturating_add(u64::from(size));
         self.streams[stream] += 1;
+        let own = &mut self.stream_bytes[stream];
+        *own = own.saturating_add(u64::from(size));
         let Some(before) = self.before.replace(time) else {
             return;
         };
@@ -138,10 +147,21 @@ impl OpenWindow {
             count: self.count,
             bytes: sized.then_some(self.bytes),
             max_gap_s: self.longest.map(|gap| gap as f64 / 1e9),
+            jitter_s: deviation(&self.gaps).filter(|_| exact),
             median_period_s: median(&mut self.gaps).filter(|_| exact),
             streams: self.streams,
+            stream_bytes: sized.then_some(self.stream_bytes),
         })
     }
+}
+
+/// The standard deviation in seconds of at least two gaps.
+fn deviation(gaps: &[i64]) -> Option<f64> {
+    let many = gaps.len() as f64;
+    let mean = gaps.iter().map(|gap| *gap as f64).sum::<f64>() / many;
+    let square = |gap: &i64| (*gap as f64 - mean) * (*gap as f64 - mean);
+    let squares: f64 = gaps.iter().map(square).sum();
+    (gaps.len() > 1).then(|| seconds(libm::sqrt(squares / many)))
 }
 
 /// The median in seconds; the mean of the two middle values of an even number.

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::io;
 
+use super::recordings::recordings;
 use super::tempo::stretches;
+use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
-use crate::evidence::collector::Recorded;
+use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::graph::history::{LongestPauses, Stretch};
@@ -36,6 +38,8 @@ pub(crate) struct Sender {
     pub(crate) node: Option<Name>,
     pub(crate) latched: bool,
     pub(crate) stretches: Vec<Stretch>,
+    /// The first and the last moment of its recordings.
+    pub(crate) recording: (Stamp, Stamp),
 }
 
 /// The node that sent the messages of a stream, if its name is reliable enough.
@@ -46,21 +50,30 @@ pub(crate) fn sender(stream: &Stream) -> Option<Name> {
 }
 
 /// Reads the times of every topic once.
-pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> io::Result<Traffic> {
+pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffic> {
+    let recordings = recordings(recorded, &findings.streams);
     let mut streams: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
     for (at, stream) in findings.streams.iter().enumerate() {
         streams.entry(stream.topic).or_default().push(at);
     }
-    let of_topic = |(topic, of): (Name, Vec<usize>)| Ok((topic, senders(recorded, findings, of)?));
-    streams.into_iter().map(of_topic).collect()
+    let of_topic = |(topic, of): (Name, Vec<usize>)| {
+        Ok((topic, senders(recorded, findings, &recordings, of)?))
+    };
+    let all: io::Result<Traffic> = streams.into_iter().map(of_topic).collect();
+    all.map_err(spool_error)
 }
 
 /// Reads the times of some streams, which together are one topic.
-fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io::Result<Senders> {
+fn senders(
+    recorded: &Recorded,
+    findings: &Findings,
+    recordings: &[(Stamp, Stamp)],
+    streams: Vec<usize>,
+) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
     let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
-    let (of, mut heard) = places(&of_topic);
+    let (of, mut heard) = places(&of_topic, recordings);
     let mut pauses = LongestPauses::default();
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
@@ -85,6 +98,7 @@ struct SenderTimes {
     node: Option<Name>,
     latched: bool,
     times: Vec<Stamp>,
+    recording: (Stamp, Stamp),
     /// The number of messages of which one is kept, unless it comes late.
     every: usize,
     passed: usize,
@@ -127,24 +141,31 @@ impl SenderTimes {
             node: self.node,
             latched: self.latched,
             stretches,
+            recording: self.recording,
         }
     }
 }
 
 /// The place of each stream's sender, and the senders without times yet.
-fn places(streams: &[&Stream]) -> (Vec<usize>, Vec<SenderTimes>) {
-    let mut latched: BTreeMap<Option<Name>, bool> = BTreeMap::new();
+fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Vec<SenderTimes>) {
+    let mut latched: BTreeMap<Option<Name>, (bool, (Stamp, Stamp))> = BTreeMap::new();
     for stream in streams {
-        *latched.entry(sender(stream)).or_insert(true) &= stream.latched;
+        let own = recordings[stream.bag];
+        let (is_latched, all) = latched.entry(sender(stream)).or_insert((true, own));
+        *is_latched &= stream.latched;
+        *all = (all.0.min(own.0), all.1.max(own.1));
     }
     let place = |stream: &&Stream| latched.range(..sender(stream)).count();
     let places = streams.iter().map(place).collect();
-    let heard = latched.iter().map(|(node, latched)| SenderTimes {
-        node: *node,
-        latched: *latched,
-        times: Vec::new(),
-        every: 1,
-        passed: 0,
-    });
+    let heard = latched
+        .iter()
+        .map(|(node, (latched, recording))| SenderTimes {
+            node: *node,
+            latched: *latched,
+            recording: *recording,
+            times: Vec::new(),
+            every: 1,
+            passed: 0,
+        });
     (places, heard.collect())
 }

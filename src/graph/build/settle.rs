@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::liveness::{Lifetime, Liveness};
+use super::restarts::Restarts;
 use crate::base::time::Stamp;
 use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
-use crate::evidence::restarts::Restarts;
 
 /// No edge has a smaller key: nodes and topics come before.
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::liveness::{Extent, Liveness, Pulse};
+use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
 use crate::base::time::Stamp;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
-use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence, SOURCES};
 
 /// The track of every element.
@@ -20,6 +20,7 @@ pub(crate) fn tracks(
     recorded: &Recorded,
     findings: &Findings,
     traffic: &Traffic,
+    restarts: &Restarts,
 ) -> io::Result<Tracks> {
     let mut tracks = Tracks::new();
     let sent = sent(&findings.proofs);
@@ -30,9 +31,9 @@ pub(crate) fn tracks(
             | ElementKey::Subscribe(_, node) => Some(node),
             ElementKey::Topic(_) => None,
         };
-        let restarts = node.and_then(|node| findings.restarts.get(&node));
-        let restarts = restarts.map_or(&[][..], Vec::as_slice);
-        let deaths: Vec<Stamp> = restarts.iter().map(|r| r.death).collect();
+        let own = node.and_then(|node| restarts.get(&node));
+        let own = own.map_or(&[][..], Vec::as_slice);
+        let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
         let track = tracks.entry(proof.what).or_default();
         track.lasts |= lasts(&proof.when);
         track.evidence = track.evidence.and(Evidence::row(proof.source));
@@ -47,7 +48,7 @@ pub(crate) fn tracks(
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
                     beats: stream.connection.topic.as_str() != "/rosout",
-                    restarts,
+                    restarts: own,
                 };
                 follow(track, senders, place, &what);
                 if !deaths.is_empty() {
@@ -83,7 +84,7 @@ pub(crate) fn tracks(
             Validity::Always => track.extent = Extent::Always,
         }
     }
-    for (node, restarts) in &findings.restarts {
+    for (node, restarts) in restarts {
         let track = tracks.entry(ElementKey::Node(*node)).or_default();
         for restart in restarts {
             track.signs.extend([restart.death, restart.birth]);
@@ -165,6 +166,7 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
     }
     track.signs.extend([first, last]);
     track.heard = track.heard.max(Some(last));
+    track.reach(Some(sender.recording));
     let pulse = Pulse::of(&sender.stretches, what.restarts);
     track
         .pulses

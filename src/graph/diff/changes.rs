@@ -161,7 +161,7 @@ impl<'a> Changes<'a> {
         topics.filter(|topic| !seen.insert(*topic)).collect()
     }
 
-    /// Adds hand-overs: a topic changes hands when none of the nodes that send on it now sent on it last.
+    /// Adds hand-overs: another node takes over a topic when none of the nodes that send on it now sent on it last.
     fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
         let there = |graph: &Graph, topic| {
             graph

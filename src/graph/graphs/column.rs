@@ -21,20 +21,22 @@ const BYTES: u8 = 4;
 const MEDIAN: u8 = 8;
 const GAP: u8 = 16;
 const RATE: u8 = 32;
+/// Always with [`LOOK`], so that it is not taken for [`SAME`].
+const MEASURES: u8 = 64;
 
 /// The state that writer and reader share: the rows so far.
 #[derive(Clone, Copy, Debug)]
 struct Memory {
     row: Row,
-    /// The last whole numbers of the median and the gap.
-    halves: [i64; 3],
+    /// The last whole numbers of the median, the gap, the rate, jitter and age.
+    halves: [i64; 5],
 }
 
 impl Default for Memory {
     fn default() -> Self {
         Self {
             row: Row::new(State::Active, Degree::Measured),
-            halves: [0; 3],
+            halves: [0; 5],
         }
     }
 }
@@ -82,6 +84,7 @@ impl ColumnWriter {
     fn row(&mut self, row: &Row) {
         let old = self.memory.row;
         let look = |row: &Row| (row.state, row.degree, row.lifecycle);
+        let measures = |row: &Row| (row.drops, row.jitter, row.age);
         let parts = [
             (LOOK, look(row) != look(&old)),
             (COUNT, row.count != old.count),
@@ -89,6 +92,7 @@ impl ColumnWriter {
             (MEDIAN, row.median != old.median),
             (GAP, row.gap != old.gap),
             (RATE, row.rate != old.rate),
+            (MEASURES | LOOK, measures(row) != measures(&old)),
         ];
         let tag = parts.iter().filter(|(_, differs)| *differs);
         let tag = tag.fold(0, |tag, (bit, _)| tag | bit);
@@ -116,6 +120,11 @@ impl ColumnWriter {
             if let Some(rate) = row.rate {
                 put_number(bytes, &mut halves[2], rate);
             }
+        }
+        if tag & MEASURES != 0 {
+            put_count(bytes, old.drops, row.drops);
+            put_number(bytes, &mut halves[3], row.jitter);
+            put_number(bytes, &mut halves[4], row.age);
         }
         self.memory.row = *row;
     }
@@ -216,6 +225,11 @@ impl ColumnCursor<'_> {
         if tag & RATE != 0 {
             let is_given = take_byte(bytes) == 1;
             row.rate = is_given.then(|| take_number(bytes, &mut halves[2]));
+        }
+        if tag & MEASURES != 0 {
+            row.drops = take_count(bytes, row.drops);
+            row.jitter = take_number(bytes, &mut halves[3]);
+            row.age = take_number(bytes, &mut halves[4]);
         }
     }
 }

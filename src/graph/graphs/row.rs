@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::base::time::Span;
 use crate::evidence::Degree;
-use crate::graph::{EdgeState, NodeState, State, TopicState, per_second};
+use crate::graph::{EdgeState, Measures, NodeState, State, TopicState, per_second};
 
 /// A number, as an integer where possible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,6 +61,9 @@ pub(crate) struct Row {
     pub(crate) bytes: Option<u64>,
     pub(crate) median: Number,
     pub(crate) gap: Number,
+    pub(crate) drops: Option<u64>,
+    pub(crate) jitter: Number,
+    pub(crate) age: Number,
     /// The rate, where it does not follow from the count and the window's length.
     pub(crate) rate: Option<Number>,
 }
@@ -75,7 +78,28 @@ impl Row {
             bytes: None,
             median: Number::Unknown,
             gap: Number::Unknown,
+            drops: None,
+            jitter: Number::Unknown,
+            age: Number::Unknown,
             rate: None,
+        }
+    }
+
+    fn with_measures(self, measures: &Measures) -> Self {
+        Self {
+            drops: measures.drops,
+            jitter: Number::of(measures.jitter_s),
+            age: Number::of(measures.age_s),
+            ..self
+        }
+    }
+
+    /// The further numbers of the window.
+    pub(crate) fn measures(&self) -> Measures {
+        Measures {
+            drops: self.drops,
+            jitter_s: self.jitter.value(),
+            age_s: self.age.value(),
         }
     }
 
@@ -121,15 +145,16 @@ impl Row {
             gap: Number::of(state.max_gap_s),
             ..Self::new(state.state, state.degree)
         };
-        row.with_rate(state.hz, span)
+        row.with_measures(&state.measures).with_rate(state.hz, span)
     }
 
     pub(super) fn of_edge(state: &EdgeState, span: Span) -> Self {
         let row = Self {
             count: state.count,
+            bytes: state.bytes,
             ..Self::new(state.state, state.degree)
         };
-        row.with_rate(state.hz, span)
+        row.with_measures(&state.measures).with_rate(state.hz, span)
     }
 
     pub(super) fn node(&self, id: u32, span: Span, lifecycles: &[Arc<str>]) -> NodeState {
@@ -153,6 +178,7 @@ impl Row {
             hz: self.hz(span),
             median_period_s: self.median.value(),
             max_gap_s: self.gap.value(),
+            measures: self.measures(),
         }
     }
 
@@ -163,6 +189,8 @@ impl Row {
             degree: self.degree,
             count: self.count,
             hz: self.hz(span),
+            bytes: self.bytes,
+            measures: self.measures(),
         }
     }
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::base::time::Stamp;
 use crate::evidence::Degree;
-use crate::graph::State;
+use crate::graph::{Measures, State};
 
 fn number() -> impl Strategy<Value = Option<f64>> {
     prop_oneof![
@@ -31,19 +31,39 @@ fn look() -> impl Strategy<Value = (State, Degree)> {
     (0..4_usize, 0..4_usize).prop_map(|(state, degree)| (State::ALL[state], Degree::ALL[degree]))
 }
 
+fn measures() -> impl Strategy<Value = Measures> {
+    (count(), number(), number()).prop_map(|(drops, jitter_s, age_s)| Measures {
+        drops,
+        jitter_s,
+        age_s,
+    })
+}
+
 fn topic() -> impl Strategy<Value = TopicState> {
-    (look(), count(), count(), number(), number(), number()).prop_map(
-        |((state, degree), count, bytes, hz, median_period_s, max_gap_s)| TopicState {
-            id: 0,
-            state,
-            degree,
-            count: count.unwrap_or(0),
-            bytes,
-            hz,
-            median_period_s,
-            max_gap_s,
-        },
+    (
+        look(),
+        count(),
+        count(),
+        number(),
+        number(),
+        number(),
+        measures(),
     )
+        .prop_map(
+            |((state, degree), count, bytes, hz, median_period_s, max_gap_s, measures)| {
+                TopicState {
+                    id: 0,
+                    state,
+                    degree,
+                    count: count.unwrap_or(0),
+                    bytes,
+                    hz,
+                    median_period_s,
+                    max_gap_s,
+                    measures,
+                }
+            },
+        )
 }
 
 fn node() -> impl Strategy<Value = NodeState> {
@@ -62,13 +82,17 @@ fn node() -> impl Strategy<Value = NodeState> {
 }
 
 fn edge() -> impl Strategy<Value = EdgeState> {
-    (look(), count(), number()).prop_map(|((state, degree), count, hz)| EdgeState {
-        id: 0,
-        state,
-        degree,
-        count,
-        hz,
-    })
+    (look(), count(), number(), count(), measures()).prop_map(
+        |((state, degree), count, hz, bytes, measures)| EdgeState {
+            id: 0,
+            state,
+            degree,
+            count,
+            hz,
+            bytes,
+            measures,
+        },
+    )
 }
 
 /// Some of three elements, by id.
@@ -150,6 +174,7 @@ fn what_stays_the_same_takes_no_room() {
         hz: Some(10.0),
         median_period_s: Some(0.1),
         max_gap_s: Some(0.1),
+        measures: Measures::default(),
     };
     let graph = Graph {
         topics: vec![topic],

@@ -173,7 +173,7 @@ mod tests {
         in_order(n, &turned).iter().all(|turn| !turn)
     }
 
-    /// The order as it is told, in time that grows with the square of the vertices.
+    /// The order as it is reported, in time that grows with the square of the vertices.
     fn told(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         let mut left: BTreeSet<usize> = (0..n).collect();
         let (mut first, mut last) = (Vec::new(), Vec::new());

@@ -51,6 +51,9 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
             0,
         );
     }
+    for label in layout.labels(plan) {
+        taken.insert(label.grown(0.5), 0);
+    }
     let mut edges = Obstacles::new(taken.cell);
     for &i in &order {
         if edges.noted > CELLS {
@@ -64,10 +67,13 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         if taken.looks.get() + edges.looks.get() > EFFORT {
             break;
         }
-        let Some(size) = plan.links[i].label else {
+        let Some(size) = plan.links[i]
+            .label
+            .filter(|_| layout.routes[i].label.is_none())
+        else {
             continue;
         };
-        layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
+        layout.routes[i].label = lines[i].spot((size, plan.is_labelled), i, &taken, &edges);
         if let Some(spot) = layout.routes[i].label {
             taken.insert(Rect::around(spot, size).grown(0.5), 0);
         }
@@ -138,8 +144,14 @@ impl Segments {
         Some((point, (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
-    /// The best middle for a label of this size, if any is free.
-    fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
+    /// The best middle for a label of this size, if any is free; a strict one is on no other edge.
+    fn spot(
+        &self,
+        (size, is_strict): (Size, bool),
+        own: usize,
+        taken: &Obstacles,
+        edges: &Obstacles,
+    ) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
             let Some((point, sideways)) = self.station(part) else {
@@ -157,7 +169,7 @@ impl Segments {
                     .filter(|&edge| edge != own)
                     .collect();
                 // Beside its own edge and on another, it would be read as the other's.
-                if spot != point && !met.is_empty() {
+                if (spot != point || is_strict) && !met.is_empty() {
                     continue;
                 }
                 met.sort_unstable();
@@ -307,6 +319,7 @@ mod tests {
             vertices: vec![vertex(None); 2],
             links,
             clusters: vec![],
+            ..Plan::default()
         }
     }
 

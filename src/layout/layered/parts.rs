@@ -106,6 +106,7 @@ mod tests {
             vertices: vec![vertex(Some(0)), vertex(None), vertex(Some(1)), vertex(None)],
             links: vec![link(1, 3)],
             clusters: vec![cluster(None), cluster(Some(0))],
+            ..Plan::default()
         };
         let parts = parts(&plan);
         let members: Vec<&[usize]> = parts.iter().map(|part| part.vertices.as_slice()).collect();

@@ -49,13 +49,14 @@ impl Subplan {
         };
         let cluster = |&c: &usize| Cluster {
             parent: number(part.parent[c]),
-            title: plan.clusters[part.clusters[c - 1]].title,
+            ..plan.clusters[part.clusters[c - 1]]
         };
         Self {
             plan: Plan {
                 vertices: vertices.iter().map(vertex).collect(),
                 links: drawn,
                 clusters: clusters.iter().map(cluster).collect(),
+                is_labelled: plan.is_labelled,
             },
             vertices,
             links,

@@ -243,6 +243,7 @@ mod tests {
             vertices: vec![vertex(home); n],
             links: (0..n).map(|v| link(v, (v + 1) % n)).collect(),
             clusters: vec![cluster(None)],
+            ..Plan::default()
         };
         let options = LayoutOptions {
             page: Size::new(1280.0, 560.0),

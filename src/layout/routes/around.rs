@@ -131,25 +131,13 @@ fn leaves(rect: &Rect, outline: Outline, inside: Point, outside: Point) -> Point
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = f64::midpoint(low, high);
-        if contains(rect, outline, mixed(inside, outside, middle)) {
+        if outline.holds(rect, mixed(inside, outside, middle)) {
             low = middle;
         } else {
             high = middle;
         }
     }
     mixed(inside, outside, high)
-}
-
-fn contains(rect: &Rect, outline: Outline, p: Point) -> bool {
-    let centre = rect.centre();
-    let (x, y) = (
-        (p.x - centre.x) / (rect.w / 2.0).max(1e-9),
-        (p.y - centre.y) / (rect.h / 2.0).max(1e-9),
-    );
-    match outline {
-        Outline::Box => x.abs() <= 1.0 && y.abs() <= 1.0,
-        Outline::Ellipse => x * x + y * y <= 1.0,
-    }
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
@@ -358,6 +346,7 @@ mod tests {
             vertices: vec![vertex(None); n],
             links: (1..n).map(|v| link(v - 1, v)).collect(),
             clusters: vec![],
+            ..Plan::default()
         };
         let place = |v: usize| {
             Rect::new(
@@ -406,6 +395,7 @@ mod tests {
             vertices: vec![vertex(None); 3],
             links: vec![link(0, 2)],
             clusters: vec![],
+            ..Plan::default()
         };
         let boxes = [0.0, 150.0, 300.0].map(|x| Rect::new(x, 0.0, 80.0, 30.0));
         let (routes, straight) = routes(&plan, &boxes);

@@ -6,7 +6,7 @@ use crate::base::name::is_quiet;
 use crate::base::words::{self, visible};
 use crate::graph::{Element, Elements, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
+use crate::mission::ledger::{Detail, Entry, EntryId, Interruption, InterruptionKind, Kind};
 
 /// The most topics that are named; the rest is counted.
 const NAMED: usize = 6;
@@ -42,6 +42,13 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             };
             format!("handed over: {} → {}", names(from), names(to))
         }
+        (Detail::Count(many), _) => {
+            let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
+            let lost = words::count(usize::try_from(*many).unwrap_or(usize::MAX), "message");
+            format!("{lost} lost by the recorder{over}")
+        }
+        (Detail::Values { to, .. }, Kind::Starved) => starved(entry.what, to),
+        (Detail::None, Kind::Duplicate) => "is the name of two nodes".to_owned(),
         (Detail::Values { from, to }, kind) => {
             let or = |text: &str| {
                 let shown = visible(text).into_owned();
@@ -71,6 +78,27 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             format!("{word}{}", with(mission, parts, entry))
         }
         (Detail::None, kind) => mission.ledger.word(kind).to_owned(),
+    }
+}
+
+/// Who gets nothing over an edge, and by which policy of the quality of service.
+fn starved(what: Element, policy: &str) -> String {
+    let whom = match what {
+        Element::Publish(_) => "a subscriber gets nothing",
+        _ => "gets nothing from a publisher",
+    };
+    match policy {
+        "" => format!("{whom}: incompatible quality of service"),
+        policy => format!("{whom}: incompatible {}", visible(policy)),
+    }
+}
+
+/// An interruption of the recording as a sentence.
+pub(crate) fn interrupted(one: &Interruption) -> String {
+    let length = words::duration(one.length);
+    match one.kind {
+        InterruptionKind::ClockBack => format!("the recorder's clock went back by {length}"),
+        InterruptionKind::Nothing => format!("nothing was recorded for {length}"),
     }
 }
 

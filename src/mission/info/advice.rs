@@ -23,8 +23,7 @@ fn ros1(info: &Info) -> Vec<String> {
     let deaf = info.topics_without_subscriber;
     if !has(info, "/rosout") {
         advice.push(
-            "the bag has no `/rosout`, which names nodes that publish nothing else: record it too"
-                .to_owned(),
+            "also record `/rosout`, which reveals nodes that publish nothing else".to_owned(),
         );
     }
     if deaf > 0 && !has(info, "/statistics") {
@@ -45,7 +44,7 @@ fn ros2(info: &Info) -> Vec<String> {
         return advice;
     }
     advice.push(format!(
-        "rosbag2 stores who talks to whom of no topic: {} without a known publisher, {} without a known subscriber",
+        "rosbag2 does not record publishers or subscribers: {} without a known publisher, {} without a known subscriber",
         info.topics_without_publisher, info.topics_without_subscriber
     ));
     advice.extend(from_files(info));
@@ -57,14 +56,11 @@ fn ros2(info: &Info) -> Vec<String> {
         ),
     ] {
         if !has(info, topic) {
-            advice.push(format!(
-                "the bag has no `{topic}`, which names {tells}: record it too"
-            ));
+            advice.push(format!("also record `{topic}`, which reveals {tells}"));
         }
     }
     advice.push(
-        "next time run `ros2 run rosgraph_monitor rosgraph_monitor_node`, then `ros2 bag record --all`: its topic `/rosgraph` \
-         tells the whole graph"
+        "next time run `ros2 run rosgraph_monitor rosgraph_monitor_node`, then `ros2 bag record --all`: its topic `/rosgraph` contains the whole graph"
             .to_owned(),
     );
     advice
@@ -81,7 +77,7 @@ fn from_files(info: &Info) -> Vec<String> {
             .any(|row| row.source.starts_with("source"));
     if named > 0 && !is_read && Evidence::all_words().any(|word| word == "source") {
         advice.push(format!(
-            "`--source FOLDER` reads from their source code what the nodes known by name ({named}) publish and subscribe"
+            "`--source FOLDER` adds what the source code of the {named} named nodes declares"
         ));
     }
     if info
@@ -92,7 +88,8 @@ fn from_files(info: &Info) -> Vec<String> {
         return advice;
     }
     advice.push(
-        "`--topology FILE` adds what you know: a launch file, a graph saved by rqt_graph, a table of nodes".to_owned(),
+        "`--topology FILE` adds a launch file, a graph saved by rqt_graph, or a table of nodes"
+            .to_owned(),
     );
     advice
 }

@@ -12,7 +12,7 @@ use crate::mission::phases::knows_publishers;
 /// A figure that fits a mission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FigureInfo {
-    /// The word of `--figure`.
+    /// The word of `bagreel figure --kind`.
     pub figure: &'static str,
     /// The content of the figure, and its amount.
     pub shows: String,
@@ -39,9 +39,7 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
         format!("what was alive when: {}", words::count(roles.len(), "node"))
     } else {
         let topics = words::count(topics, "topic");
-        format!(
-            "when which topic carried messages: {topics}, of most of which no publisher is known"
-        )
+        format!("when each topic carried messages: {topics}, most without a known publisher")
     };
     (topics > 0).then_some(FigureInfo {
         figure: "lives",

@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
-use super::{Info, info};
+use super::{Info, NodeInfo, info};
+use crate::base::columns::{Cell, Column, WHOLE, hang, table};
+use crate::base::name::{is_player, is_recorder};
 use crate::base::table::{Batch, ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
+use crate::evidence::Evidence;
 use crate::mission::Mission;
 
 /// A bag in a survey.
@@ -55,6 +58,8 @@ const COLUMNS: &[(&str, ColumnKind)] = &[
     ("publishes_measured", ColumnKind::I64),
     ("subscribes_measured", ColumnKind::I64),
     ("subscribes_stated", ColumnKind::I64),
+    ("named_nodes", ColumnKind::I64),
+    ("unknown_publishers", ColumnKind::I64),
     ("evidence", ColumnKind::Text),
     ("error", ColumnKind::Text),
 ];
@@ -83,6 +88,19 @@ fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
     };
     let bag = info.bags.first();
     let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
+    let is_named = |node: &&NodeInfo| {
+        let is_guess = node
+            .evidence
+            .iter()
+            .all(|word| Evidence::of(word).is_guess());
+        !is_guess && !is_recorder(&node.name) && !is_player(&node.name)
+    };
+    let named = info.nodes.iter().filter(is_named).count();
+    let unknown: u32 = info
+        .topics
+        .iter()
+        .filter_map(|t| t.unknown_publishers)
+        .sum();
     vec![
         path,
         TableCell::known(bag, |b| TableCell::text(&b.format)),
@@ -101,49 +119,54 @@ fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
         TableCell::count(info.publishes_by_degree.measured),
         TableCell::count(info.subscribes_by_degree.measured),
         TableCell::count(info.subscribes_by_degree.stated),
+        TableCell::count(named),
+        TableCell::count(unknown),
         TableCell::text(evidence.join(" ")),
         TableCell::known(row.error.as_deref(), TableCell::text),
     ]
 }
 
-/// The survey as aligned text.
-pub fn survey_text(rows: &[SurveyRow]) -> String {
-    let head = [
-        "bag", "format", "size", "start", "span", "messages", "topics", "nodes", "pub", "sub",
-        "evidence",
+/// The survey as a table for people, fitted to `width`; a bag that cannot be read has a line that says why.
+pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
+    let column = |head, is_right, least, goes| Column {
+        head,
+        is_right,
+        least,
+        gives: (goes, goes),
+    };
+    let columns = [
+        column("bag", false, 20, 0),
+        column("format", false, WHOLE, 4),
+        column("size", true, WHOLE, 0),
+        column("start", false, 10, 5),
+        column("span", true, WHOLE, 0),
+        column("messages", true, WHOLE, 0),
+        column("topics", true, WHOLE, 0),
+        column("nodes", true, WHOLE, 0),
+        column("pub", true, WHOLE, 2),
+        column("sub", true, WHOLE, 3),
+        column("evidence", false, 12, 1),
     ];
-    let mut lines: Vec<Vec<String>> = vec![head.map(str::to_owned).to_vec()];
-    lines.extend(rows.iter().map(text_row));
-    let columns = head.len();
-    let width = |k: usize| {
-        lines
-            .iter()
-            .filter(|l| l.len() == columns)
-            .map(|l| l[k].chars().count())
-            .max()
-            .unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |cells: &Vec<String>| {
-        let padded = cells
-            .iter()
-            .zip(&widths)
-            .map(|(cell, width)| format!("{cell:<width$}"));
-        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-    };
-    lines.iter().map(line).collect()
+    let read: Vec<Vec<Cell>> = rows.iter().filter_map(text_row).collect();
+    let mut out = String::new();
+    if !read.is_empty() {
+        out = table(&columns, &read, width);
+    }
+    for row in rows {
+        if let Some(error) = &row.error {
+            let lead = format!("  {}  ", visible(&row.path));
+            out.push_str(&hang(&lead, &visible(error), 4, width));
+        }
+    }
+    out
 }
 
-fn text_row(row: &SurveyRow) -> Vec<String> {
-    let (Some(info), None) = (&row.info, &row.error) else {
-        let error = row.error.as_deref().unwrap_or_default();
-        return [&row.path, error]
-            .map(|text| visible(text).into_owned())
-            .into();
-    };
+/// The row of a bag that was read.
+fn text_row(row: &SurveyRow) -> Option<Vec<Cell>> {
+    let info = row.info.as_ref().filter(|_| row.error.is_none())?;
     let bag = info.bags.first();
     let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
-    vec![
+    let cells = [
         visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
         row.file_bytes.map(words::bytes).unwrap_or_default(),
@@ -155,5 +178,6 @@ fn text_row(row: &SurveyRow) -> Vec<String> {
         info.publishes_by_degree.total().to_string(),
         info.subscribes_by_degree.total().to_string(),
         evidence.join(" "),
-    ]
+    ];
+    Some(cells.into_iter().map(Cell::Text).collect())
 }

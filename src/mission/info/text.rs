@@ -3,22 +3,32 @@
 use std::fmt::Write as _;
 
 use super::{DegreeCounts, Info, NodeInfo, TopicInfo};
+use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 
-/// The most columns of a sparkline.
-const COLUMNS: usize = 32;
-const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-
-/// The summary as aligned text, ending in a new line.
-pub fn text(info: &Info) -> String {
+/// The summary as aligned text fitted to `width`, ending in a new line.
+pub fn text(info: &Info, width: Option<usize>) -> String {
     let mut out = String::new();
+    let flow = |text: &str| -> String {
+        let line = |line: &str| {
+            let lead = line.len() - line.trim_start().len();
+            hang(&line[..lead], &line[lead..], lead + 2, width)
+        };
+        // A line without words stays one.
+        text.lines().map(line).collect()
+    };
+    let mut prose = String::new();
     // Writing to a string cannot fail.
-    let _ = head(&mut out, info);
-    let _ = known(&mut out, info);
-    let _ = topics(&mut out, &info.topics);
-    let _ = nodes(&mut out, info);
-    let _ = undrawn(&mut out, info);
+    let _ = head(&mut prose, info);
+    let _ = known(&mut prose, info);
+    out.push_str(&flow(&prose));
+    out.push_str(&topics(&info.topics, width));
+    out.push('\n');
+    out.push_str(&nodes(info, width));
+    let mut prose = String::new();
+    let _ = undrawn(&mut prose, info);
+    out.push_str(&flow(&prose));
     out
 }
 
@@ -81,10 +91,7 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
         .sum();
     let counted = match unknown as usize {
         0 => String::new(),
-        n => format!(
-            " (the bag counts {} that nobody names)",
-            words::count(n, "publisher")
-        ),
+        n => format!(" ({} are unnamed)", words::count(n, "publisher")),
     };
     writeln!(
         out,
@@ -107,10 +114,13 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
     }
     info.advice
         .iter()
-        .try_for_each(|line| writeln!(out, "to know more: {line}"))?;
+        .try_for_each(|line| writeln!(out, "to learn more: {line}"))?;
     for figure in &info.figures {
         let (word, shows) = (figure.figure, &figure.shows);
-        writeln!(out, "for a paper: `--figure {word}` shows {shows}")?;
+        writeln!(
+            out,
+            "for a paper: `bagreel figure --kind {word}` shows {shows}"
+        )?;
     }
     writeln!(out)
 }
@@ -136,117 +146,82 @@ pub(crate) fn how_many(what: &str, degrees: DegreeCounts) -> String {
     words::count(degrees.total(), what) + &inner
 }
 
-fn topics(out: &mut String, topics: &[TopicInfo]) -> std::fmt::Result {
-    writeln!(out, "topics")?;
-    let width = topics
-        .iter()
-        .map(|t| t.name.chars().count())
-        .max()
-        .unwrap_or(0)
-        .min(60);
-    let kinds = topics
-        .iter()
-        .map(|t| t.types.join(" ").chars().count())
-        .max()
-        .unwrap_or(0)
-        .min(40);
-    for topic in topics {
-        let rate = topic.hz.map_or_else(String::new, words::rate);
-        let types = topic.types.join(" ");
-        let types = visible(&types);
-        let bars = sparkline(&topic.activity);
-        writeln!(
-            out,
-            "  {:<width$}  {types:<kinds$}  {:>9}  {rate:>9}  {bars}",
-            visible(topic.name.as_str()),
-            topic.count
-        )?;
+const fn column(head: &'static str, is_right: bool, least: usize, gives: (u8, u8)) -> Column {
+    Column {
+        head,
+        is_right,
+        least,
+        gives,
     }
-    writeln!(out)
 }
 
-fn nodes(out: &mut String, info: &Info) -> std::fmt::Result {
-    writeln!(out, "nodes")?;
-    let width = info
-        .nodes
-        .iter()
-        .map(|n| n.name.chars().count())
-        .max()
-        .unwrap_or(0)
-        .min(60);
-    for node in &info.nodes {
-        let life = |at: Option<i64>| {
-            at.map_or_else(
-                || "?".to_owned(),
-                |at| words::offset_seconds(at - info.start_ns),
-            )
-        };
-        let span = format!("{} – {}", life(node.first_ns), life(node.last_ns));
-        writeln!(
-            out,
-            "  {:<width$}  {:<9} {span:>15}  {}",
-            visible(node.name.as_str()),
-            node.degree,
-            load(node, info.duration_s)
-        )?;
-    }
-    Ok(())
+const TOPIC_COLUMNS: [Column; 5] = [
+    column("topic", false, 28, (0, 0)),
+    column("type", false, 12, (2, 1)),
+    column("messages", true, WHOLE, (0, 0)),
+    column("rate", true, WHOLE, (0, 0)),
+    column("activity", false, 8, (1, 2)),
+];
+
+const NODE_COLUMNS: [Column; 5] = [
+    column("node", false, 24, (0, 0)),
+    column("known", false, WHOLE, (0, 1)),
+    column("alive", true, WHOLE, (0, 0)),
+    column("sends", false, WHOLE, (0, 3)),
+    column("receives", false, WHOLE, (0, 2)),
+];
+
+fn topics(topics: &[TopicInfo], width: Option<usize>) -> String {
+    let row = |topic: &TopicInfo| {
+        vec![
+            Cell::Text(visible(topic.name.as_str()).into_owned()),
+            Cell::Type(visible(&topic.types.join(" ")).into_owned()),
+            Cell::Text(topic.count.to_string()),
+            Cell::Text(topic.hz.map_or_else(String::new, words::rate)),
+            Cell::Bars(topic.activity.clone()),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = topics.iter().map(row).collect();
+    table(&TOPIC_COLUMNS, &rows, width)
 }
 
-/// The messages that a node sends and receives per second of the mission.
-fn load(node: &NodeInfo, duration_s: f64) -> String {
+fn nodes(info: &Info, width: Option<usize>) -> String {
+    let row = |node: &NodeInfo| {
+        let (sends, receives) = load(node, info.duration_s);
+        vec![
+            Cell::Text(visible(node.name.as_str()).into_owned()),
+            Cell::Text(node.degree.to_owned()),
+            Cell::Text(alive(node, info.start_ns)),
+            Cell::Text(sends),
+            Cell::Text(receives),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = info.nodes.iter().map(row).collect();
+    table(&NODE_COLUMNS, &rows, width)
+}
+
+/// When a node is known to be alive: from its first to its last sign of life, or the only moment.
+fn alive(node: &NodeInfo, start_ns: i64) -> String {
+    let at = |time: i64| words::offset_seconds(time - start_ns);
+    match (node.first_ns, node.last_ns) {
+        (Some(first), Some(last)) if at(first) == at(last) => format!("at {}", at(first)),
+        (Some(first), Some(last)) => format!("{} – {}", at(first), at(last)),
+        (first, last) => first
+            .or(last)
+            .map_or_else(|| "?".to_owned(), |one| format!("at {}", at(one))),
+    }
+}
+
+/// The messages that a node sends and receives per second of the mission, and the topics: `0.26/s on 4`.
+fn load(node: &NodeInfo, duration_s: f64) -> (String, String) {
     let rate = |count: u64| words::number(count as f64 / duration_s.max(1e-3));
-    let topics = |n: usize| words::count(n, "topic");
-    let mut parts = Vec::new();
-    if node.publishes > 0 {
-        let sent = node
-            .sent
-            .map_or_else(String::new, |n| format!(" {} msg/s", rate(n)));
-        parts.push(format!("sends{sent} on {}", topics(node.publishes)));
-    }
-    if let Some(received) = node.received {
-        parts.push(format!(
-            "receives up to {} msg/s on {}",
-            rate(received),
-            topics(node.subscribes)
-        ));
-    }
-    parts.join(", ")
-}
-
-/// Messages over time as bars; a blank where there are no messages.
-fn sparkline(activity: &[u64]) -> String {
-    let columns = activity.len().clamp(1, COLUMNS);
-    let part = |k: usize| {
-        let (from, to) = (
-            k * activity.len() / columns,
-            (k + 1) * activity.len() / columns,
-        );
-        activity[from..to].iter().sum::<u64>()
+    let sends = match node.sent {
+        _ if node.publishes == 0 => String::new(),
+        Some(n) => format!("{}/s on {}", rate(n), node.publishes),
+        None => words::count(node.publishes, "topic"),
     };
-    let sums: Vec<u64> = (0..columns).map(part).collect();
-    let most = sums.iter().copied().max().unwrap_or(0).max(1);
-    // Rounded up, so that a single message is a bar.
-    let bar = |n: u64| {
-        if n == 0 {
-            ' '
-        } else {
-            BARS[usize::try_from((n * 8).div_ceil(most) - 1)
-                .unwrap_or(7)
-                .min(7)]
-        }
-    };
-    sums.into_iter().map(bar).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sparkline_shows_silence_as_blanks() {
-        assert_eq!(sparkline(&[0, 1, 4, 8]), " ▁▄█");
-        assert_eq!(sparkline(&[]), " ");
-        assert_eq!(sparkline(&[1; 100]).chars().count(), COLUMNS);
-    }
+    let receives = node.received.map_or_else(String::new, |n| {
+        format!("≤ {}/s on {}", rate(n), node.subscribes)
+    });
+    (sends, receives)
 }

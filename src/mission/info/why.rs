@@ -122,7 +122,7 @@ fn describe(
     let (first, last) = all.life(element);
     let words: Vec<&str> = evidence.words().collect();
     let signs = match (first, last) {
-        (None, None) => "no sign at a time of its own".to_owned(),
+        (None, None) => "no times of its own".to_owned(),
         _ => format!("first sign {}, last sign {}", at(first), at(last)),
     };
     writeln!(
@@ -162,7 +162,7 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
         format!("close to it: {}", close.join(", "))
     };
     let what = match names {
-        [name] => format!("no node or topic is called `{name}`"),
+        [name] => format!("there is no node or topic `{name}`"),
         names => format!("nothing connects `{}`", names.join("` and `")),
     };
     Error::usage(what, hint)

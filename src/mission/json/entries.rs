@@ -9,7 +9,9 @@ use super::write::words;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, Elements, NodeId};
-use crate::mission::ledger::{Detail, Entry, Kind, Ledger, Phase, sorted};
+use crate::mission::ledger::{
+    Detail, Entry, Interruption, InterruptionKind, Kind, Ledger, Phase, sorted,
+};
 
 /// An entry in the form for writing.
 #[derive(Serialize)]
@@ -46,6 +48,9 @@ enum DetailRow<'a> {
     Senders {
         from: Vec<&'a str>,
         to: Vec<&'a str>,
+    },
+    Count {
+        count: u64,
     },
     Values {
         from: &'a str,
@@ -92,6 +97,39 @@ pub(crate) struct PhaseRow {
     ramp: bool,
     #[serde(rename = "as")]
     same_as: Option<u32>,
+}
+
+/// An interruption of the recording in the form for writing and reading.
+#[derive(Deserialize, Serialize)]
+pub(crate) struct InterruptionRow {
+    time_ns: i64,
+    kind: String,
+    length_ns: i64,
+}
+
+impl From<&Interruption> for InterruptionRow {
+    fn from(one: &Interruption) -> Self {
+        Self {
+            time_ns: one.time.0,
+            kind: one.kind.word().to_owned(),
+            length_ns: one.length,
+        }
+    }
+}
+
+/// The interruptions of rows that were read, without those of unknown kinds.
+pub(crate) fn interruptions(rows: &[InterruptionRow]) -> Vec<Interruption> {
+    let one = |row: &InterruptionRow| {
+        let mut kinds = InterruptionKind::ALL.into_iter();
+        Some(Interruption {
+            time: Stamp(row.time_ns),
+            kind: kinds.find(|kind| kind.word() == row.kind)?,
+            length: row.length_ns.max(0),
+        })
+    };
+    let mut all: Vec<Interruption> = rows.iter().filter_map(one).collect();
+    all.sort_unstable();
+    all
 }
 
 impl From<&Phase> for PhaseRow {
@@ -159,6 +197,7 @@ fn detail<'a>(detail: &'a Detail, elements: &'a Elements) -> DetailRow<'a> {
             from: names(from),
             to: names(to),
         },
+        Detail::Count(count) => DetailRow::Count { count: *count },
         Detail::Values { from, to } => DetailRow::Values { from, to },
     }
 }
@@ -179,6 +218,7 @@ pub(crate) struct RawEntry {
     to_hz: Option<f64>,
     from: Option<OneOrMore>,
     to: Option<OneOrMore>,
+    count: Option<u64>,
     degree: Option<String>,
     #[serde(default)]
     evidence: Vec<String>,
@@ -278,6 +318,9 @@ fn topic(name: &str, elements: &Elements) -> Option<u32> {
 fn read_detail(row: &RawEntry, elements: &Elements) -> Option<Detail> {
     if let (Some(from_hz), Some(to_hz)) = (row.from_hz, row.to_hz) {
         return Some(Detail::Rates { from_hz, to_hz });
+    }
+    if let Some(count) = row.count {
+        return Some(Detail::Count(count));
     }
     let nodes = |names: &[String]| {
         let all = names.iter().map(|name| node(name, elements));

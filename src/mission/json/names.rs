@@ -8,7 +8,7 @@ use super::runs::RawElements;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
-use crate::graph::{Edge, Elements, Graph, Node, NodeState, Topic, TopicState};
+use crate::graph::{Edge, Elements, Graph, Measures, Node, NodeState, Topic, TopicState};
 
 /// Names with their facts over all windows, before they have places.
 #[derive(Default)]
@@ -273,10 +273,11 @@ impl Ids {
             state: raw.rest.state(),
             degree: raw.rest.degree(),
             count: raw.rest.count.unwrap_or(0),
-            bytes: raw.bytes,
+            bytes: raw.rest.bytes,
             hz: raw.rest.hz,
             median_period_s: raw.median_period_s,
             max_gap_s: raw.max_gap_s,
+            measures: raw.rest.measures(),
         };
         (state.id, state)
     }
@@ -308,6 +309,7 @@ impl Ids {
             hz: None,
             median_period_s: None,
             max_gap_s: None,
+            measures: Measures::default(),
         };
         (id, state)
     }

@@ -2,12 +2,12 @@
 
 use serde::Deserialize;
 
-use super::entries::{PhaseRow, RawEntry};
+use super::entries::{InterruptionRow, PhaseRow, RawEntry};
 use super::runs::RawWhole;
 use super::sending::RawSending;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{EdgeState, State};
+use crate::graph::{EdgeState, Measures, State};
 
 #[derive(Default, Deserialize)]
 pub(crate) struct Raw {
@@ -31,6 +31,8 @@ pub(crate) struct Raw {
     pub(crate) sending: Option<RawSending>,
     pub(crate) form: Option<String>,
     pub(crate) ledger: Option<Vec<RawEntry>>,
+    #[serde(default)]
+    pub(crate) interruptions: Vec<InterruptionRow>,
     #[serde(default)]
     pub(crate) phases: Vec<PhaseRow>,
     pub(crate) layout: Option<RawLayout>,
@@ -114,6 +116,10 @@ pub(crate) struct RawState {
     pub(crate) runs: Vec<[i64; 2]>,
     pub(crate) count: Option<u64>,
     pub(crate) hz: Option<f64>,
+    pub(crate) bytes: Option<u64>,
+    pub(crate) drops: Option<u64>,
+    pub(crate) jitter_s: Option<f64>,
+    pub(crate) age_s: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -130,7 +136,6 @@ pub(crate) struct RawTopic {
     pub(crate) name: String,
     #[serde(default)]
     pub(crate) types: Vec<String>,
-    pub(crate) bytes: Option<u64>,
     pub(crate) median_period_s: Option<f64>,
     pub(crate) max_gap_s: Option<f64>,
     pub(crate) qos: Option<String>,
@@ -170,6 +175,14 @@ impl RawState {
         spans(&self.runs)
     }
 
+    pub(crate) fn measures(&self) -> Measures {
+        Measures {
+            drops: self.drops,
+            jitter_s: self.jitter_s,
+            age_s: self.age_s,
+        }
+    }
+
     pub(crate) fn edge(&self, id: u32) -> EdgeState {
         EdgeState {
             id,
@@ -177,6 +190,8 @@ impl RawState {
             degree: self.degree(),
             count: self.count,
             hz: self.hz,
+            bytes: self.bytes,
+            measures: self.measures(),
         }
     }
 }

@@ -26,7 +26,7 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
         path: path.to_owned(),
         line,
         reason,
-        hint: "an evolution is what `bagreel render BAG -o x.json` writes".to_owned(),
+        hint: "`bagreel render BAG -o x.json` writes a mission".to_owned(),
     };
     let mut raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
     if raw.schema != SCHEMA && raw.schema != OLD_SCHEMA {
@@ -35,17 +35,19 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
     let ledger = raw.ledger.take();
     let phases = super::entries::phases(std::mem::take(&mut raw.phases));
+    let interruptions = super::entries::interruptions(&raw.interruptions);
     let mut mission = build(raw, &spans).map_err(|reason| bad(0, reason))?;
     if let Some(rows) = ledger {
         let entries = super::entries::read(&rows, &mission.elements);
         let nothing = || {
             bad(
                 0,
-                "an entry of its ledger is about nothing in its windows".to_owned(),
+                "an event refers to an element that is in no window".to_owned(),
             )
         };
         mission.ledger.entries = entries.ok_or_else(nothing)?;
         mission.ledger.phases = phases;
+        mission.ledger.interruptions = interruptions;
         mission.explain();
     }
     Ok(mission)
@@ -69,9 +71,7 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
             return Err(format!("window {index} ends before it starts"));
         }
         if index > 0 && spans[index - 1].start > span.start {
-            return Err(format!(
-                "window {index} starts before the one in front of it"
-            ));
+            return Err(format!("window {index} starts before the previous one"));
         }
     }
     Ok(spans)

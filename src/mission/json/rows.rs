@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::write::words;
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Edge, EdgeState, Elements, Node, NodeState, Topic, TopicState};
+use crate::graph::{Edge, EdgeState, Elements, Measures, Node, NodeState, Topic, TopicState};
 
 /// The intervals in which an element exists, as pairs of nanoseconds.
 #[derive(Clone, Copy)]
@@ -129,6 +129,27 @@ impl<'a> NodeRow<'a> {
     }
 }
 
+/// The further numbers of a window, those that are known.
+#[derive(Serialize)]
+struct MeasureRow {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drops: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    jitter_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    age_s: Option<f64>,
+}
+
+impl From<Measures> for MeasureRow {
+    fn from(measures: Measures) -> Self {
+        Self {
+            drops: measures.drops,
+            jitter_s: measures.jitter_s,
+            age_s: measures.age_s,
+        }
+    }
+}
+
 #[derive(Serialize)]
 pub(crate) struct TopicRow<'a> {
     name: &'a str,
@@ -141,6 +162,8 @@ pub(crate) struct TopicRow<'a> {
     hz: Option<f64>,
     median_period_s: Option<f64>,
     max_gap_s: Option<f64>,
+    #[serde(flatten)]
+    measures: MeasureRow,
     qos: Option<&'a str>,
     unknown_publishers: Option<u32>,
     first_ns: Option<i64>,
@@ -162,6 +185,7 @@ impl<'a> TopicRow<'a> {
             hz: state.hz,
             median_period_s: state.median_period_s,
             max_gap_s: state.max_gap_s,
+            measures: state.measures.into(),
             qos: topic.qos.as_deref(),
             unknown_publishers: topic.unknown_publishers,
             first_ns: nanos(topic.first),
@@ -194,6 +218,10 @@ struct EdgeRow<'a> {
     evidence: Vec<&'static str>,
     count: Option<u64>,
     hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bytes: Option<u64>,
+    #[serde(flatten)]
+    measures: MeasureRow,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
     runs: RunRows<'a>,
@@ -207,6 +235,8 @@ impl<'a> EdgeRow<'a> {
             evidence: words(edge.evidence),
             count: state.count,
             hz: state.hz,
+            bytes: state.bytes,
+            measures: state.measures.into(),
             first_ns: nanos(edge.first),
             last_ns: nanos(edge.last),
             runs: RunRows(&edge.runs),

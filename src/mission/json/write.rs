@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
 use super::changes::ChangeRow;
-use super::entries::{PhaseRow, entries};
+use super::entries::{InterruptionRow, PhaseRow, entries};
 use super::lines::LineFormatter;
 use super::rows::{NodeRow, PublishRow, SubscribeRow, TopicRow};
 use super::runs;
@@ -104,6 +104,10 @@ impl Serialize for Json<'_> {
         map.serialize_entry("period_ns", &mission.period.nanos())?;
         map.serialize_entry("step_ns", &mission.step.nanos())?;
         map.serialize_entry("ledger", &List(entries(&mission.ledger, &mission.elements)))?;
+        if !mission.ledger.interruptions.is_empty() {
+            let all = mission.ledger.interruptions.iter();
+            map.serialize_entry("interruptions", &List(all.map(InterruptionRow::from)))?;
+        }
         let phases = mission.ledger.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
         let elements = &mission.elements;

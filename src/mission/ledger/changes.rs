@@ -136,6 +136,8 @@ fn values(ledger: &Ledger, news: Span) -> impl Iterator<Item = (Change, EntryId)
 fn change(entry: &Entry) -> Option<Change> {
     let what = entry.what;
     match (&entry.detail, entry.kind) {
+        (Detail::Count(_), _) => None,
+        (_, kind) if kind.is_remark() => None,
         (Detail::Rates { from_hz, to_hz }, _) => Some(Change::Rate {
             what,
             from_hz: *from_hz,

@@ -1,6 +1,6 @@
 //! The making of a mission's entries from its lives: each kind in a file of its own, then sorted and joined.
 
-use super::{Detail, Entry, EntryId, Kind, hands, lifetimes, rates, silence};
+use super::{Detail, Entry, EntryId, Kind, hands, incidents, lifetimes, rates, silence};
 use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
@@ -38,6 +38,7 @@ pub(crate) fn make(told: &LedgerInput<'_>) -> Vec<Entry> {
     hands::tell(told, &mut drafts);
     rates::tell(told, &mut drafts);
     lifecycles(told, &mut drafts);
+    incidents::tell(told, &mut drafts);
     sorted(drafts.list, told.elements).0
 }
 

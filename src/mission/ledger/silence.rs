@@ -5,33 +5,32 @@ use std::collections::BTreeMap;
 use super::make::{Drafts, LedgerInput};
 use super::{EntryId, Kind};
 use crate::base::rhythm::TOGETHER_NS;
-use crate::base::time::{Span, Stamp};
-use crate::graph::history::{Bound, Sender, Stretch, all_silent};
-use crate::graph::{Element, NodeId, TopicId};
+use crate::base::time::Stamp;
+use crate::graph::history::{Bound, Sender};
+use crate::graph::{Element, NodeId, Record, TopicId};
 
 /// The beginning and end of a silence; `None` if to the end of the mission.
 type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let pauses = Pauses::new(&told.history.sending.senders);
     let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
     for (node, senders) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
         let what = Element::Node(node);
-        for silence in silences(told, what, &senders, &pauses) {
-            let id = drafts.add(entry(told, what, silence, &senders));
-            of_nodes.entry(node).or_default().push((silence, id));
+        for silence in silences(told, what) {
+            let id = drafts.add(entry(told, what, *silence, &senders));
+            of_nodes.entry(node).or_default().push((*silence, id));
         }
     }
     for (topic, senders) in by(told, |v| Some(v.topic).filter(|_| !v.is_latched)) {
         if told.is_by_the_way(topic) {
             continue;
         }
-        for silence in silences(told, Element::Topic(topic), &senders, &pauses) {
-            let mut entry = entry(told, Element::Topic(topic), silence, &senders);
+        for silence in silences(told, Element::Topic(topic)) {
+            let mut entry = entry(told, Element::Topic(topic), *silence, &senders);
             let nodes = senders.iter().filter_map(|v| of_nodes.get(&v.node?));
-            let whole = nodes.flatten().find(|(of, _)| meet(*of, silence));
+            let whole = nodes.flatten().find(|(of, _)| meet(*of, *silence));
             let whole = whole.map(|(_, id)| *id);
             entry.part_of = whole.or_else(|| gone.at(&senders, silence.0));
             drafts.add(entry);
@@ -78,18 +77,9 @@ fn by<'a>(
     of
 }
 
-fn silences(
-    told: &LedgerInput<'_>,
-    what: Element,
-    senders: &[&Sender],
-    pauses: &Pauses,
-) -> Vec<Silence> {
-    let lives = told.lives(what).iter();
-    let spans: Vec<Span> = lives.map(|life| life.span).collect();
-    let stretches: Vec<&[Stretch]> = senders.iter().map(|v| &v.stretches[..]).collect();
-    let mut all = all_silent(&stretches, &spans);
-    all.retain(|silence| !pauses.hold(*silence));
-    all
+/// The silences of an element.
+fn silences<'a>(told: &LedgerInput<'a>, what: Element) -> &'a [Silence] {
+    told.history.records.of(what).map_or(&[], Record::silences)
 }
 
 fn entry(
@@ -120,34 +110,4 @@ fn entry(
 fn meet(a: Silence, b: Silence) -> bool {
     let before = |a: Silence, b: Silence| a.1.is_some_and(|end| end <= b.0);
     !before(a, b) && !before(b, a)
-}
-
-/// The times without any message: the recording paused, not the robot.
-struct Pauses(Vec<(Stamp, Stamp)>);
-
-impl Pauses {
-    fn new(senders: &[Sender]) -> Self {
-        let sending = senders.iter().flat_map(|v| &v.stretches);
-        let mut sending: Vec<_> = sending.map(|s| (s.first, s.last)).collect();
-        sending.sort_unstable();
-        let mut pauses = Vec::new();
-        let mut until = sending.first().map_or(Stamp::MAX, |s| s.0);
-        for (first, last) in sending {
-            if first > until {
-                pauses.push((until, first));
-            }
-            until = until.max(last);
-        }
-        Self(pauses)
-    }
-
-    /// Whether most of a silence lies in a pause of the recording.
-    fn hold(&self, (from, to): Silence) -> bool {
-        let Some(to) = to else {
-            return false;
-        };
-        let inside = |(a, b): &(Stamp, Stamp)| (*b.min(&to)).since(*a.max(&from)).max(0);
-        let paused: i64 = self.0.iter().map(inside).sum();
-        paused > to.since(from) / 2
-    }
 }

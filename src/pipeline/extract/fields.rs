@@ -3,34 +3,44 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufWriter};
 
-use super::{Extract, Extracted, of_report, stop};
-use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
+use super::{Extract, Extracted, definitions, of_report, stop};
+use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
+use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
+use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::base::time::Stamp;
-use crate::evidence::message::fields::Decoder;
+use crate::base::words;
+use crate::evidence::message::fields::{Decoder, KnownTypes};
 use crate::export::tables::TableFormat;
 use crate::export::tables::folder::{Folder, Part, file_stem};
 use crate::export::tables::writer::Writer;
 use crate::pipeline::Watch;
+use crate::pipeline::collect::no_messages;
 
-/// The column in front of a message's fields: its log time.
+/// The columns in front of a message's fields: its log time, and the node that published it, if the bag says.
 const TIME: &str = "time_ns";
+const PUBLISHER: &str = "publisher";
+/// The table of the others: topic, type, file, number of rows.
+const INDEX: &str = "index";
 /// The number of bytes of messages that wait in one table before its rows are written.
 const MOST_WAITING: usize = 4 << 20;
 /// The same number for all tables together.
 const MOST_WAITING_IN_ALL: usize = 32 << 20;
+/// The most types that an error names.
+const MOST_NAMED: usize = 3;
 /// The number of bytes of packed rows that all tables hold in memory.
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let range = job.range(watch)?;
+    let types = definitions::read(&job.msg_paths)?;
     let mut tables = FieldTables {
         folder: Folder::create(job.target.path())?,
         format: job.format,
+        is_nested: job.nested,
         all: Vec::new(),
-        names: BTreeSet::new(),
+        names: BTreeSet::from([INDEX.to_owned()]),
         waiting: 0,
         failed: None,
     };
@@ -38,6 +48,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     for mut reader in job.open()? {
         let mut one = OfBag {
             job,
+            types: &types,
             tables: &mut tables,
             lost: &mut lost,
             sources: Vec::new(),
@@ -48,7 +59,9 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         lost.notices.extend(of_report(&report, &lost.notices));
         stop(watch)?;
     }
-
+    if tables.all.iter().all(|table| table.rows == 0) {
+        return Err(nothing(job, &lost));
+    }
     let (written, rows) = tables
         .finish()
         .map_err(Error::io("write into", job.target.path()))??;
@@ -60,16 +73,49 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     })
 }
 
-/// The messages that could not be decoded: their number, and notices about them.
+/// The failure of a job without a single row.
+fn nothing(job: &Extract, lost: &Lost) -> Error {
+    let is_whole = job.topics.passes_all() && job.start.is_none() && job.end.is_none();
+    if lost.types.is_empty() && is_whole {
+        return no_messages(&job.inputs, &lost.notices);
+    }
+    let path = job
+        .inputs
+        .first()
+        .map_or_else(String::new, Input::name)
+        .into();
+    if lost.types.is_empty() {
+        let hint = "`bagreel info` lists its topics and times".to_owned();
+        return Error::NoMessages { path, hint };
+    }
+    let types = lost
+        .types
+        .iter()
+        .map(|(name, why)| format!("{name}: {why}"));
+    let types: Vec<String> = types.collect();
+    Error::Unsupported {
+        path,
+        what: format!(
+            "no message could be decoded; {}",
+            words::some_of(&types, MOST_NAMED)
+        ),
+        hint: "`--msg-path DIR` names a folder of `.msg` files for missing definitions".to_owned(),
+    }
+}
+
+/// The messages that could not be decoded: their number, their types with a reason each, and notices about them.
 #[derive(Default)]
 struct Lost {
     messages: u64,
+    types: BTreeMap<String, String>,
     notices: Notices,
 }
 
 impl Lost {
     fn add(&mut self, topic: &str, type_name: &str, count: u64, why: &str) {
         self.messages += count;
+        let types = self.types.entry(type_name.to_owned());
+        types.or_insert_with(|| why.to_owned());
         self.notices.add(Notice {
             kind: NoticeKind::Undecodable,
             count,
@@ -82,6 +128,8 @@ impl Lost {
 struct FieldTable {
     topic: String,
     type_name: String,
+    /// The name of its file, once it has one.
+    file: String,
     decoder: Decoder,
     batch: Batch,
     rows: u64,
@@ -94,6 +142,7 @@ struct FieldTable {
 struct FieldTables {
     folder: Folder,
     format: TableFormat,
+    is_nested: bool,
     all: Vec<FieldTable>,
     /// Names of files taken so far, in lower case: some systems do not tell cases apart.
     names: BTreeSet<String>,
@@ -103,20 +152,22 @@ struct FieldTables {
 
 impl FieldTables {
     /// The place of the table for such messages.
-    fn of(&mut self, connection: &Connection, decoder: Decoder) -> usize {
-        let same = |t: &FieldTable| {
-            t.topic == connection.topic.as_str()
-                && *t.type_name == *connection.type_name
-                && t.decoder == decoder
-        };
+    fn of(&mut self, topic: &str, type_name: &str, decoder: Decoder) -> usize {
+        let same =
+            |t: &FieldTable| t.topic == topic && t.type_name == type_name && t.decoder == decoder;
         if let Some(at) = self.all.iter().position(same) {
             return at;
         }
-        let columns = std::iter::once(TableColumn::full(TIME, ColumnKind::Time, 0));
+        let columns = [
+            TableColumn::full(TIME, ColumnKind::Time, 0),
+            TableColumn::known(PUBLISHER, ColumnKind::Text),
+        ];
+        let fields = decoder.columns(&[TIME, PUBLISHER], self.is_nested);
         self.all.push(FieldTable {
-            topic: connection.topic.as_str().to_owned(),
-            type_name: connection.type_name.as_ref().to_owned(),
-            batch: Batch::of(columns.chain(decoder.columns(&[TIME]))),
+            topic: topic.to_owned(),
+            type_name: type_name.to_owned(),
+            file: String::new(),
+            batch: Batch::of(columns.into_iter().chain(fields)),
             decoder,
             rows: 0,
             waiting: 0,
@@ -126,14 +177,13 @@ impl FieldTables {
     }
 
     /// Adds a message to a table; `false` if it could not be decoded.
-    fn add(&mut self, at: usize, message: &Message<'_>) -> bool {
+    fn add(&mut self, at: usize, message: &Message<'_>, publisher: Option<&str>) -> bool {
         let table = &mut self.all[at];
-        if let ColumnValues::I64(times) = &mut table.batch.columns[0].values {
-            times.push(message.time.0);
-        }
+        table.batch.columns[0].push(&TableCell::Time(message.time));
+        table.batch.columns[1].push(&TableCell::known(publisher, TableCell::text));
         if table
             .decoder
-            .decode(message.data, &mut table.batch, 1)
+            .decode(message.data, &mut table.batch, 2)
             .is_err()
         {
             table.batch.take_back();
@@ -190,7 +240,7 @@ impl FieldTables {
 
     /// Begins the file of a table, under a name that no other has.
     fn begin(&mut self, at: usize) -> io::Result<Writer<BufWriter<Part>>> {
-        let table = &self.all[at];
+        let table = &mut self.all[at];
         let stem = file_stem(&table.topic);
         let mut name = stem.clone();
         let mut number = 1;
@@ -198,7 +248,8 @@ impl FieldTables {
             number += 1;
             name = format!("{stem}.{number}");
         }
-        let part = self.folder.file(format!("{name}.{}", self.format.word()));
+        table.file = format!("{name}.{}", self.format.word());
+        let part = self.folder.file(table.file.clone());
         let facts = [("topic", table.topic.as_str()), ("type", &table.type_name)];
         Writer::new(
             self.format,
@@ -216,6 +267,32 @@ impl FieldTables {
         }
         let mut writers = self.all.iter_mut().filter_map(|t| t.writer.as_mut());
         writers.try_for_each(Writer::unload)
+    }
+
+    /// Writes down which table is in which file.
+    fn write_index(&mut self) -> io::Result<()> {
+        let mut index = Batch::new(&[
+            ("topic", ColumnKind::Text),
+            ("type", ColumnKind::Text),
+            ("file", ColumnKind::Text),
+            ("n", ColumnKind::I64),
+        ]);
+        let mut tables: Vec<&FieldTable> = self.all.iter().filter(|t| t.rows > 0).collect();
+        tables.sort_by_key(|t| (&t.topic, &t.file));
+        for table in tables {
+            let text = |text: &str| TableCell::text(text.to_owned());
+            index.push(&[
+                text(&table.topic),
+                text(&table.type_name),
+                text(&table.file),
+                TableCell::count(table.rows),
+            ]);
+        }
+        let part = self.folder.file(format!("{INDEX}.{}", self.format.word()));
+        let mut writer = Writer::new(self.format, BufWriter::new(part), &index, &[])?;
+        writer.write(&index)?;
+        writer.finish()?.into_inner()?;
+        Ok(())
     }
 
     /// Writes the rest, one table after another, and gives all of them their names. Returns the number of tables and of
@@ -236,6 +313,7 @@ impl FieldTables {
             tables += 1;
             rows += self.all[at].rows;
         }
+        self.write_index()?;
         Ok(self.folder.commit().map(|()| (tables, rows)))
     }
 }
@@ -246,6 +324,9 @@ struct MessageTarget {
     type_name: String,
     /// The place of the table, or the reason why there is none; `None` for topics that are not asked for.
     table: Option<Result<usize, String>>,
+    /// The decoder to try if the first message does not fit the other.
+    older: Option<Decoder>,
+    publisher: Option<NodeName>,
     /// The number of messages stamped and not seen since.
     missing: u64,
 }
@@ -253,6 +334,7 @@ struct MessageTarget {
 /// The reader's visitor of one bag.
 struct OfBag<'a> {
     job: &'a Extract,
+    types: &'a KnownTypes,
     tables: &'a mut FieldTables,
     lost: &'a mut Lost,
     sources: Vec<MessageTarget>,
@@ -282,19 +364,24 @@ impl OfBag<'_> {
 
 impl Sink for OfBag<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
-        let is_wanted = self.job.topics.passes(connection.topic.as_str());
+        let (topic, type_name) = (connection.topic.as_str(), &*connection.type_name);
+        let is_wanted = self.job.topics.passes(topic);
+        let mut older = None;
         let table = is_wanted.then(|| {
-            let decoder = Decoder::new(connection)?;
-            Ok(self.tables.of(connection, decoder))
+            let (decoder, other) = Decoder::new(connection, self.types)?;
+            older = other;
+            Ok(self.tables.of(topic, type_name, decoder))
         });
         let want = match table {
             Some(Ok(_)) => Want::Payload,
             _ => Want::Stamps,
         };
         self.sources.push(MessageTarget {
-            topic: connection.topic.as_str().to_owned(),
-            type_name: connection.type_name.as_ref().to_owned(),
+            topic: topic.to_owned(),
+            type_name: type_name.to_owned(),
             table,
+            older,
+            publisher: connection.publisher.clone(),
             missing: 0,
         });
         want
@@ -315,8 +402,18 @@ impl Sink for OfBag<'_> {
         };
         // Messages may come before their stamps.
         source.missing = source.missing.wrapping_sub(1);
-        if !self.tables.add(table, &message) {
-            let why = "they do not have the layout of its definition";
+        let older = source.older.take();
+        let publisher = source.publisher.as_ref().map(NodeName::as_str);
+        let mut is_added = self.tables.add(table, &message, publisher);
+        if let Some(older) = older.filter(|_| !is_added) {
+            let table = self.tables.of(&source.topic, &source.type_name, older);
+            is_added = self.tables.add(table, &message, publisher);
+            if is_added {
+                source.table = Some(Ok(table));
+            }
+        }
+        if !is_added {
+            let why = "they do not match its definition";
             self.lost.add(&source.topic, &source.type_name, 1, why);
         }
     }

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::counts::{Count, FleetBag};
-use super::rows::{COUNTS, bags_table, counts_table};
+use super::rows::{COUNTS, ROLE, bags_table, counts_table};
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, ColumnValues, TableColumn};
 use crate::base::time::{Period, Stamp};
@@ -47,7 +47,9 @@ pub fn mission_batches(mission: &Mission) -> Result<Vec<(&'static str, RecordBat
 /// # Errors
 /// [`Error::Usage`] for a column that is missing, of another type, or unknown where it must be known.
 pub fn counts_of(batch: &RecordBatch) -> Result<Vec<Count>> {
-    let table = from_arrow(batch, COUNTS)?;
+    // A role follows from a name, and tables of before had none.
+    let columns = COUNTS.iter().filter(|(name, _)| *name != ROLE);
+    let table = from_arrow(batch, &columns.copied().collect::<Vec<_>>())?;
     (0..table.rows).map(|row| count(&table, row)).collect()
 }
 

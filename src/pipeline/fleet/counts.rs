@@ -7,7 +7,7 @@ use crate::bag::Tier;
 use crate::base::time::{Period, Span, Stamp};
 
 /// The version of both tables' columns, raised when the meaning of one changes.
-pub const SCHEMA_VERSION: i64 = 1;
+pub const SCHEMA_VERSION: i64 = 2;
 
 /// The messages of one publisher on one topic in one window: a row of the table `counts`. Windows without messages have
 /// none.

@@ -73,7 +73,7 @@ fn check(counts: &[Count]) -> Result<(Period, usize)> {
                 "`{}` in windows of {} and `{}` in windows of {} are not one mission",
                 one.mission, one.period, other.mission, other.period
             ),
-            "finish each mission by itself",
+            "finish each mission separately",
         ));
     }
     let wins = || counts.iter().map(|c| i128::from(c.win));
@@ -81,7 +81,7 @@ fn check(counts: &[Count]) -> Result<(Period, usize)> {
     if many > i128::from(budget::WINDOWS) {
         return Err(Error::usage(
             format!("its messages lie {many} windows apart"),
-            "leave out the counts at impossible times, or take a longer period",
+            "remove the counts at impossible times, or use a longer period",
         ));
     }
     Ok((one.period, usize::try_from(many).unwrap_or(usize::MAX)))
@@ -232,9 +232,11 @@ fn window(
         RawTopic {
             name: name.to_string(),
             types: types(lives, name),
-            bytes: sum.and_then(|sum| sum.bytes),
             max_gap_s: sum.and_then(|sum| Some(sum.gap? as f64 / 1e9)),
-            rest: state(life, sum),
+            rest: RawState {
+                bytes: sum.and_then(|sum| sum.bytes),
+                ..state(life, sum)
+            },
             ..RawTopic::default()
         }
     });
@@ -296,5 +298,6 @@ fn state(life: &WindowLife, sum: CountSum, window: Span) -> RawState {
         runs: Vec::new(),
         count: Some(sum.n),
         hz: per_second(sum.n, window),
+        ..RawState::default()
     }
 }

@@ -10,7 +10,6 @@ use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Stamp};
 use crate::graph::window::Align;
 use crate::pipeline::extract::Bounds;
-use crate::pipeline::survey::recordings;
 
 /// The options of a plan.
 #[derive(Clone, Debug)]
@@ -93,7 +92,7 @@ impl PlannedBag {
 /// The character that stands in a table for what is no UTF-8.
 const UNKNOWN: char = '\u{fffd}';
 
-/// The path whose name is no UTF-8 and told as `path`; `None` unless there is exactly one.
+/// The path whose name is no UTF-8 and reported as `path`; `None` unless there is exactly one.
 fn named(path: &Path) -> Option<PathBuf> {
     let mut real = PathBuf::new();
     for part in path.components() {
@@ -200,7 +199,7 @@ fn listed(source: &str) -> Result<Vec<String>> {
         }
         Input::Path(path) if path.is_dir() => {
             let text = |path: PathBuf| path.to_string_lossy().into_owned();
-            Ok(recordings(&path)?.into_iter().map(text).collect())
+            Ok(bag::recordings(&path)?.into_iter().map(text).collect())
         }
         _ => Ok(vec![source.to_owned()]),
     }
@@ -235,7 +234,7 @@ fn missions(uris: &[String], pattern: Option<&str>) -> Result<Vec<String>> {
     let pattern = Regex::new(pattern).map_err(|error| {
         Error::usage(
             format!("`{pattern}` is not a regular expression: {error}"),
-            "its first group, or all that it matches, names the mission",
+            "its first group, or the whole match, names the mission",
         )
     })?;
     let own = |(uri, stem): (&String, String)| match pattern.captures(uri) {
@@ -313,8 +312,8 @@ fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
 fn begins(input: &Input) -> Result<Option<Stamp>> {
     if input.is_pipe() {
         return Err(Error::usage(
-            "a bag that flows by tells only at its end when it began",
-            "save it to a file first, or take windows by the clock: `--align clock`",
+            "the start of a pipe is unknown until it ends",
+            "save it to a file first, or align windows with the clock: `--align clock`",
         ));
     }
     let mut reader = bag::open(input, &OpenOptions::default())?;

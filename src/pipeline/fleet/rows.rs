@@ -1,8 +1,12 @@
 //! The two tables of a fleet: their columns and cells.
 
 use super::counts::{Count, FleetBag, SCHEMA_VERSION};
+use crate::base::role::role;
 use crate::base::table::{Batch, ColumnKind, TableCell};
 use crate::base::time::Stamp;
+
+/// The column of a node's name without what is new in every run.
+pub(super) const ROLE: &str = "node_role";
 
 pub(super) const COUNTS: &[(&str, ColumnKind)] = &[
     ("mission", ColumnKind::Text),
@@ -15,6 +19,7 @@ pub(super) const COUNTS: &[(&str, ColumnKind)] = &[
     ("topic", ColumnKind::Text),
     ("type", ColumnKind::Text),
     ("node", ColumnKind::Text),
+    (ROLE, ColumnKind::Text),
     ("n", ColumnKind::I64),
     ("bytes", ColumnKind::I64),
     ("first_ns", ColumnKind::I64),
@@ -42,6 +47,7 @@ pub(crate) fn counts_table(counts: &[Count]) -> Batch {
             TableCell::text(&*count.topic),
             TableCell::text(&*count.type_name),
             TableCell::known(count.node.as_deref(), TableCell::text),
+            TableCell::known(count.node.as_deref().map(role), TableCell::text),
             TableCell::count(count.n),
             TableCell::known(count.bytes, TableCell::count),
             TableCell::known(count.first, nanos),

@@ -110,6 +110,7 @@ fn union(json: &serde_json::Value) -> Graph {
                 (1 + name.rsplit('/').next().unwrap_or("").len()) as f64 * 6.0,
                 14.0,
             ),
+            footer: Size::default(),
         })
         .collect();
     let count = nodes.len();

@@ -23,6 +23,8 @@ pub(crate) struct Measures {
     pub(crate) label_overlaps: usize,
     /// Labels on another edge that are not on their own.
     pub(crate) strayed: usize,
+    /// Labels on another edge.
+    pub(crate) crossed: usize,
     /// Vertices inside a cluster that is not theirs.
     pub(crate) foreign: usize,
     /// How many pieces of routes are not straight and level.
@@ -60,10 +62,29 @@ pub(crate) fn measure(plan: &Plan, layout: &Layout) -> Measures {
         labels: labels.len(),
         label_overlaps: pairs(&labels) + on_boxes,
         strayed: strayed(plan, layout, &lines),
+        crossed: crossed(plan, layout, &lines),
         foreign: foreign(plan, layout),
         bends: layout.routes.iter().map(bends).sum(),
         length: lines.iter().flat_map(|line| line.windows(2)).map(far).sum(),
     }
+}
+
+fn crossed(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
+    let labels = layout.routes.iter().zip(&plan.links).enumerate();
+    // The arcs of self loops are measured in more pieces here than there.
+    let labels = labels.filter(|(_, (_, link))| link.from != link.to);
+    let labels = labels.filter_map(|(i, (route, link))| {
+        // Two may touch; `enters` looks 2 px further inside.
+        Some((i, Rect::around(route.label?, link.label?).grown(1.5)))
+    });
+    let is_crossed = |&(own, label): &(usize, Rect)| {
+        let mut others = lines.iter().enumerate().filter(|(i, _)| *i != own);
+        others.any(|(_, line)| {
+            line.windows(2)
+                .any(|pair| enters(pair, &label, Outline::Box))
+        })
+    };
+    labels.filter(is_crossed).count()
 }
 
 fn strayed(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
@@ -159,7 +180,7 @@ fn enters(pair: &[Point], at: &Rect, outline: Outline) -> bool {
         let t = f64::from(step) / 40.0;
         let (x, y) = (a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t);
         match outline {
-            Outline::Box => x.abs() < 1.0 && y.abs() < 1.0,
+            Outline::Box | Outline::Pill => x.abs() < 1.0 && y.abs() < 1.0,
             Outline::Ellipse => x * x + y * y < 1.0,
         }
     })

@@ -13,7 +13,7 @@ pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
 }
 
 /// The rules for elements that are active and did not change.
-pub(crate) fn base(style: &Style) -> String {
+fn base(style: &Style) -> String {
     let mut out = String::from(
         ":is(.node,.topic,.edge) text{text-anchor:middle;stroke:none}use,.c,.l{visibility:hidden}",
     );
@@ -36,7 +36,7 @@ pub(crate) fn base(style: &Style) -> String {
 
 /// The rules for what classes change of that: rate, degree, state and mark; a later rule counts more. Only these class
 /// words have rules.
-pub(crate) fn states(style: &Style, words: &BTreeSet<&str>) -> String {
+fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // What is silent has no rate worth a place.
     let mut out = String::from(
         ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed):not(.changed)>.r{visibility:hidden}",

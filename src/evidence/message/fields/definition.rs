@@ -1,17 +1,22 @@
 //! The text of a message definition as fields, with the messages inside it.
 
+use std::fmt;
+use std::sync::Arc;
+
+use super::known::KnownTypes;
+
 /// A field of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Field {
-    pub(super) name: String,
+pub(crate) struct Field {
+    pub(crate) name: String,
     /// The type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
-    pub(super) kind: String,
-    pub(super) array: Array,
+    pub(crate) kind: String,
+    pub(crate) array: Array,
 }
 
 /// The kind of array that a field is, if any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Array {
+pub(crate) enum Array {
     No,
     /// An array of this length.
     Fixed(usize),
@@ -19,18 +24,30 @@ pub(super) enum Array {
     Told,
 }
 
+impl fmt::Display for Array {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::No => Ok(()),
+            Self::Fixed(length) => write!(f, "[{length}]"),
+            Self::Told => f.write_str("[]"),
+        }
+    }
+}
+
 /// A message: its package, its name without it, its fields.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct MessageFields {
-    package: String,
-    name: String,
-    pub(super) fields: Vec<Field>,
+pub(crate) struct MessageFields {
+    pub(super) package: String,
+    pub(crate) name: String,
+    pub(crate) fields: Vec<Field>,
 }
 
 /// A parsed definition, the outermost message first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Definition {
-    pub(super) messages: Vec<MessageFields>,
+    pub(super) messages: Vec<Arc<MessageFields>>,
+    /// Whether the text named the messages inside it, in some old bags without their packages.
+    is_loose: bool,
 }
 
 impl Definition {
@@ -47,16 +64,25 @@ impl Definition {
         if text.contains("module ") && text.contains("struct ") {
             return Err("its definition is written in IDL, which is not decoded".to_owned());
         }
-        let mut messages = vec![MessageFields::new(type_name)];
-        for line in text.lines() {
-            let line = without_comment(line);
-            if let Some(name) = line.strip_prefix("MSG:") {
-                messages.push(MessageFields::new(name.trim()));
-            } else if let (Some(field), Some(message)) = (field(line)?, messages.last_mut()) {
-                message.fields.push(field);
-            }
-        }
-        Ok(Self { messages })
+        let messages = messages(text, type_name)?;
+        Ok(Self {
+            messages: messages.into_iter().map(Arc::new).collect(),
+            is_loose: true,
+        })
+    }
+
+    /// The definition of a type that the bag does not define; `is_older` as it was before it changed, if it has.
+    pub(super) fn known(types: &KnownTypes, type_name: &str, is_older: bool) -> Option<Self> {
+        let name = MessageFields::new(type_name);
+        let all = types.all(is_older);
+        let same = |m: &&&Arc<MessageFields>| m.name == name.name && m.package == name.package;
+        let own = all.iter().find(same).map(|m| Arc::clone(m))?;
+        Some(Self {
+            messages: std::iter::once(own)
+                .chain(all.into_iter().cloned())
+                .collect(),
+            is_loose: false,
+        })
     }
 
     /// The place of the message that `kind` names in the message at place `from`: of the package in the name, of the
@@ -75,14 +101,43 @@ impl Definition {
         let inside = || self.messages.iter().enumerate().skip(1);
         let found = inside()
             .find(|(_, m)| m.name == wanted.name && m.package == *package)
-            .or_else(|| inside().find(|(_, m)| m.name == wanted.name));
+            .or_else(|| {
+                // `Header` alone is the one of `std_msgs`, wherever it stands.
+                let by_name = |m: &MessageFields| self.is_loose || m.name == "Header";
+                inside().find(|(_, m)| m.name == wanted.name && by_name(m))
+            });
         found
             .map(|(at, _)| at)
             .ok_or_else(|| format!("its definition lacks the type `{kind}`"))
     }
 }
 
+/// The messages of a text: `type_name`, whose fields come first, and those behind a line `MSG:`.
+///
+/// # Errors
+/// The reason why it cannot be used.
+pub(super) fn messages(text: &str, type_name: &str) -> Result<Vec<MessageFields>, String> {
+    let mut messages = vec![MessageFields::new(type_name)];
+    for line in text.lines() {
+        let line = without_comment(line);
+        if let Some(name) = line.strip_prefix("MSG:") {
+            messages.push(MessageFields::new(name.trim()));
+        } else if let (Some(field), Some(message)) = (field(line)?, messages.last_mut()) {
+            message.fields.push(field);
+        }
+    }
+    Ok(messages)
+}
+
 impl MessageFields {
+    /// Whether it is ROS 2's time, two numbers of 32 bits.
+    pub(super) fn is_time(&self) -> bool {
+        let fields = self.fields.iter().map(|f| f.kind.as_str());
+        self.package == "builtin_interfaces"
+            && self.name == "Time"
+            && fields.eq(["int32", "uint32"])
+    }
+
     /// A message `std_msgs/Header`, `std_msgs/msg/Header` or `Header`, without fields yet.
     fn new(name: &str) -> Self {
         let mut parts = name.split('/');

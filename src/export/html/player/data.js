@@ -15,6 +15,8 @@ const data = JSON.parse(await unpacked($.data));
 say('data', '');
 const { words, starts, ends, told, phases, rows, hands, sizes } = data;
 const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
+// How long the lives take: of two missions, whose windows have no times, as long as the longer one.
+const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lives]) => lives.filter((_, k) => k % 3 < 2))) : total;
 // The window that shows a time: the last that begins before it.
 const windowAt = s => Math.max(0, starts.findLastIndex(start => start <= s + 1e-6));
 const iso = (s, from, to) => new Date(Math.round(s * 1e3)).toISOString().slice(from, to).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');

@@ -11,9 +11,11 @@ function livesOn(on) {
 	resized();
 }
 function escape() {
+	if (!$.big.hidden) return enlarge(false);
 	if (!$.sheet.hidden) return table(false);
 	if ($.q.value) return clearSearch();
 	if (sel >= 0 || !$.card.hidden) return pick(-1);
+	if (range) { span(null); return seek(now); }
 	if (base >= 0) compare(-1);
 }
 const MOVES = { ArrowRight: 1, ArrowLeft: -1, '.': 1, ',': -1, PageDown: W / 10, PageUp: -W / 10, Home: -W, End: W };
@@ -21,6 +23,7 @@ const KEYS = {
 	' ': () => play(!timer), '[': () => jump(-1), ']': () => jump(1), p: () => jump(-1), n: () => jump(1),
 	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
 	'/': () => { side(true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
+	g: () => enlarge($.big.hidden), r: () => { if (data.sides) return; if (range) { span(null); seek(now); } else { anchor = now; go(now); } },
 	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => livesOn($.deck.classList.contains('small')), s: () => side(!sideIsOpen()),
 	o: () => { if (group >= 0) unfold(); else if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
 };
@@ -49,17 +52,33 @@ document.addEventListener('click', e => {
 		if (innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
 	}
 });
+// Until somebody chooses what to look at, it is chosen anew for every size of the stage.
+let fresh = false;
+for (const event of ['pointerdown', 'wheel', 'keydown']) addEventListener(event, () => { fresh = false; }, { capture: true, passive: true });
 // Keys go on working after a choice.
 $.speed.onchange = () => $.play.focus();
-const resized = () => { wide = stage.clientWidth; high = stage.clientHeight; drawTime(); fit(view); };
+const resized = () => { if (beforePrint) return; wide = stage.clientWidth; high = stage.clientHeight; drawTime(); fresh ? firstView() : fit(view); if (!$.big.hidden) enlarge(true); };
 new ResizeObserver(resized).observe(stage);
 // The address that was asked for, even where ours was written over it since.
 onhashchange = e => load(e.newURL.split('#')[1]);
 if ($.open) $.open.hidden = !folded;
 $.notes.hidden = !$.notes.querySelector('li');
 if (innerWidth < 1200) side(false);
-livesOn(innerWidth > 760 && innerHeight > 600);
+livesOn(isBoard || innerWidth > 760 && innerHeight > 600);
 if (innerWidth <= 760) side(true);
-// The board draws its own head.
-if ($.boardhead) onSeek.push(() => { for (const k of ['x', 'width']) $.boardhead.setAttribute(k, $.boardhead.dataset[k].split(' ')[now]); });
+// Paper shows all of it, with names and lives, whatever the screen shows.
+onbeforeprint = () => {
+	beforePrint = [view, $.deck.classList.contains('small')];
+	if (!isBoard) fit(homeOf());
+	svg().classList.remove('norates', 'notopics', 'nonodes');
+	$.deck.classList.remove('small');
+	$.time.style.width = '42rem';
+	drawTime();
+};
+onafterprint = () => {
+	const [box, isSmall] = beforePrint;
+	beforePrint = $.time.style.width = '';
+	livesOn(!isSmall);
+	fit(box);
+};
 load(location.hash.slice(1));

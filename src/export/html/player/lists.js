@@ -27,8 +27,9 @@ function element(i) {
 }
 function listNews() {
 	if (base < 0) {
-		say('newstitle', data.sides ? 'What differs' : 'Changes in this window');
-		const { n = 0, lines = [] } = news.get(now) ?? {};
+		say('newstitle', data.sides ? 'What differs' : range ? 'Changes in these windows' : 'Changes in this window');
+		const all = told.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
+		const n = all.reduce((sum, [, n]) => sum + n, 0), lines = all.flatMap(([, , , lines]) => lines);
 		// Nothing, as before.
 		if (!n && $.news.firstChild?.textContent == 'None.') return;
 		fill('news', lines, ([s, sign, i, text, id]) => {
@@ -47,19 +48,43 @@ function listNews() {
 }
 onSeek.push(listNews);
 
-// Search: all words must be in name or type; `a -> b` finds connections.
+// Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then what
+// begins with the text, then what holds it; where nothing does, what is nearly written so.
 function found(text) {
 	const q = text.toLowerCase().trim();
 	if (!q) return NONE;
-	const ends = q.split(/\s*(?:->|→)\s*/), all = [], has = (name, part) => part.split(/\s+/).every(word => name.includes(word));
-	for (let i = 0; i < whole.count; i++) {
-		if (ends.length > 1) {
-			if (i < whole.N) continue;
-			const [a, b] = whole.ends(i).map(end => whole.names[end].toLowerCase());
-			if (has(a, ends[0]) && has(b, ends[1])) all.push(i);
-		} else if (i < whole.N && has((whole.names[i] + ' ' + whole.type(i).slice(5)).toLowerCase(), q)) all.push(i);
+	const ends = q.split(/\s*(?:->|→)\s*/), has = (name, part) => part.split(/\s+/).every(word => name.includes(word));
+	const items = [...whole.names.keys()], lower = whole.names.map(name => name.toLowerCase());
+	if (ends.length > 1) {
+		return [...Array(whole.count - whole.N).keys()].map(k => k + whole.N).filter(i => {
+			const [a, b] = whole.ends(i).map(end => lower[end]);
+			return has(a, ends[0]) && has(b, ends[1]);
+		});
 	}
-	return all;
+	const tail = i => lower[i].slice(lower[i].lastIndexOf('/') + 1);
+	const rank = i => lower[i] == q || tail(i) == q ? 0 : tail(i).startsWith(q) ? 1 : tail(i).includes(q) ? 2 : has(lower[i], q) ? 3 : 4;
+	const sorted = (all, rank) => all.map(i => [rank(i), lower[i].length, i]).sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2]).map(([, , i]) => i);
+	const all = items.filter(i => has(lower[i] + ' ' + whole.type(i).slice(5).toLowerCase(), q));
+	if (all.length || q.length < 3) return sorted(all, rank);
+	const most = Math.min(2, Math.ceil(q.length / 4)), apart = i => Math.min(...[lower[i], ...lower[i].split('/')].map(part => distance(q, part)));
+	const close = items.filter(i => apart(i) <= most);
+	return close.length ? sorted(close, apart) : sorted(items.filter(i => isInOrder(q, lower[i])), () => 0);
+}
+// The letters to insert, leave out or exchange.
+function distance(a, b) {
+	if (Math.abs(a.length - b.length) > 2) return 9;
+	let row = [...Array(b.length + 1).keys()];
+	for (let i = 1; i <= a.length; i++) {
+		const next = [i];
+		for (let j = 1; j <= b.length; j++) next[j] = Math.min(row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] != b[j - 1]));
+		row = next;
+	}
+	return row[b.length];
+}
+function isInOrder(q, name) {
+	let at = 0;
+	for (const c of name) if (c == q[at]) at++;
+	return at == q.length;
 }
 let hitList = NONE;
 function search() {
@@ -81,3 +106,17 @@ function clearSearch() {
 }
 $.q.oninput = search;
 $.only.onchange = () => { only = $.only.checked; dress(); };
+// Namespaces, each with a box that leaves it out.
+function listSpaces() {
+	const counts = new Map();
+	for (const name of whole.names) counts.set(spaceOf(name), (counts.get(spaceOf(name)) ?? 0) + 1);
+	$.spaces.hidden = counts.size < 2;
+	$.spacelist.replaceChildren(...[...counts].sort().map(([space, n]) => make('label', {}, make('input', { type: 'checkbox', checked: !without.has(space), onchange: e => {
+		without[e.target.checked ? 'delete' : 'add'](space);
+		dress();
+		drawTime();
+		save();
+	} }), ` ${space == '/' ? 'no namespace' : space} (${n})`)));
+}
+$.known.hidden = !isBoard || !whole.kinds.includes(0);
+onSeek.push(() => $.known.hidden || fill('knownlist', [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])), element));

@@ -1,10 +1,45 @@
 // What a window looks like: classes, rates, header. `shown` is the graph on the stage, `base` the window to compare with.
 let now = 0, base = -1, shown = folded ?? whole, sel = -1, timer = 0, hits = null;
-let near = new Set(), only = false;
+let near = new Set(), only = false, looping = false;
+// A range of windows shown as one: its ends, the window that it grows from, and what it looks like, per graph.
+let range = null, anchor = -1, rangeLooks = new Map();
+// Namespaces that the reader left out.
+const without = new Set();
+const spaceOf = name => name.startsWith('/') && name.indexOf('/', 1) > 0 ? name.slice(0, name.indexOf('/', 1)) : '/';
+const isOut = (g, i) => without.size > 0 && (i < g.N ? [i] : g.ends(i)).some(k => without.has(spaceOf(g.names[k])) || without.has(g.names[k]));
 const onSeek = [], stage = $.stage;
 const calm = matchMedia('(prefers-reduced-motion)');
 
+// Class and label of every element over the range: what was there at any time, marked where its end differs from its
+// beginning; rates are means over all of it.
+function looksOf(g) {
+	if (rangeLooks.has(g)) return rangeLooks.get(g);
+	const [from, to] = range, length = ends[to] - starts[from], looks = [];
+	for (let i = 0; i < g.count; i++) {
+		const list = g.lives[i][0], first = g.class(i, from), after = g.isThere(i, to);
+		let last = -1, sum = 0;
+		for (let p = Math.max(0, place(list, from) - 2); p < list.length && list[p] <= to; p += 2) {
+			const end = Math.min(list[p + 2] ?? W, to + 1);
+			if (!list[p + 1]) continue;
+			last = list[p + 1];
+			for (let w = Math.max(from, list[p]); w < end; w++) sum += g.hz(i, w) * (ends[w] - starts[w]);
+		}
+		// What begins in the first window was not there before it; class 0 is nobody.
+		const was = first > 0 && g.marks[first] != 0, mark = was == after ? '' : after ? ' added' : ' removed';
+		looks.push(last < 0 ? ['off', ''] : [g.plain[last] + mark, sum ? spell(sum / length) + ' Hz' : '']);
+	}
+	rangeLooks.set(g, looks);
+	return looks;
+}
+const spell = hz => hz >= 99.95 ? hz.toFixed(0) : hz >= .95 ? +hz.toFixed(1) + '' : hz ? +hz.toPrecision(2) + '' : '0';
+// Shows the windows from one to another as one graph; `null` shows single windows again.
+function span(ends) {
+	range = ends && [Math.min(...ends), Math.max(...ends)];
+	if (!range) anchor = -1;
+	rangeLooks = new Map();
+}
 function classOf(g, i, w) {
+	if (range) return looksOf(g)[i][0];
 	const k = g.class(i, w);
 	if (base < 0) return g.classes[k];
 	const [difference] = g.difference(i, base, w);
@@ -12,6 +47,7 @@ function classOf(g, i, w) {
 	return (g.there[k] ? g.plain[k] : 'off') + (difference ? ' ' + difference : '');
 }
 function labelOf(g, i, w) {
+	if (range) return looksOf(g)[i][1];
 	if (base >= 0) return g.difference(i, base, w)[1] ?? g.rate(i, w);
 	const lifecycle = g.lives[i][2].length && g.lifecycle(i, w);
 	const topic = i >= g.N && g.arrows[i - g.N][2], turn = g.turn(i, w);
@@ -21,7 +57,7 @@ function labelOf(g, i, w) {
 function dress() {
 	const g = shown, moved = [];
 	g.els.forEach((e, i) => {
-		const look = classOf(g, i, now), cls = near.has(i) ? look + ' near' : look, all = hits?.has(i) ? cls + ' hit' : cls;
+		const look = classOf(g, i, now) + (isOut(g, i) ? ' without' : ''), cls = near.has(i) ? look + ' near' : look, all = hits?.has(i) ? cls + ' hit' : cls;
 		if (all != g.cur[i]) {
 			if (look != g.cur[i].replace(/ (near|hit)\b/g, '')) moved.push(i);
 			e.setAttribute('class', g.base[i] + (g.cur[i] = all));
@@ -38,13 +74,14 @@ function dress() {
 // What is marked in the present window, or differs from the base.
 function marked(g = shown) {
 	const all = [];
+	if (range) return looksOf(g).flatMap(([look], i) => /added|removed/.test(look) ? i : NONE);
 	for (let i = 0; i < g.count; i++) if (base < 0 ? g.marks[g.class(i, now)] >= 0 : g.difference(i, base, now).length) all.push(i);
 	return all;
 }
 function chipsOf() {
-	if (base < 0) return news.get(now)?.chips ?? [];
+	if (base < 0 && !range) return news.get(now)?.chips ?? [];
 	const sum = { added: [0, 0, 0], removed: [0, 0, 0], changed: [0, 0, 0] };
-	marked(whole).forEach(i => sum[whole.difference(i, base, now)[0].split(' ')[0]][i < whole.N ? +(whole.kinds[i] % 3 > 0) : 2]++);
+	marked(whole).forEach(i => sum[range ? looksOf(whole)[i][0].split(' ').at(-1) : whole.difference(i, base, now)[0].split(' ')[0]][i < whole.N ? +(whole.kinds[i] % 3 > 0) : 2]++);
 	const spell = (sign, counts) => counts.map((n, k) => n && `${sign}${n} ${['node', 'topic', 'edge'][k]}${n > 1 ? 's' : ''}`).filter(Boolean).join(' ');
 	return [spell('+', sum.added), spell('−', sum.removed), spell('', sum.changed) && spell('', sum.changed) + ' changed'];
 }
@@ -63,14 +100,15 @@ function seek(w, quiet) {
 }
 function header() {
 	const place = `window ${now + 1} of ${W}`, chips = chipsOf();
-	say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
+	if (range) say('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${clock(starts[range[0]])} – ${clock(ends[range[1]])} of ${clock(total)} · mean rates`);
+	else say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
 	// The events of the log that the chips count; what differs between any two windows need not be one.
-	if (base < 0) $.chips.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
+	if (base < 0 && !range) $.chips.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
 	else delete $.chips.dataset.entries;
 	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;
@@ -79,12 +117,18 @@ function header() {
 function play(on) {
 	if (!on && !timer) return;
 	clearTimeout(timer);
-	timer = on && setTimeout(() => { seek(now + 1, 1); play(now < last); }, 1e3 / $.speed.value);
+	if (on) span(null);
+	timer = on && setTimeout(() => { seek(now == last && looping ? 0 : now + 1, 1); play(looping || now < last); }, 1e3 / $.speed.value);
 	say('play', on ? 'Pause' : 'Play');
 	if (on && now == last) seek(0, 1);
 	if (!on) save();
 }
-const go = w => { play(0); seek(w); };
+function go(w) {
+	play(0);
+	w = Math.max(0, Math.min(last, w));
+	span(anchor < 0 ? null : [anchor, w]);
+	seek(w);
+}
 // To the next window with a headline; of the followed element only, if one is.
 function jump(by) {
 	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.turns(sel) : news;
@@ -94,6 +138,7 @@ function jump(by) {
 	else { play(0); say('live', by > 0 ? 'No change after this one' : 'No change before this one'); }
 }
 function compare(w) {
+	if (w >= 0) span(null);
 	base = w;
 	$.compare.ariaPressed = base >= 0;
 	say('compare', base < 0 ? 'Compare' : 'Stop comparing');

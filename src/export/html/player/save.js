@@ -2,8 +2,10 @@
 let later;
 const escapes = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
 function link() {
-	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel >= 0 ? whole.key(sel) : group >= 0 ? folded.key(group) : '', q: $.q.value, table: $.sheet.hidden ? '' : 1 };
-	return '#' + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
+	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel >= 0 ? whole.key(sel) : group >= 0 ? folded.key(group) : '', q: $.q.value, table: $.sheet.hidden ? '' : 1, e: range ? ends[range[1]] : '', out: [...without].join(',') };
+	if (range) parts.t = starts[range[0]];
+	const flags = ['bare', 'loop'].filter(flag => new URLSearchParams(location.hash.slice(1)).has(flag)).map(flag => flag + '&').join('');
+	return '#' + flags + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
 }
 function save() {
 	clearTimeout(later);
@@ -15,13 +17,23 @@ function load(hash = '') {
 	$.q.value = to.get('q') ?? '';
 	base = against >= 0 ? windowAt(against) : -1;
 	now = time >= 0 ? windowAt(time) : data.still;
-	compare(base);
+	const end = parseFloat(to.get('e'));
+	span(end > time ? [now, windowAt(end - 1e-3)] : null);
+	for (const space of to.get('out')?.split(',') ?? []) without.add(space);
+	listSpaces();
+	for (const flag of ['bare', 'loop']) document.body.classList.toggle(flag, to.has(flag));
+	resized();
+	looping = to.has('loop');
+	if (range) seek(now);
+	else compare(base);
 	const name = to.get('sel'), i = ['', 'node:', 'topic:', 'topics:', 'edge:'].map(kind => whole.keys.get(kind + name)).find(i => i >= 0);
 	firstView();
 	pick(name === null ? -1 : i ?? -1, 1);
+	fresh = name === null;
 	if (!(i >= 0) && folded?.keys.has(name)) pickGroup(folded.keys.get(name));
 	search();
 	if (to.get('table')) table(true);
+	if (looping && !calm.matches) play(1);
 }
 // The stage as it is, with the rules that colour it and the font that it is set in.
 function picture() {

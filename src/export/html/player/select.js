@@ -10,7 +10,7 @@ const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key
 function pick(i, look, fromList) {
 	sel = i;
 	group = -1;
-	if (i >= 0 && look && !whole.isThere(i, now) && base < 0) toLife(i);
+	if (i >= 0 && look && !whole.isThere(i, now) && base < 0 && !range) toLife(i);
 	if (i >= 0 && look && shown == folded && !near_of(i).size) show(whole);
 	near = near_of(i);
 	dress();
@@ -93,6 +93,10 @@ function card() {
 	// What a group holds is listed below.
 	$.facts.replaceChildren(...facts.filter(fact => group < 0 || !/^\d+ together/.test(fact)).map(fact => make('p', { textContent: fact })));
 	drawLife(g.lives[i][0], g.classes);
+	drawRate($.rate, g, i);
+	$.rate.toggleAttribute('hidden', !$.rate.childElementCount);
+	$.enlarge.hidden = $.rate.hasAttribute('hidden');
+	if (!$.big.hidden) enlarge(true);
 	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;
 	say('unfold', shown == whole ? 'Fold again' : 'Open');
@@ -108,6 +112,38 @@ function drawLife(life, classes) {
 	$.life.setAttribute('viewBox', `0 0 ${total} 9`);
 	$.life.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
 }
+// The rate of an element in each window, with an axis; nothing where it has none.
+function drawRate(svg, g, i, w = 300, h = 84) {
+	const rates = starts.map((_, k) => g.hz(i, k)), top = Math.max(...rates), deep = 16, left = 4, x = s => left + s / total * (w - left - 4), y = hz => h - deep - hz / top * (h - deep - 18);
+	const named = (tag, attributes, text = '') => {
+		const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
+		for (const key in attributes) element.setAttribute(key, attributes[key]);
+		element.textContent = text;
+		return element;
+	};
+	svg.setAttribute('viewBox', `0 0 ${w} ${h}`);
+	if (!(top > 0)) return svg.replaceChildren();
+	const from = range?.[0] ?? now, to = range?.[1] ?? now;
+	const line = rates.map((hz, k) => `${k ? 'L' : 'M'}${x(starts[k]).toFixed(1)} ${y(hz).toFixed(1)}H${x(ends[k]).toFixed(1)}`).join('');
+	const grid = w > 400 ? [0, .25, .5, .75, 1] : [0, 1], times = w > 400 ? [0, .25, .5, .75, 1] : [0, 1];
+	svg.replaceChildren(
+		named('rect', { class: 'now', x: x(starts[from]), y: 14, width: Math.max(2, x(ends[to]) - x(starts[from])), height: h - deep - 14 }),
+		...grid.map(k => named('path', { class: 'grid', d: `M${left} ${y(top * k)}H${w - 4}` })),
+		named('path', { class: 'line', d: line }),
+		...grid.slice(1).map(k => named('text', { x: left, y: y(top * k) - 3 }, spell(top * k) + ' Hz')),
+		...times.map(k => named('text', { x: x(total * k), y: h - 3, 'text-anchor': k == 0 ? 'start' : k == 1 ? 'end' : 'middle' }, clock(Math.floor(total * k)))));
+	svg.setAttribute('aria-label', `Rate of ${g.name(i)}, at most ${spell(top)} Hz`);
+}
+// The same plot as large as the stage.
+function enlarge(on) {
+	const g = group < 0 ? whole : folded, i = group < 0 ? sel : group;
+	on &&= i >= 0;
+	$.big.hidden = !on;
+	if (!on) return $.enlarge.focus();
+	say('bigname', g.name(i));
+	drawRate($.bigplot, g, i, Math.max(500, $.big.clientWidth - 24), Math.max(200, $.big.clientHeight - 70));
+}
+$.enlarge.onclick = () => enlarge(true);
 onSeek.push(card);
 $.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
 

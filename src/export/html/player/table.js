@@ -32,7 +32,6 @@ function chosen() {
 		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? whole.isThere(i, now) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.turn(i, now) : whole.difference(i, base, now).length));
 	});
 }
-const spell = hz => hz >= 99.95 ? hz.toFixed(0) : hz >= .95 ? +hz.toFixed(1) + '' : hz ? +hz.toPrecision(2) + '' : '0';
 function cells(i) {
 	const delta = change(i), { first, last: end, rates } = course(i), away = !whole.isThere(i, now);
 	const cell = (text, className = '') => make('td', { textContent: text, className });

@@ -1,6 +1,6 @@
 // The timeline: phases, changes and life lines at their true times, and the head over the present window.
-const ROW = 14, part = s => s / total, percent = s => 100 * part(s) + '%';
-let pitch = ROW;
+const ROW = isBoard ? 20 : 14, part = s => s / long, percent = s => 100 * part(s) + '%';
+let pitch = ROW, beforePrint;
 phases.forEach(([from, to, name], p) => {
 	const button = make('button', { textContent: `${p + 1} · ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => go(windowAt(from)) });
 	button.style.left = percent(from);
@@ -8,10 +8,19 @@ phases.forEach(([from, to, name], p) => {
 	$.band.append(button);
 });
 $.time.classList.toggle('nophases', !phases.length);
+// A row of the timeline of topics tells the type and the rate, too.
 const rowNames = rows.map(([i, label, inside]) => i < 0
 	? make('div', { className: inside ? 'inside' : 'space', textContent: label, title: label })
-	: make('button', { className: inside ? 'inside' : '', textContent: label, title: whole.name(i), onclick: () => pick(i, 1) }));
+	: make('button', { className: inside ? 'inside' : '', title: whole.name(i), onclick: () => pick(i, 1) },
+		...isBoard ? [make('span', { textContent: label }), make('span', { className: 'type', textContent: whole.type(i).slice(5), title: whole.type(i) }), make('span', { className: 'hz' })] : [label]));
 $.rownames.append(...rowNames);
+const tellRates = () => isBoard && rows.forEach(([i], r) => {
+	if (i >= 0) rowNames[r].lastChild.textContent = (range ? looksOf(whole)[i][1] : whole.rate(i, now)) || '–';
+});
+onSeek.push(tellRates);
+// The place of each row; those of namespaces that are left out have none.
+const isRowOut = ([i]) => i >= 0 && isOut(whole, i);
+let placeOf = [];
 
 const bit = (x, y, w, h) => `M${x.toFixed(1)} ${y.toFixed(1)}h${w.toFixed(1)}v${h.toFixed(1)}h${(-w).toFixed(1)}z`;
 // A mark that names the events of the log it stands for.
@@ -24,11 +33,15 @@ function markOf([className, ids, d]) {
 }
 // Draws all in the pixels there are.
 function drawTime() {
-	const small = $.deck.classList.contains('small') || innerWidth <= 760, wide = $.axis.clientWidth, x = s => part(s) * wide;
+	const small = !isBoard && !beforePrint && ($.deck.classList.contains('small') || innerWidth <= 760), wide = $.axis.clientWidth, x = s => part(s) * wide;
 	pitch = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
-	const high = pitch * rows.length, d = { life: '', guess: '', bar: '' }, signs = [];
+	let count = 0;
+	placeOf = rows.map(row => isRowOut(row) ? -1 : count++);
+	rowNames.forEach((name, r) => { name.hidden = placeOf[r] < 0; });
+	const high = pitch * count, d = { life: '', guess: '', bar: '' }, signs = [];
 	rows.forEach(([, , , lives, bars, events], r) => {
-		const y = (r + .5) * pitch, tall = pitch * .8;
+		if (placeOf[r] < 0) return;
+		const y = (placeOf[r] + .5) * pitch, tall = pitch * .8;
 		for (let k = 0; k < lives.length; k += 3) {
 			const [from, to, guessed] = lives.slice(k, k + 3);
 			d[guessed ? 'guess' : 'life'] += `M${x(from).toFixed(1)} ${y}H${x(to).toFixed(1)}`;
@@ -43,14 +56,15 @@ function drawTime() {
 			`M${(x(s) - tall / 4).toFixed(1)} ${y}l${tall / 4} ${-tall / 4}l${tall / 4} ${tall / 4}l${-tall / 4} ${tall / 4}z`][sign]]);
 	});
 	for (const [s, a, b, id] of hands) {
-		const [from, to] = [a, b].map(r => (r + .5) * pitch), tip = Math.sign(to - from) * 4;
+		if (placeOf[a] < 0 || placeOf[b] < 0) continue;
+		const [from, to] = [a, b].map(r => (placeOf[r] + .5) * pitch), tip = Math.sign(to - from) * 4;
 		signs.push(['hand', id, `M${x(s)} ${from}V${to}m-3 ${-tip}l3 ${tip}l3 ${-tip}M${x(s) - 2} ${from}a2 2 0 1 0 4 0a2 2 0 1 0 -4 0`]);
 	}
 	$.plot.setAttribute('width', wide);
 	$.plot.setAttribute('height', high);
 	for (const key in d) $.plot.querySelector('.' + key).setAttribute('d', d[key]);
 	$.plot.querySelector('.events').replaceChildren(...signs.map(markOf));
-	drawMarks(x);
+	if (!data.sides) drawMarks(x);
 	drawTicks(x, wide);
 	drawRow();
 	drawHead();
@@ -68,9 +82,9 @@ function drawMarks(x) {
 }
 const STEPS = [.001, .002, .005, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400];
 function drawTicks(x, wide) {
-	const least = total * 70 / wide, step = STEPS.find(s => s >= least) ?? Math.ceil(least / 86400) * 86400, ticks = [];
-	for (let k = 0; k * step <= total && k < 400; k++) ticks.push(k * step);
-	const end = clock(total), spans = ticks.filter(s => x(s) < wide - 7 * end.length - 30).map(s => {
+	const least = long * 70 / wide, step = STEPS.find(s => s >= least) ?? Math.ceil(least / 86400) * 86400, ticks = [];
+	for (let k = 0; k * step <= long && k < 400; k++) ticks.push(k * step);
+	const clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19), end = clock(long), spans = ticks.filter(s => x(s) < wide - 7 * end.length - 30).map(s => {
 		const tick = make('span', { textContent: clock(+s.toFixed(3)) });
 		tick.style.left = percent(s);
 		return tick;
@@ -78,21 +92,22 @@ function drawTicks(x, wide) {
 	$.ticks.replaceChildren(...spans, make('span', { className: 'last', textContent: end }));
 }
 function drawHead() {
-	for (const [id, w] of [['head', now], ['base', base]]) {
-		$[id].hidden = w < 0;
-		if (w < 0) continue;
-		$[id].style.left = percent(starts[w]);
-		$[id].style.width = `max(3px, ${percent(ends[w] - starts[w])})`;
+	for (const [id, from, to] of [['head', ...range ?? [now, now]], ['base', base, base]]) {
+		$[id].hidden = from < 0 || !!data.sides;
+		if ($[id].hidden) continue;
+		$[id].style.left = percent(starts[from]);
+		$[id].style.width = `max(3px, ${percent(ends[to] - starts[from])})`;
 	}
 }
 function drawRow() {
 	const r = rows.findIndex(([i]) => i >= 0 && i == sel), rect = $.plot.firstElementChild;
 	rowNames.forEach((name, k) => name.classList.toggle('picked', k == r));
-	for (const [key, value] of Object.entries({ x: 0, y: r * pitch, width: r < 0 ? 0 : $.axis.clientWidth, height: pitch })) rect.setAttribute(key, value);
+	for (const [key, value] of Object.entries({ x: 0, y: placeOf[r] * pitch || 0, width: r < 0 ? 0 : $.axis.clientWidth, height: pitch })) rect.setAttribute(key, value);
 }
 onSeek.push(drawHead);
 
-// A press seeks; one near a mark goes to exactly that change; one on a row picks who lives there.
+// A press seeks; one near a mark goes to exactly that change; one on a row picks who lives there. A drag of the frame
+// moves it; one that begins beside it chooses a range of windows.
 const timeAt = e => (e.clientX - $.axis.getBoundingClientRect().left) / $.axis.clientWidth * total;
 function markAt(e) {
 	const s = timeAt(e), near = 7 / $.axis.clientWidth * total;
@@ -100,18 +115,30 @@ function markAt(e) {
 	for (const [w, , , lines] of told) for (const [time] of lines) if (Math.abs(time - s) < least) { least = Math.abs(time - s); best = w; }
 	return best;
 }
-const rowAt = e => pitch < ROW ? -1 : rows[Math.floor((e.clientY - $.plot.getBoundingClientRect().top) / pitch)]?.[0] ?? -1;
-let scrubbed = 0;
+const rowAt = e => pitch < ROW ? -1 : rows[placeOf.indexOf(Math.floor((e.clientY - $.plot.getBoundingClientRect().top) / pitch))]?.[0] ?? -1;
+let moved = 0, grip = 0, first = -1;
 $.axis.onpointerdown = e => {
 	if (e.target.closest('#band button') || e.button) return;
-	scrubbed = 0;
+	moved = 0;
 	if (e.isTrusted) $.axis.setPointerCapture(e.pointerId);
-	const w = e.target.closest('#marks') ? markAt(e) : -1;
-	go(w < 0 ? windowAt(timeAt(e)) : w);
+	if (data.sides) return;
+	const w = e.target.closest('#marks') ? markAt(e) : -1, s = timeAt(e);
+	const [from, to] = range ?? [now, now], inside = !range && s >= starts[from] && s < ends[to];
+	// The frame is held where it was taken.
+	grip = s - starts[now];
+	first = inside && e.pointerType != 'touch' ? -1 : windowAt(s);
+	anchor = -1;
+	if (!inside || range || w >= 0) go(w < 0 ? windowAt(s) : w);
 };
 $.axis.onpointermove = e => {
 	if (e.buttons && $.axis.hasPointerCapture(e.pointerId)) {
-		if (scrubbed++ > 2) go(windowAt(timeAt(e)));
+		moved += Math.abs(e.movementX);
+		if (moved < 6 || data.sides) return;
+		const s = timeAt(e), w = windowAt(Math.max(0, first < 0 ? s - grip + 1e-3 : s));
+		if (first < 0) return w == now || go(w);
+		if (w == now && range) return;
+		span([first, w]);
+		seek(w, 1);
 		return;
 	}
 	const i = e.target.closest('#lives') ? rowAt(e) : -1, w = e.target.closest('#marks') ? markAt(e) : -1;
@@ -121,7 +148,8 @@ $.axis.onpointermove = e => {
 };
 $.axis.onpointerup = e => {
 	const i = e.target.closest('#axis') && document.elementsFromPoint(e.clientX, e.clientY).includes($.lives) ? rowAt(e) : -1;
-	if (i >= 0 && scrubbed < 4) pick(i, 1);
+	if (i >= 0 && moved < 6) pick(i, 1);
+	save();
 };
 $.axis.onpointerleave = () => { $.tip.hidden = true; };
 $.lives.onscroll = () => { $.rownames.scrollTop = $.lives.scrollTop; };

@@ -1,4 +1,5 @@
 // Where the stage looks: a gesture moves the picture by X, Y, S; its end draws it anew. Text too small to be read gives way.
+const isBoard = document.body.classList.contains('board');
 let X = 0, Y = 0, S = 1, idle;
 const READABLE = 9, MOST = 6, pointers = new Map();
 for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
@@ -11,6 +12,7 @@ let view = homeOf();
 const [RATE, TOPIC, NODE] = sizes.map(size => READABLE / size);
 
 function fit(box) {
+	if (isBoard) return;
 	view = [...box];
 	svg().setAttribute('viewBox', view.join(' '));
 	const k = scaleOf(view), list = svg().classList;
@@ -67,15 +69,9 @@ function densest(boxes, w, h) {
 	}
 	return best.slice(1);
 }
-// The board's beginning, where all of it would be too small to be read.
-function boardView() {
-	const [x, y] = homeOf(), sizes = [...$.graph.querySelectorAll('text')].map(text => +text.getAttribute('font-size'));
-	const all = scaleOf(homeOf()), k = Math.max(all, READABLE / Math.min(...sizes));
-	fit(k > all ? [x, y, wide / k, high / k] : homeOf());
-}
 // All of it if its names can be read, else the changes of this window.
 function firstView() {
-	if (!shown.svg) return boardView();
+	if (isBoard) return;
 	if (scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
 	const all = marked();
 	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
@@ -99,6 +95,17 @@ function minimap() {
 	picked.setAttribute('d', outline([...near].filter(i => i < shown.N).map(i => shown.boxes[i])));
 	const places = [view[0] + view[2] / 2 - seen[0] / 2, view[1] + view[3] / 2 - seen[1] / 2, ...seen];
 	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
+	outOfTheWay();
+}
+// The minimap stands in the first corner in which it covers nothing that is selected; if there is none it fades.
+function outOfTheWay() {
+	const k = scaleOf(view), { offsetWidth: w, offsetHeight: h } = $.mini, edge = 14;
+	const left = view[0] + view[2] / 2 - wide / k / 2, top = view[1] + view[3] / 2 - high / k / 2;
+	const boxes = boxesOf([...near].filter(i => i < shown.N)).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
+	const isFree = ([x, y]) => !boxes.some(b => b[0] < x + w + edge && b[0] + b[2] > x - edge && b[1] < y + h + edge && b[1] + b[3] > y - edge);
+	const corners = [['', wide - w, high - h], ['west', 0, high - h], ['north', wide - w, 0], ['north west', 0, 0]];
+	const free = corners.find(([, x, y]) => isFree([x, y]));
+	$.mini.setAttribute('class', free ? free[0] : 'faint');
 }
 const markMini = () => $.mini.children[1].setAttribute('d', outline(marked().filter(i => i < shown.N).map(i => shown.boxes[i])));
 onSeek.push(() => $.mini.hasAttribute('hidden') || markMini());

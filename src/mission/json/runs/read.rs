@@ -40,6 +40,9 @@ struct RawColumns {
     bytes: JsonColumn<Option<u64>>,
     median_period_s: JsonColumn<Option<f64>>,
     max_gap_s: JsonColumn<Option<f64>>,
+    drops: JsonColumn<Option<u64>>,
+    jitter_s: JsonColumn<Option<f64>>,
+    age_s: JsonColumn<Option<f64>>,
     hz: JsonColumn<JsonRate>,
     lifecycle: JsonColumn<Option<String>>,
 }
@@ -96,6 +99,9 @@ impl RawColumns {
         let mut bytes = self.bytes.values(|bytes| *bytes);
         let mut medians = self.median_period_s.values(|value| Number::of(*value));
         let mut gaps = self.max_gap_s.values(|value| Number::of(*value));
+        let mut drops = self.drops.values(|count| *count);
+        let mut jitters = self.jitter_s.values(|value| Number::of(*value));
+        let mut ages = self.age_s.values(|value| Number::of(*value));
         let mut rates = self.hz.values(JsonRate::number);
         let mut next = 0;
         for (from, to) in &self.windows {
@@ -108,6 +114,9 @@ impl RawColumns {
                     bytes: bytes.next().flatten(),
                     median: medians.next().unwrap_or_default(),
                     gap: gaps.next().unwrap_or_default(),
+                    drops: drops.next().flatten(),
+                    jitter: jitters.next().unwrap_or_default(),
+                    age: ages.next().unwrap_or_default(),
                     rate: rates.next().flatten(),
                     ..Row::new(state, degree)
                 };

@@ -74,6 +74,12 @@ struct Columns<'a> {
     median_period_s: JsonColumn<Option<f64>>,
     #[serde(skip_serializing_if = "JsonColumn::is_plain")]
     max_gap_s: JsonColumn<Option<f64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    drops: JsonColumn<Option<u64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    jitter_s: JsonColumn<Option<f64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    age_s: JsonColumn<Option<f64>>,
     #[serde(skip_serializing_if = "is_counted")]
     hz: JsonColumn<JsonRate>,
     #[serde(skip_serializing_if = "JsonColumn::is_plain")]
@@ -101,6 +107,9 @@ impl<'a> Columns<'a> {
             all.bytes.push(row.bytes);
             all.median_period_s.push(row.median.value());
             all.max_gap_s.push(row.gap.value());
+            all.drops.push(row.drops);
+            all.jitter_s.push(row.jitter.value());
+            all.age_s.push(row.age.value());
             all.hz.push(JsonRate::of(&row));
             all.lifecycle.push(graphs.lifecycle(&row));
         }

@@ -1,0 +1,99 @@
+//! A rosbag2 folder that is still being written: its storage files, also those that a split adds.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::{ConnectionKey, Metadata, PartsAdapter, metadata, storage};
+use crate::bag::model::{ConnectionId, Growing, Growth, Sink, Want};
+use crate::bag::{self, Input};
+use crate::base::budget::FILES;
+use crate::base::error::Result;
+
+/// The looks in which nothing grows after which a recording that has its metadata is over: two seconds, in which a
+/// recorder closes its last file.
+const QUIET: u32 = 8;
+
+/// A folder's storage files, each up to where it has been read.
+struct GrowingFolder {
+    path: PathBuf,
+    parts: Vec<Part>,
+    /// The files that were found, also those that cannot be followed.
+    seen: BTreeSet<PathBuf>,
+    known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
+    quiet: u32,
+}
+
+/// A storage file.
+struct Part {
+    file: Box<dyn Growing>,
+    /// The ids of its connections in the whole.
+    ids: Vec<ConnectionId>,
+    is_over: bool,
+}
+
+/// Follows a folder.
+#[expect(clippy::unnecessary_wraps, reason = "as every format opens one")]
+pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
+    Ok(Box::new(GrowingFolder {
+        path: path.to_owned(),
+        parts: Vec::new(),
+        seen: BTreeSet::new(),
+        known: BTreeMap::new(),
+        quiet: 0,
+    }))
+}
+
+impl Growing for GrowingFolder {
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
+        self.find();
+        let none = Metadata::default();
+        let mut grew = false;
+        for part in self.parts.iter_mut().filter(|part| !part.is_over) {
+            let mut joined = PartsAdapter::new(&none, sink, 0);
+            joined.known = std::mem::take(&mut self.known);
+            joined.part = std::mem::take(&mut part.ids);
+            let growth = part.file.poll(&mut joined);
+            (self.known, part.ids) = (joined.known, joined.part);
+            grew |= matches!(growth, Ok(Growth::More));
+            // A file that is gone was compressed when it was full, and holds what was read of it.
+            part.is_over = matches!(growth, Ok(Growth::Ended) | Err(_));
+        }
+        self.quiet = if grew { 0 } else { self.quiet + 1 };
+        Ok(if grew {
+            Growth::More
+        } else if self.quiet >= QUIET && self.is_closed() {
+            Growth::Ended
+        } else {
+            Growth::Same
+        })
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl GrowingFolder {
+    /// Looks for new storage files. One that cannot be followed yet is tried again.
+    fn find(&mut self) {
+        for file in storage(&self.path) {
+            if self.seen.contains(&file) || self.seen.len() >= FILES {
+                continue;
+            }
+            if let Ok(growing) = bag::follow(&Input::Path(file.clone())) {
+                self.seen.insert(file);
+                self.parts.push(Part {
+                    file: growing,
+                    ids: Vec::new(),
+                    is_over: false,
+                });
+            }
+        }
+    }
+
+    /// Whether the metadata, which is written at the end, names all files.
+    fn is_closed(&self) -> bool {
+        let named = metadata::read(&self.path).ok().flatten();
+        named.is_some_and(|named| named.files.len() >= storage(&self.path).len())
+    }
+}

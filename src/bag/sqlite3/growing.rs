@@ -1,0 +1,84 @@
+//! A database that is still being written: its new rows, read without a lock.
+//!
+//! rosbag2 writes with `journal_mode=MEMORY` and ends where the database is locked, so SQLite is told that nobody writes,
+//! and takes no lock; a page that is half written ends the look, and the next one goes on from there. With a log beside
+//! it (`-wal`) a reader never stands in a writer's way, and a short transaction reads both.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use super::place::{Ready, with_suffix};
+use super::rows::RowReader;
+use super::{Db, bag};
+use crate::bag::model::{Growing, Growth, OpenOptions, Sink, Want};
+use crate::bag::source::FileSource;
+use crate::base::error::Result;
+
+/// The number of looks between two that open the database: a look is cheap, SQLite's own start is not.
+const EVERY: u32 = 4;
+
+/// A database up to the row that was reported last.
+struct GrowingDb {
+    path: PathBuf,
+    /// The sizes and times of change of the database and its log when it was last read.
+    seen: Vec<(u64, Option<SystemTime>)>,
+    /// The looks since then.
+    looks: u32,
+    /// The first row that has not been reported.
+    next: i64,
+    wants: Vec<Want>,
+}
+
+/// Follows a database.
+#[expect(clippy::unnecessary_wraps, reason = "as every format opens one")]
+pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
+    Ok(Box::new(GrowingDb {
+        path: path.to_owned(),
+        seen: Vec::new(),
+        looks: EVERY,
+        next: i64::MIN,
+        wants: Vec::new(),
+    }))
+}
+
+impl Growing for GrowingDb {
+    fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth> {
+        self.looks += 1;
+        let source = FileSource::open(&self.path)?;
+        let wal = with_suffix(&self.path, "-wal");
+        let state = |path: &Path| {
+            let meta = path.metadata().ok()?;
+            Some((meta.len(), meta.modified().ok()))
+        };
+        let now: Vec<_> = [&self.path, &wal]
+            .into_iter()
+            .filter_map(|p| state(p))
+            .collect();
+        if now == self.seen || self.looks < EVERY {
+            return Ok(Growth::Same);
+        }
+        (self.seen, self.looks) = (now, 0);
+        let has_log = wal.metadata().is_ok_and(|log| log.len() > 0);
+        let ready = Ready::growing(&self.path, has_log);
+        // A table that is not there yet will be.
+        let Ok(bag) = bag(ready, &source, &OpenOptions::default()) else {
+            return Ok(Growth::Same);
+        };
+        for topic in bag.topics.iter().skip(self.wants.len()) {
+            self.wants.push(sink.connection(topic));
+        }
+        let before = self.next;
+        if let Ok(db) = Db::open(&bag.ready) {
+            self.next = RowReader::new(&bag, &self.wants, None).read_from(&db, self.next, sink);
+        }
+        Ok(if self.next > before {
+            Growth::More
+        } else {
+            Growth::Same
+        })
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+}

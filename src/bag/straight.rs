@@ -1,0 +1,365 @@
+//! Bags whose recorder's clock was set back, or whose simulation began again: such a bag holds several runs, one behind
+//! the other in the file, whose times overlap.
+//!
+//! The first reading watches for the places where time falls, in the order of the file; where there are any, a second
+//! one moves each run behind the one before.
+
+use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
+use crate::base::notice::Notice;
+use crate::base::rhythm::{OUT_OF_ORDER_NS, RUN_FEWEST, RUN_SHARE};
+use crate::base::time::Stamp;
+
+/// The longest fall of the clock that makes a run: a longer one is a clock that was not set yet.
+const LONGEST_NS: i64 = 365 * 86_400_000_000_000;
+
+/// The place in a bag where another run begins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Seam {
+    /// The last time of the run before, and the first one of this run, as recorded.
+    pub(crate) before: Stamp,
+    pub(crate) after: Stamp,
+    /// The number of messages before it, by connection.
+    counts: Vec<u64>,
+}
+
+/// A connection on its way through the bag.
+#[derive(Clone, Debug, Default)]
+struct Line {
+    count: u64,
+    /// The number of messages before the part of the file that is being read.
+    before_part: u64,
+    /// The last time in this run, and in the one that may have begun.
+    last: Option<Stamp>,
+    next: Option<Stamp>,
+}
+
+/// A run that may have begun.
+struct Suspect {
+    seam: Seam,
+    /// The numbers of connections whose time fell, and of those whose time went on.
+    fell: u64,
+    went_on: u64,
+    messages: u64,
+    /// Whether time has come to where it fell.
+    is_past: bool,
+}
+
+/// A sink that watches for seams.
+pub(crate) struct Watched<'a> {
+    sink: &'a mut dyn Sink,
+    lines: Vec<Line>,
+    touched: Vec<usize>,
+    last: Stamp,
+    suspect: Option<Suspect>,
+    seams: Vec<Seam>,
+}
+
+impl<'a> Watched<'a> {
+    pub(crate) fn new(sink: &'a mut dyn Sink) -> Self {
+        Self {
+            sink,
+            lines: Vec::new(),
+            touched: Vec::new(),
+            last: Stamp::MIN,
+            suspect: None,
+            seams: Vec::new(),
+        }
+    }
+
+    /// The seams of the bag that was read, in the order of the file.
+    pub(crate) fn seams(mut self) -> Vec<Seam> {
+        self.decide(true);
+        self.seams
+    }
+
+    fn watch(&mut self, at: usize, time: Stamp) {
+        let line = &mut self.lines[at];
+        if let Some(suspect) = &mut self.suspect {
+            suspect.messages += 1;
+            if suspect.seam.after.since(time) <= OUT_OF_ORDER_NS {
+                suspect.seam.after = suspect.seam.after.min(time);
+            }
+            if let (Some(last), None) = (line.last, line.next) {
+                // Others than those that spoke lately may speak after the fall as if nothing had been.
+                let would_fall = last.since(suspect.seam.after) > OUT_OF_ORDER_NS;
+                let fell = last.since(time) > OUT_OF_ORDER_NS;
+                suspect.fell += u64::from(would_fall && fell);
+                suspect.went_on += u64::from(would_fall && !fell);
+            }
+            line.next = Some(line.next.map_or(time, |next| next.max(time)));
+            suspect.is_past |= time >= suspect.seam.before;
+            return;
+        }
+        let fall = line.last.map_or(0, |last| last.since(time));
+        if fall > OUT_OF_ORDER_NS && fall < LONGEST_NS {
+            let counts = self.lines.iter().map(|line| line.before_part).collect();
+            let mut seam = Seam {
+                before: self.last,
+                after: time,
+                counts,
+            };
+            seam.counts[at] = self.lines[at].count;
+            self.suspect = Some(Suspect {
+                seam,
+                fell: 0,
+                went_on: 0,
+                messages: 0,
+                is_past: false,
+            });
+            return self.watch(at, time);
+        }
+        line.last = Some(line.last.map_or(time, |last| last.max(time)));
+        self.last = self.last.max(time);
+    }
+
+    /// Decides whether a run has begun, once enough of it is known: most connections that speak again have fallen back,
+    /// and not only one of several.
+    fn decide(&mut self, is_end: bool) {
+        let spoke = self.lines.iter().filter(|line| line.last.is_some()).count();
+        let fewest = spoke.min(2) as u64;
+        let is_known = |s: &mut Suspect| is_end || s.is_past && s.fell + s.went_on >= fewest;
+        let Some(suspect) = self.suspect.take_if(is_known) else {
+            return;
+        };
+        let all = suspect.fell + suspect.went_on;
+        let most = suspect.fell * 100 >= all * RUN_SHARE && suspect.fell >= fewest;
+        let is_run = most && suspect.messages >= RUN_FEWEST;
+        for line in &mut self.lines {
+            let next = line.next.take();
+            line.last = if is_run { next } else { line.last.max(next) };
+        }
+        let lasts = self.lines.iter().filter_map(|line| line.last);
+        self.last = lasts.max().unwrap_or(self.last);
+        self.seams.extend(is_run.then_some(suspect.seam));
+    }
+}
+
+impl Sink for Watched<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.lines.push(Line::default());
+        self.sink.connection(connection)
+    }
+
+    fn part(&mut self) {
+        self.decide(false);
+        for at in self.touched.drain(..) {
+            self.lines[at].before_part = self.lines[at].count;
+        }
+        self.sink.part();
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let at = connection.0 as usize;
+        if at < self.lines.len() {
+            self.touched.push(at);
+            for time in stamps {
+                self.watch(at, *time);
+                self.lines[at].count += 1;
+            }
+        }
+        self.sink.stamps(connection, stamps, sizes);
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        self.sink.message(message);
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.sink.notice(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.sink.progress(done, total);
+    }
+}
+
+/// A place where a recorder's clock was set back, on the time axis without overlaps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ClockFall {
+    /// The last time of the run before.
+    pub(crate) time: Stamp,
+    /// The time by which the clock went back, in nanoseconds.
+    pub(crate) length: i64,
+}
+
+/// A sink that moves each run behind the one before.
+pub(crate) struct Straightened<'a> {
+    sink: &'a mut dyn Sink,
+    seams: &'a [Seam],
+    /// The time by which each run is moved, in nanoseconds; the first run is not.
+    shifts: Vec<i64>,
+    /// The numbers of stamps and of messages of each connection so far.
+    counts: Vec<[u64; 2]>,
+}
+
+/// The times by which runs are moved, the first of them by 0.
+fn shifts(seams: &[Seam]) -> Vec<i64> {
+    let mut shifts = vec![0_i64];
+    for seam in seams {
+        let before = shifts[shifts.len() - 1];
+        // The next nanosecond: how much time really went by is not known.
+        let shift = seam
+            .before
+            .since(seam.after)
+            .saturating_add(before)
+            .saturating_add(1);
+        shifts.push(shift);
+    }
+    shifts
+}
+
+/// The places of seams on the time axis without overlaps.
+pub(crate) fn falls(seams: &[Seam]) -> impl Iterator<Item = ClockFall> + '_ {
+    seams
+        .iter()
+        .zip(shifts(seams))
+        .map(|(seam, shift)| ClockFall {
+            time: seam.before.plus(shift),
+            length: seam.before.since(seam.after),
+        })
+}
+
+impl<'a> Straightened<'a> {
+    pub(crate) fn new(seams: &'a [Seam], sink: &'a mut dyn Sink) -> Self {
+        Self {
+            sink,
+            seams,
+            shifts: shifts(seams),
+            counts: Vec::new(),
+        }
+    }
+
+    /// The time of the next stamp, or message, of a connection.
+    fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
+        let at = connection.0 as usize;
+        let count = self.counts[at][kind];
+        self.counts[at][kind] += 1;
+        let behind = |seam: &Seam| seam.counts.get(at).is_none_or(|before| *before <= count);
+        let run = self.seams.partition_point(behind);
+        time.plus(self.shifts[run])
+    }
+}
+
+impl Sink for Straightened<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.counts.push([0; 2]);
+        self.sink.connection(connection)
+    }
+
+    fn part(&mut self) {
+        self.sink.part();
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let moved = stamps.iter().map(|time| self.moved(connection, 0, *time));
+        let moved: Vec<Stamp> = moved.collect();
+        self.sink.stamps(connection, &moved, sizes);
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        let time = self.moved(message.connection, 1, message.time);
+        self.sink.message(Message { time, ..message });
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.sink.notice(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.sink.progress(done, total);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    /// A sink that keeps the stamps of each connection, in seconds.
+    #[derive(Default)]
+    struct Kept(Vec<Vec<i64>>);
+
+    impl Sink for Kept {
+        fn connection(&mut self, _: &Connection) -> Want {
+            Want::Stamps
+        }
+
+        fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+            let at = connection.0 as usize;
+            self.0.resize(self.0.len().max(at + 1), Vec::new());
+            self.0[at].extend(stamps.iter().map(|t| t.0.div_euclid(SECOND)));
+        }
+
+        fn message(&mut self, _: Message<'_>) {}
+
+        fn notice(&mut self, _: Notice) {}
+    }
+
+    /// Parts of a file: of each the connections with their seconds.
+    type Parts<'a> = &'a [&'a [(u32, Vec<i64>)]];
+
+    fn tell(parts: Parts<'_>, sink: &mut dyn Sink) {
+        for part in parts {
+            sink.part();
+            for (id, seconds) in *part {
+                let stamps: Vec<Stamp> = seconds.iter().map(|s| Stamp(s * SECOND)).collect();
+                sink.stamps(ConnectionId(*id), &stamps, None);
+            }
+        }
+    }
+
+    fn seams(parts: Parts<'_>) -> Vec<Seam> {
+        let mut kept = Kept::default();
+        let mut watched = Watched::new(&mut kept);
+        watched.lines.resize(3, Line::default());
+        tell(parts, &mut watched);
+        watched.seams()
+    }
+
+    #[test]
+    fn a_run_is_moved_behind_the_one_before() {
+        let parts: Parts<'_> = &[
+            &[(0, (0..60).collect()), (1, vec![0, 30]), (2, vec![50])],
+            // The second connection speaks as if nothing had been.
+            &[(1, vec![58]), (0, (40..90).collect()), (2, vec![45])],
+        ];
+        let found = seams(parts);
+        let told: Vec<_> = falls(&found)
+            .map(|f| (f.time.0 / SECOND, f.length / SECOND))
+            .collect();
+        assert_eq!(told, [(59, 19)]);
+        let mut kept = Kept::default();
+        let mut moved = Straightened::new(&found, &mut kept);
+        moved.counts.resize(3, [0; 2]);
+        tell(parts, &mut moved);
+        assert_eq!(kept.0[0], (0..60).chain(59..109).collect::<Vec<_>>());
+        assert_eq!(kept.0[1], [0, 30, 77]);
+    }
+
+    #[test]
+    fn topics_behind_each_other_are_one_run() {
+        let topic = |id| [(id, (0..60).collect())];
+        assert_eq!(seams(&[&topic(0), &topic(1), &topic(2)]), []);
+    }
+
+    #[test]
+    fn one_topic_out_of_order_is_one_run() {
+        let parts: Parts<'_> = &[
+            &[(0, (0..60).collect()), (1, (0..60).collect())],
+            &[(0, (40..90).collect())],
+            &[(1, (60..90).collect())],
+        ];
+        assert_eq!(seams(parts), []);
+    }
+
+    #[test]
+    fn a_clock_that_was_not_set_is_no_run() {
+        let year = 366 * 86_400;
+        let parts: Parts<'_> = &[
+            &[(0, (year..year + 60).collect())],
+            &[(0, (0..60).collect())],
+        ];
+        assert_eq!(seams(parts), []);
+    }
+}

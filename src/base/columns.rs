@@ -1,0 +1,244 @@
+//! Text fitted to a terminal: tables with heads whose columns give way to its width, and lines with a hanging indent.
+
+/// A column of a table for people.
+pub(crate) struct Column {
+    /// Its head; empty where the cells speak for themselves.
+    pub(crate) head: &'static str,
+    /// Whether its cells end at its right side, as numbers do.
+    pub(crate) is_right: bool,
+    /// The least width to which it shrinks, in characters; [`WHOLE`] where it does not.
+    pub(crate) least: usize,
+    /// When it shrinks, and when it is left out, where the table is too wide: 1 is the first. Those with 0 shrink last and
+    /// are never left out.
+    pub(crate) gives: (u8, u8),
+}
+
+/// The least width of a column that does not shrink.
+pub(crate) const WHOLE: usize = usize::MAX;
+
+/// A cell of a table.
+pub(crate) enum Cell {
+    /// Text without control characters; cut in its middle where it does not fit.
+    Text(String),
+    /// A message type, which gives up its package first.
+    Type(String),
+    /// Numbers over time, drawn as bars in as many characters as there is room for.
+    Bars(Vec<u64>),
+}
+
+/// The most characters of bars.
+const MOST_BARS: usize = 32;
+const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+/// The space between columns, and before the first of them.
+const GAP: usize = 2;
+
+impl Cell {
+    fn width(&self) -> usize {
+        match self {
+            Self::Text(text) | Self::Type(text) => text.chars().count(),
+            Self::Bars(numbers) => numbers.len().clamp(1, MOST_BARS),
+        }
+    }
+
+    fn fitted(&self, width: usize) -> String {
+        match self {
+            Self::Text(text) => middle(text, width),
+            Self::Type(text) if text.chars().count() > width => {
+                middle(text.rsplit('/').next().unwrap_or(text), width)
+            }
+            Self::Type(text) => text.clone(),
+            Self::Bars(numbers) => bars(numbers, width),
+        }
+    }
+}
+
+/// A table with a head, at most `width` characters wide if columns can give way that far; lines end without spaces.
+pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>) -> String {
+    let natural = |at: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(at)).map(Cell::width);
+        cells
+            .max()
+            .unwrap_or(0)
+            .max(columns[at].head.chars().count())
+    };
+    let mut widths: Vec<usize> = (0..columns.len()).map(natural).collect();
+    if let Some(width) = width {
+        give_way(columns, &mut widths, width);
+    }
+    let heads = columns.iter().map(|c| Cell::Text(c.head.to_owned()));
+    let heads: Vec<Cell> = heads.collect();
+    let mut out = String::new();
+    let lines = std::iter::once(&heads).filter(|_| columns.iter().any(|c| !c.head.is_empty()));
+    for cells in lines.chain(rows) {
+        let mut line = String::new();
+        for ((cell, column), width) in cells.iter().zip(columns).zip(&widths) {
+            if *width == 0 {
+                continue;
+            }
+            line.push_str("  ");
+            let text = cell.fitted(*width);
+            let blank = " ".repeat(width.saturating_sub(text.chars().count()));
+            let (before, after) = if column.is_right {
+                (&*blank, "")
+            } else {
+                ("", &*blank)
+            };
+            line.extend([before, &text, after]);
+        }
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out
+}
+
+/// Leaves out columns, in their order, until the least widths of the others fit; then shrinks these, in theirs.
+fn give_way(columns: &[Column], widths: &mut [usize], room: usize) {
+    let excess = |widths: &[usize]| {
+        let shown = widths.iter().filter(|width| **width > 0);
+        let taken = shown.map(|width| width + GAP).sum::<usize>();
+        taken.saturating_sub(room)
+    };
+    let in_order = |by: fn(&Column) -> u8| {
+        let mut order: Vec<usize> = (0..columns.len()).collect();
+        order.sort_by_key(|at| by(&columns[*at]).wrapping_sub(1));
+        order
+    };
+    let least = |(width, column): (&usize, &Column)| *width.min(&column.least);
+    for at in in_order(|column| column.gives.1) {
+        let smallest: Vec<usize> = widths.iter().zip(columns).map(least).collect();
+        if columns[at].gives.1 > 0 && excess(&smallest) > 0 {
+            widths[at] = 0;
+        }
+    }
+    for at in in_order(|column| column.gives.0) {
+        let most = widths[at].saturating_sub(columns[at].least);
+        widths[at] -= most.min(excess(widths));
+    }
+}
+
+/// `text` in at most `width` characters, cut in its middle: the end of a name says more than its beginning.
+fn middle(text: &str, width: usize) -> String {
+    let length = text.chars().count();
+    if length <= width {
+        return text.to_owned();
+    }
+    let kept = width.saturating_sub(1);
+    let head = kept / 3;
+    let start: String = text.chars().take(head).collect();
+    let end: String = text.chars().skip(length - (kept - head)).collect();
+    format!("{start}…{end}")
+}
+
+/// Numbers over time as bars; a blank where the number is 0.
+fn bars(numbers: &[u64], width: usize) -> String {
+    let columns = numbers.len().clamp(1, width.clamp(1, MOST_BARS));
+    let part = |k: usize| {
+        let (from, to) = (
+            k * numbers.len() / columns,
+            (k + 1) * numbers.len() / columns,
+        );
+        numbers[from..to].iter().sum::<u64>()
+    };
+    let sums: Vec<u64> = (0..columns).map(part).collect();
+    let most = sums.iter().copied().max().unwrap_or(0).max(1);
+    // Rounded up, so that a single message is a bar.
+    let eighth = |n: u64| {
+        usize::try_from((n.saturating_mul(8)).div_ceil(most))
+            .unwrap_or(8)
+            .min(8)
+    };
+    let bar = |n: u64| eighth(n).checked_sub(1).map_or(' ', |at| BARS[at]);
+    sums.into_iter().map(bar).collect()
+}
+
+/// `lead` and `text` on lines of at most `width` characters, broken at spaces; all lines but the first are indented by
+/// `indent`. A word that is longer than a line has one for itself. Ends in a new line.
+pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) -> String {
+    let mut out = lead.to_owned();
+    let mut used = lead.chars().count();
+    let mut is_first = true;
+    for word in text.split(' ') {
+        let length = word.chars().count();
+        let space = usize::from(!is_first);
+        if width.is_some_and(|width| used + space + length > width) && used > indent {
+            out.truncate(out.trim_end().len());
+            out.push('\n');
+            out.push_str(&" ".repeat(indent));
+            used = indent;
+        } else if !is_first {
+            out.push(' ');
+            used += 1;
+        }
+        out.push_str(word);
+        used += length;
+        is_first = false;
+    }
+    out.truncate(out.trim_end().len());
+    out.push('\n');
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_show_silence_as_blanks() {
+        assert_eq!(bars(&[0, 1, 4, 8], 32), " ▁▄█");
+        assert_eq!(bars(&[], 32), " ");
+        assert_eq!(bars(&[1; 100], 32).chars().count(), MOST_BARS);
+        assert_eq!(bars(&[1; 100], 8), "████████");
+    }
+
+    #[test]
+    fn columns_shrink_and_vanish_in_their_order() {
+        let columns = [
+            Column {
+                head: "topic",
+                is_right: false,
+                least: 6,
+                gives: (0, 0),
+            },
+            Column {
+                head: "n",
+                is_right: true,
+                least: WHOLE,
+                gives: (0, 0),
+            },
+            Column {
+                head: "type",
+                is_right: false,
+                least: 4,
+                gives: (1, 1),
+            },
+        ];
+        let cell = |text: &str| Cell::Text(text.to_owned());
+        let rows = [vec![
+            cell("/long/name"),
+            cell("12"),
+            cell("std_msgs/String"),
+        ]];
+        let at = |width| table(&columns, &rows, width);
+        assert_eq!(
+            at(None),
+            "  topic        n  type\n  /long/name  12  std_msgs/String\n"
+        );
+        assert_eq!(
+            at(Some(24)),
+            "  topic        n  type\n  /long/name  12  s…ring\n"
+        );
+        assert_eq!(at(Some(20)), "  topic      n  type\n  /l…/name  12  s…ng\n");
+        assert_eq!(at(Some(12)), "  topic    n\n  /…name  12\n");
+    }
+
+    #[test]
+    fn long_lines_hang_below_their_lead() {
+        let at = |width| hang("00:01  ", "/a started: publishes b", 7, width);
+        assert_eq!(at(None), "00:01  /a started: publishes b\n");
+        assert_eq!(at(Some(18)), "00:01  /a started:\n       publishes b\n");
+        assert_eq!(
+            at(Some(3)),
+            "00:01  /a\n       started:\n       publishes\n       b\n"
+        );
+    }
+}

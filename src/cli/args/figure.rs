@@ -1,0 +1,87 @@
+//! The arguments of `bagreel figure`.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+
+use super::values::{moment, points, share, width};
+use super::{GraphArgs, Inputs};
+use crate::base::time::Moment;
+use crate::draw::figure::FigureKind;
+use crate::graph::diff::RATE_CHANGE;
+
+#[derive(Debug, Args)]
+pub(crate) struct FigureArgs {
+    #[command(flatten)]
+    pub(crate) inputs: Inputs,
+    /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable; without it,
+    /// `out/<bag name>.pdf`.
+    #[arg(long = "output", short, value_name = "FILE")]
+    pub(crate) outputs: Vec<OsString>,
+    /// Life lines, a map of who talks to whom, or the reconfigurations one by one.
+    #[arg(long, default_value = "lives", value_parser = kinds())]
+    pub(crate) kind: String,
+    /// Width on paper: `88mm`, `180mm`. [default: 88mm]
+    #[arg(long, value_name = "MM", value_parser = width)]
+    pub(crate) width: Option<f64>,
+    #[command(flatten)]
+    pub(crate) form: FigureForm,
+    #[command(flatten)]
+    pub(crate) phases: PhaseArgs,
+    /// Draw the figure without its legend.
+    #[arg(long)]
+    pub(crate) bare: bool,
+    /// Font file for characters that the bundled font lacks.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) font: Option<PathBuf>,
+    /// Start: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) start: Option<Moment>,
+    /// End, written like `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) end: Option<Moment>,
+    /// Smallest relative change of a rate to report.
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
+    pub(crate) rate_change: f64,
+    /// Nodes to draw, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(crate) ns_filter: Option<String>,
+    /// Topics to draw, written like `--ns-filter`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(crate) topic_filter: Option<String>,
+    #[command(flatten)]
+    pub(crate) graph: GraphArgs,
+}
+
+/// The form of a figure, whatever its kind; hidden where `render` takes it.
+#[derive(Debug, Default, Args)]
+pub(crate) struct FigureForm {
+    /// What a row or box represents. [default: the finest that fits]
+    #[arg(long, value_name = "nodes|groups|topics", value_parser = ["nodes", "groups", "topics"])]
+    pub(crate) rows: Option<String>,
+    /// Phases whose beginnings `steps` shows, such as `3,5`. [default: the six with most changes]
+    #[arg(long, value_name = "N,M,…", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(2..))]
+    pub(crate) steps: Vec<u16>,
+    /// Size of names, `7pt` to `12pt`; other text is a point smaller. [default: 7pt]
+    #[arg(long, value_name = "PT", value_parser = points)]
+    pub(crate) text: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PhaseArgs {
+    /// Phases of the mission: detected (`auto`), `none`, or a file of lines such as `0:38 navigation` or names alone.
+    #[arg(long, value_name = "FILE|auto|none", default_value = "auto")]
+    pub(crate) phases: String,
+}
+
+pub(super) const HELP: &str = "\
+Examples:
+  bagreel figure run.bag -o fig.pdf                      life lines, as wide as a column
+  bagreel figure run.bag --kind map --width 181mm -o map.pdf -o map.tex";
+
+/// The kinds of figures.
+pub(super) fn kinds() -> PossibleValuesParser {
+    PossibleValuesParser::new(FigureKind::ALL.map(|(word, _)| word))
+}

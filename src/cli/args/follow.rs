@@ -1,0 +1,57 @@
+//! The arguments of `follow`.
+
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::values::{length, period};
+use crate::base::time::Period;
+use crate::graph::window::Length;
+
+#[derive(Debug, Args)]
+pub(crate) struct FollowArgs {
+    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, or a folder whose newest recording is
+    /// followed.
+    #[arg(value_name = "WHAT")]
+    pub(crate) what: PathBuf,
+    /// How to print events.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) format: FollowFormat,
+    /// Check the recording against this expectations file: findings are printed when they are sure, and the exit code is
+    /// that of `check`.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) expect: Option<PathBuf>,
+    /// A file to write at the end, as `render` writes it from the closed recording. May be given many times.
+    #[arg(long = "output", short, value_name = "FILE")]
+    pub(crate) outputs: Vec<OsString>,
+    /// The length of a window in outputs, on the page, and for rules about rates.
+    #[arg(long, short, value_parser = length)]
+    pub(crate) period: Option<Length>,
+    /// End when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
+    #[arg(long, value_name = "TIME", value_parser = period)]
+    pub(crate) idle: Option<Period>,
+    /// How much of the recording is kept in mind for events, findings and the page; outputs hold all of it.
+    #[arg(long, value_name = "TIME", default_value = "1h", value_parser = period)]
+    pub(crate) keep: Period,
+    /// Show the mission as a page at this address, which grows with the recording: `127.0.0.1:8723`.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub(crate) serve: Option<SocketAddr>,
+    /// Let other machines see the page: allow an address that is not this machine's own.
+    #[arg(long, requires = "serve")]
+    pub(crate) bind: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "lower")]
+pub(crate) enum FollowFormat {
+    /// A line per event, for people.
+    #[default]
+    Text,
+    /// An object per event and line, for programs.
+    Ndjson,
+}
+
+pub(crate) const FOLLOW_HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is sure.\n\n\
+    Exit codes: 0 done, 1 failed or a rule is broken, 2 usage, 3 done but data was skipped (damaged bag).";

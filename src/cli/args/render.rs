@@ -1,0 +1,200 @@
+//! The arguments of `bagreel render`.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::figure::{FigureForm, PhaseArgs, kinds};
+use super::values::{bytes, size, width};
+use super::{ChangeArgs, GraphArgs, Inputs, SizeArgs, TimeArgs};
+use crate::export::FORMATS;
+
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) inputs: Inputs,
+    #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT), help_heading = "Output")]
+    pub(crate) outputs: Vec<OsString>,
+    /// Format of outputs without a known extension, such as `-`.
+    #[arg(long, value_name = "WORD", help_heading = "Output")]
+    pub(crate) format: Option<String>,
+    #[command(flatten)]
+    pub(crate) time: TimeArgs,
+    #[command(flatten)]
+    pub(crate) change: ChangeArgs,
+    #[command(flatten)]
+    pub(crate) graph: GraphArgs,
+    #[command(flatten)]
+    pub(crate) sizes: SizeArgs,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
+    #[command(flatten)]
+    pub(crate) sequence: SequenceArgs,
+    /// Draw a figure for a paper: an older way to write `bagreel figure`.
+    #[arg(long, value_name = "KIND", hide = true, value_parser = kinds(), conflicts_with_all = [
+        "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
+        "expand", "rqt_defaults", "show_recorder", "title",
+    ])]
+    pub(crate) figure: Option<String>,
+    #[command(flatten)]
+    pub(crate) form: FigureForm,
+    #[command(flatten)]
+    pub(crate) phases: PhaseArgs,
+    /// Print the time spent in each step.
+    #[arg(long, help_heading = "Performance")]
+    pub(crate) timings: bool,
+    /// Redraw whenever the style file changes, until interrupted.
+    #[arg(long, help_heading = "Picture")]
+    pub(crate) watch: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Filter")]
+pub(crate) struct ViewArgs {
+    /// Draw the graph, or a timeline of topics. [default: graph; board if most publishers are unknown]
+    #[arg(long, help_heading = "Picture", value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
+    pub(crate) view: Option<String>,
+    /// Draw nodes only, nodes with one line per pair, nodes and active topics, or all topics.
+    #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
+    pub(crate) mode: Option<String>,
+    /// Nodes to draw, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(crate) ns_filter: Option<String>,
+    /// Topics to draw, in the same form as `--ns-filter`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(crate) topic_filter: Option<String>,
+    /// Kinds to leave out: quiet, debug, dead, leaf, tf, params, unreachable, or none. [default: quiet]
+    #[arg(long, value_name = "KIND,…")]
+    pub(crate) hide: Option<String>,
+    /// Kinds to draw as one box: actions, tf, images, namespaces=N, or none. [default: all of them]
+    #[arg(long, value_name = "KIND,…")]
+    pub(crate) group: Option<String>,
+    /// Draw each of these namespaces as one box.
+    #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
+    pub(crate) collapse: Vec<String>,
+    /// Never collapse these namespaces.
+    #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
+    pub(crate) expand: Vec<String>,
+    /// Include the recorder and the player.
+    #[arg(long)]
+    pub(crate) show_recorder: bool,
+    /// Draw what `rqt_graph` shows by default.
+    #[arg(long)]
+    pub(crate) rqt_defaults: bool,
+    /// Write the filtered graph instead of the full one to JSON and tables.
+    #[arg(long)]
+    pub(crate) filtered: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub(crate) struct LookArgs {
+    /// Built-in style or style file; see `bagreel styles`.
+    #[arg(long, default_value = "light", value_name = "NAME|FILE")]
+    pub(crate) style: String,
+    /// Frame size in pixels. [default: fits the graph]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<(u32, u32)>,
+    /// Choose page and text size for a README (830 px), a slide (1280×720), or a paper's column (88 mm) or page (181 mm).
+    #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
+        conflicts_with_all = ["size", "width", "figure", "strip", "layout_from"])]
+    pub(crate) purpose: Option<String>,
+    /// Printed width of a PDF or SVG: `88mm`, `180mm`.
+    #[arg(long, value_name = "MM", value_parser = width)]
+    pub(crate) width: Option<f64>,
+    /// Enlarge the page and collapse namespaces until labels are legible.
+    #[arg(long, value_name = "auto|none", default_value = "auto", value_parser = ["auto", "none"])]
+    pub(crate) fit: String,
+    /// Direction of edges.
+    #[arg(long, value_name = "LR|TB|auto", default_value = "auto", value_parser = ["LR", "TB", "auto"])]
+    pub(crate) orientation: String,
+    /// Layout engine: layered, layout-rs or ring.
+    #[arg(long, value_name = "ENGINE", default_value = "layered")]
+    pub(crate) layout: String,
+    /// Reuse the positions of an earlier run's JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) layout_from: Option<PathBuf>,
+    /// Title. [default: the bag's name]
+    #[arg(long)]
+    pub(crate) title: Option<String>,
+    /// Draw the graph without title, legend or timeline.
+    #[arg(long)]
+    pub(crate) bare: bool,
+    /// Captions to show: a file of `seconds|text` lines, or a topic of strings.
+    #[arg(long, value_name = "FILE|TOPIC")]
+    pub(crate) captions: Option<String>,
+    /// Font file for characters that the bundled font lacks.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) font: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct SequenceArgs {
+    /// Duration of a frame in milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=600_000))]
+    pub(crate) frame_ms: u32,
+    /// Number of frames inserted at windows with a change.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=60))]
+    pub(crate) tween: u32,
+    /// Show windows with a change this many times longer.
+    #[arg(long, value_name = "TIMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub(crate) hold_changes: u32,
+    /// Draw several windows side by side: a grid `3x2`, `changes`, or window numbers `0,4,9`.
+    #[arg(long, value_name = "3x2|changes|N,M,…")]
+    pub(crate) strip: Option<String>,
+    /// Limit a GIF's size, such as `5MB`, by dropping tween frames, then resolution, then frames.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub(crate) max_bytes: Option<u64>,
+    /// Also write the first frame of an animation to this PNG.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) poster: Option<PathBuf>,
+    /// Layout of JSON: every window in full, or every element once with its runs. [default: windows, above 2000 runs]
+    #[arg(long, value_name = "windows|runs", value_parser = ["windows", "runs"])]
+    pub(crate) json: Option<String>,
+    /// Write one table row per run of equal windows instead of one per window.
+    #[arg(long)]
+    pub(crate) runs: bool,
+    /// Write DOT with positions for `rqt_graph`, or plain for Graphviz.
+    #[arg(long, value_name = "rqt|plain", default_value = "rqt", value_parser = ["rqt", "plain"])]
+    pub(crate) dot_profile: String,
+    /// Link to add to the report, such as `player=URL`.
+    #[arg(long, value_name = "NAME=URL")]
+    pub(crate) link: Vec<String>,
+}
+
+impl SequenceArgs {
+    /// Whether the strip is of changes, which are drawn as steps: differences, and not whole graphs.
+    pub(crate) fn draws_steps(&self) -> bool {
+        self.strip.as_deref() == Some("changes")
+    }
+}
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  bagreel render run.bag                              an animation of the mission, out/run.gif
+  bagreel render run/ -o run.html --period 10         a page to step through, ten seconds per window
+  bagreel render run.mcap --for readme -o run.gif     as wide and legible as a README needs it
+
+`bagreel render --help` lists all options and output formats.";
+
+const OUTPUT: &str = "Output file; the extension selects the format, `{n}` writes one file per window, `-` is standard \
+    output. Repeatable. [default: out/<bag name>.gif; .png if nothing changes, and for a topic timeline]";
+
+/// The table of formats, for the end of `render --help`.
+pub(super) fn outputs_help() -> String {
+    let rows = FORMATS
+        .iter()
+        .map(|f| format!("  .{:<6} {}", f.word, f.what));
+    let rows: Vec<String> = rows.collect();
+    shown(&format!("Outputs, by extension:\n{}", rows.join("\n")))
+}
+
+/// A help text in which `{n}` stands as it is: clap would make a new line of it, so a style that changes nothing, and
+/// that is left out where there is no terminal, comes in between.
+fn shown(text: &str) -> String {
+    text.replace("{n}", "{\u{1b}[0mn}")
+}

@@ -1,0 +1,84 @@
+//! Values of options, parsed from text; each error says what to write instead.
+
+use crate::base::time::{Moment, Period, parse_nanos};
+use crate::graph::window::{Align, Cut, Length};
+
+pub(super) fn length(text: &str) -> Result<Length, String> {
+    if text == "all" {
+        return Ok(Length::All);
+    }
+    period(text).map(Length::Fixed)
+}
+
+pub(super) fn period(text: &str) -> Result<Period, String> {
+    Period::parse(text).ok_or_else(|| "write `60`, `30s`, `1m` or `500ms`".to_owned())
+}
+
+pub(super) fn moment(text: &str) -> Result<Moment, String> {
+    Moment::parse(text).ok_or_else(|| "write `90`, `1:30`, `2m`, `-30s`, or RFC 3339".to_owned())
+}
+
+pub(super) fn align(text: &str) -> Result<Align, String> {
+    match text {
+        "bag" => Ok(Align::Bag),
+        "clock" => Ok(Align::Clock),
+        _ => Err("write `bag` or `clock`".to_owned()),
+    }
+}
+
+pub(super) fn cut(text: &str) -> Result<Cut, String> {
+    match text {
+        "phases" => Ok(Cut::Phases),
+        "changes" => Ok(Cut::Changes),
+        _ => Err("write `phases` or `changes`".to_owned()),
+    }
+}
+
+pub(super) fn share(text: &str) -> Result<f64, String> {
+    let share = text
+        .parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s >= 0.0);
+    share.ok_or_else(|| "write a fraction such as `0.25`".to_owned())
+}
+
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |part: &str| part.parse().ok().filter(|n| (64..=16_384).contains(n));
+    let both = text
+        .split_once('x')
+        .and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    both.ok_or_else(|| "write a size such as `1280x720`; each side is 64 to 16384".to_owned())
+}
+
+pub(super) fn width(text: &str) -> Result<f64, String> {
+    let millimetres = text.strip_suffix("mm").and_then(|n| n.parse().ok());
+    let millimetres = millimetres.filter(|mm: &f64| (20.0..=2000.0).contains(mm));
+    millimetres.ok_or_else(|| "write a width such as `88mm`; 20 to 2000".to_owned())
+}
+
+pub(super) fn points(text: &str) -> Result<f64, String> {
+    let points = text.strip_suffix("pt").and_then(|n| n.parse().ok());
+    let points = points.filter(|pt: &f64| (7.0..=12.0).contains(pt));
+    points.ok_or_else(|| "write a size such as `8pt`; 7 to 12".to_owned())
+}
+
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let at = text
+        .find(|c: char| c.is_ascii_alphabetic())
+        .unwrap_or(text.len());
+    let scale = match text[at..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1,
+        "k" | "kb" => 1000,
+        "m" | "mb" => 1_000_000,
+        "kib" => 1024,
+        "mib" => 1024 * 1024,
+        _ => 0,
+    };
+    // The nanoseconds of a plain decimal number are exact enough for its thousandths.
+    let number = parse_nanos(&text[..at]).filter(|_| scale > 0 && at > 0);
+    let bytes =
+        number.and_then(|n| u64::try_from(i128::from(n) * i128::from(scale) / 1_000_000_000).ok());
+    bytes
+        .filter(|n| *n > 0)
+        .ok_or_else(|| "write a size such as `5MB` or `500kB`".to_owned())
+}

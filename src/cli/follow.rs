@@ -1,0 +1,225 @@
+//! `follow`: looks at a recording again and again, prints what is new, and writes the outputs when it is over.
+
+use std::path::Path;
+
+use super::args::follow::{FollowArgs, FollowFormat};
+use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use super::reading::reading;
+use super::serve::Server;
+use super::terminal::Terminal;
+use super::{DONE, code, gate};
+use crate::bag::Growth;
+use crate::base::error::{Error, Result};
+use crate::base::{budget, file};
+use crate::export::Output;
+use crate::gate::{Expectation, FORMATS, judge};
+use crate::graph::window::Length;
+use crate::mission::events::LogFormat;
+use crate::pipeline::Render;
+use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
+
+/// The most messages that events are found in, the newest: a tenth of a second of work.
+const MOST: u64 = 1_000_000;
+/// The seconds between two looks at what is known, as a multiple of the time that one takes: three percent of a core.
+const REST: f64 = 33.0;
+/// The least seconds between two, and the same where something new appeared, of which people wait to hear.
+const LEAST: f64 = 1.0;
+const LEAST_NEW: f64 = 0.2;
+
+/// A work that takes time, and the next time at which it may be done.
+struct Pace {
+    due: f64,
+    /// The time at which it may be done if something new appeared.
+    due_new: f64,
+}
+
+impl Pace {
+    /// Does some work, and puts off the next.
+    fn spend<T>(&mut self, terminal: &Terminal, work: impl FnOnce() -> T) -> T {
+        let begun = terminal.seconds();
+        let done = work();
+        let now = terminal.seconds();
+        self.due = now + ((now - begun) * REST).max(LEAST);
+        self.due_new = now + ((now - begun) * REST / 4.0).max(LEAST_NEW);
+        done
+    }
+
+    fn new() -> Self {
+        Self {
+            due: 0.0,
+            due_new: 0.0,
+        }
+    }
+}
+
+/// Everything that is done with what is known.
+struct Follower<'a> {
+    args: &'a FollowArgs,
+    follow: Follow,
+    format: LogFormat,
+    feed: Feed,
+    findings: FindingFeed,
+    expectation: Option<Expectation>,
+    job: Render,
+    server: Option<Server>,
+    events: Pace,
+    whole: Pace,
+}
+
+/// Follows a recording to its end.
+pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
+    let inputs = Inputs {
+        bags: vec![args.what.clone()],
+        verify: false,
+    };
+    let time = TimeArgs {
+        period: args.period,
+        ..TimeArgs::default()
+    };
+    let reading = reading(
+        &inputs,
+        &time,
+        &ChangeArgs::default(),
+        &GraphArgs::default(),
+    )?;
+    let outputs = args.outputs.iter().map(|o| Output::named(o, None));
+    let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
+    crate::pipeline::check(&job)?;
+    let expectation = |path: &Path| {
+        let text = file::read_text(path, budget::USER_TEXT)?;
+        crate::gate::read(&text, path)
+    };
+    let follower = Follower {
+        args,
+        expectation: args.expect.as_deref().map(expectation).transpose()?,
+        follow: Follow::new(reading, args.keep)?,
+        format: match args.format {
+            FollowFormat::Text => LogFormat::Text,
+            FollowFormat::Ndjson => LogFormat::Ndjson,
+        },
+        feed: Feed::default(),
+        findings: FindingFeed::default(),
+        server: args
+            .serve
+            .map(|at| server(at, args, terminal))
+            .transpose()?,
+        job,
+        events: Pace::new(),
+        whole: Pace::new(),
+    };
+    follower.run(terminal)
+}
+
+fn server(at: std::net::SocketAddr, args: &FollowArgs, terminal: &mut Terminal) -> Result<Server> {
+    if !args.bind && !at.ip().is_loopback() {
+        let what = format!("`--serve {at}` would show the mission to other machines");
+        return Err(Error::usage(
+            what,
+            "serve at 127.0.0.1, or allow it with `--bind`",
+        ));
+    }
+    let server = Server::start(at)?;
+    terminal.say(&format!("the page is at http://{}/", server.address));
+    Ok(server)
+}
+
+impl Follower<'_> {
+    fn run(mut self, terminal: &mut Terminal) -> Result<u8> {
+        terminal.note_signals(true);
+        let (mut grew, mut known) = (terminal.seconds(), 0);
+        let (mut is_behind, mut is_page_behind) = (false, false);
+        let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
+        loop {
+            let growth = self.follow.poll()?;
+            let now = terminal.seconds();
+            if growth == Growth::More {
+                (grew, is_behind, is_page_behind) = (now, true, true);
+            }
+            let is_idle = idle.is_some_and(|idle| now - grew >= idle);
+            let is_over = growth == Growth::Ended || is_idle || terminal.take_signal();
+            let is_new = self.follow.known() > known && now >= self.events.due_new;
+            if is_behind && (is_over || is_new || now >= self.events.due) {
+                (known, is_behind) = (self.follow.known(), false);
+                if !self.tell_events(terminal)? {
+                    break;
+                }
+            }
+            if is_page_behind && (is_over || now >= self.whole.due) {
+                is_page_behind = false;
+                self.tell_whole(terminal)?;
+            }
+            if is_idle && let Some(idle) = self.args.idle {
+                terminal.say(&format!("nothing was written for {idle}"));
+            }
+            if is_over {
+                break;
+            }
+            terminal.wait();
+        }
+        terminal.note_signals(false);
+        self.end(terminal)
+    }
+
+    /// Prints the new events; false if nobody reads them any more.
+    fn tell_events(&mut self, terminal: &mut Terminal) -> Result<bool> {
+        let (follow, feed, format) = (&self.follow, &mut self.feed, self.format);
+        let lines = self.events.spend(terminal, || {
+            let known = follow.so_far(MOST, Length::All)?;
+            Ok(known.map_or_else(Vec::new, |known| feed.news(&known, format)))
+        });
+        terminal.lines(&lines?)
+    }
+
+    /// Prints new findings, and renews the page.
+    fn tell_whole(&mut self, terminal: &mut Terminal) -> Result<()> {
+        if self.expectation.is_none() && self.server.is_none() {
+            return Ok(());
+        }
+        let length = match (&self.expectation, self.args.period) {
+            (_, Some(length)) => length,
+            (
+                Some(Expectation {
+                    period: Some(period),
+                    ..
+                }),
+                _,
+            ) => Length::Fixed(*period),
+            _ => Length::Auto,
+        };
+        let (follow, findings, format) = (&self.follow, &mut self.findings, self.format);
+        let (expectation, server, job) = (&self.expectation, &self.server, &self.job);
+        let lines = self.whole.spend(terminal, || {
+            let Some(known) = follow.so_far(u64::MAX, length)? else {
+                return Ok(Vec::new());
+            };
+            let judged = expectation.as_ref().map(|expectation| {
+                let verdict = judge(expectation, &known.mission, false);
+                findings.news(&verdict, known.now, format)
+            });
+            if let Some(server) = server {
+                server.show(page(job, known.mission)?);
+            }
+            Ok(judged.unwrap_or_default())
+        });
+        terminal.lines(&lines?).map(drop)
+    }
+
+    /// Judges and writes the recording as it lies there now.
+    fn end(self, terminal: &mut Terminal) -> Result<u8> {
+        let job = Render {
+            reading: self.follow.closed(),
+            ..self.job
+        };
+        let mut done = DONE;
+        if !job.outputs.is_empty() {
+            let rendered = crate::pipeline::render(&job, terminal)?;
+            terminal.notices(&rendered.notices);
+            done = code(&rendered.mission);
+        }
+        let Some(expect) = &self.args.expect else {
+            return Ok(done);
+        };
+        let format = (self.format == LogFormat::Text).then_some(&FORMATS[0]);
+        gate::judge_closed(job.reading, &self.args.what, expect, format, terminal)
+    }
+}

@@ -1,0 +1,76 @@
+//! The options that say what is read, turned into a reading.
+
+use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use crate::bag::Input;
+use crate::base::error::Error;
+use crate::evidence::code::{SourceCode, Version};
+use crate::evidence::{collector, conclude, topology};
+use crate::graph::window::{Division, Length};
+use crate::pipeline::{Phases, Reading};
+
+/// The reading of a mission.
+pub(super) fn reading(
+    inputs: &Inputs,
+    time: &TimeArgs,
+    change: &ChangeArgs,
+    graph: &GraphArgs,
+) -> Result<Reading, Error> {
+    let infers = |what: &str| graph.infer.iter().any(|word| word == what);
+    Ok(Reading {
+        inputs: inputs.bags.iter().map(Input::parse).collect(),
+        verify: inputs.verify,
+        division: Division {
+            length: time.period.unwrap_or(Length::Auto),
+            step: time.step,
+            start: time.start,
+            end: time.end,
+            align: time.align,
+            cut: time.cut,
+        },
+        skip_unchanged: time.skip_unchanged,
+        is_still_if_unchanged: false,
+        collect: collector::CollectOptions {
+            infer_stamps: infers("stamps"),
+            payload_bytes: if infers("payloads") {
+                u64::MAX
+            } else {
+                collector::PAYLOAD_BYTES
+            },
+            ..collector::CollectOptions::default()
+        },
+        grace: change.grace as usize,
+        conclude: conclude::ConcludeOptions {
+            roles: graph.roles,
+            topology: topology::read_all(&graph.topology)?,
+            code: None,
+        },
+        code: source_code(graph)?,
+        rate_change: change.rate_change,
+        phases: Phases::Found,
+    })
+}
+
+/// The source code to read, if any.
+fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
+    let infers = graph.infer.iter().any(|word| word == "source");
+    let Some(folder) = graph.source.clone() else {
+        return if infers {
+            Err(Error::usage(
+                "`--infer source` has no source code to read",
+                "add `--source DIR`, a workspace or repository",
+            ))
+        } else {
+            Ok(None)
+        };
+    };
+    let version = match graph.source_at.as_deref() {
+        None => Version::Recording,
+        Some("worktree") => Version::Worktree,
+        Some(commit) => Version::Commit(commit.to_owned()),
+    };
+    Ok(Some(SourceCode {
+        folder,
+        version,
+        infers,
+    }))
+}

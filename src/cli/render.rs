@@ -1,0 +1,299 @@
+//! `bagreel render`: its arguments, turned into a job, and the report of what was written.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use super::applies::{self, Given};
+use super::args::figure::FigureArgs;
+use super::args::render::RenderArgs;
+use super::args::{ChangeArgs, TimeArgs};
+use super::reading::reading;
+use super::terminal::Terminal;
+use super::{code, look};
+use crate::bag::Input;
+use crate::base::error::Error;
+use crate::base::notice::NoticeKind;
+use crate::base::{budget, file, words};
+use crate::export::Output;
+use crate::export::options::FigureOptions;
+use crate::export::target::Target;
+use crate::mission::Mission;
+use crate::pipeline::{Drawing, Purpose, Render, Rendered, Watch as _, read};
+use crate::view::NameFilter;
+
+/// Reads once and writes every output.
+pub(super) fn render(
+    args: &RenderArgs,
+    given: &Given,
+    terminal: &mut Terminal,
+) -> Result<u8, Error> {
+    let mut job = job(args, given)?;
+    if let Some(kind) = &args.figure {
+        let kind = format!("`bagreel figure --kind {kind}`");
+        terminal.note(&format!(
+            "`render --figure` will be removed; {kind} draws the same"
+        ));
+    }
+    job.reading.collect.sizes = args.sizes.bytes;
+    applies::check_outputs(given, args, &job.outputs)?;
+    crate::pipeline::check(&job)?;
+    applies::check_inputs(given, &job.reading)?;
+    if job
+        .outputs
+        .iter()
+        .all(|output| applies::is_figure(args, output))
+        && let Some(note) = applies::about_windows(given, "a figure")
+    {
+        terminal.note(&note);
+    }
+    if job
+        .outputs
+        .iter()
+        .any(|output| output.target == Target::Stdout)
+    {
+        terminal.make_room();
+    }
+    if args.watch {
+        return watch(args, job, terminal);
+    }
+    let done = crate::pipeline::render(&job, terminal)?;
+    report(&done, args.timings, terminal);
+    Ok(code(&done.mission))
+}
+
+/// Reads once and draws a figure.
+pub(super) fn figure(
+    args: &FigureArgs,
+    given: &Given,
+    terminal: &mut Terminal,
+) -> Result<u8, Error> {
+    let job = figure_job(args)?;
+    applies::check_figure(&job.outputs)?;
+    crate::pipeline::check(&job)?;
+    applies::check_inputs(given, &job.reading)?;
+    if job
+        .outputs
+        .iter()
+        .any(|output| output.target == Target::Stdout)
+    {
+        terminal.make_room();
+    }
+    let done = crate::pipeline::render(&job, terminal)?;
+    // A figure shows continuous time, whatever the windows are.
+    terminal.notices(&done.notices.without(NoticeKind::Chosen));
+    terminal.say(&wrote(&done, "", terminal.seconds()));
+    Ok(code(&done.mission))
+}
+
+/// The work that `figure` was asked to do.
+fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
+    let time = TimeArgs {
+        start: args.start,
+        end: args.end,
+        ..TimeArgs::default()
+    };
+    let change = ChangeArgs {
+        rate_change: args.rate_change,
+        ..ChangeArgs::default()
+    };
+    let reading = reading(&args.inputs, &time, &change, &args.graph)?;
+    let reading = reading.with_phases(look::phases(&args.phases.phases, None)?);
+    let outputs = match &args.outputs[..] {
+        [] => vec![Output::parse(
+            &default_output(&reading.inputs, "pdf"),
+            None,
+        )?],
+        some => {
+            let named = some.iter().map(|output| Output::named(output, None));
+            named.collect::<Result<_, _>>()?
+        }
+    };
+    let mut drawing = Drawing::new()?;
+    drawing.fonts = look::fonts(args.font.as_deref())?;
+    let filter = |text: &Option<String>| NameFilter::parse(text.as_deref().unwrap_or_default());
+    drawing.view.ns_filter = filter(&args.ns_filter)?;
+    drawing.view.topic_filter = filter(&args.topic_filter)?;
+    drawing.page.rate_change = args.rate_change;
+    drawing.page.width_mm = args.width;
+    let kept = [args.font.clone(), Some(PathBuf::from(&args.phases.phases))];
+    let figure = look::figure(&args.kind, &args.form, args.width)?;
+    let mut job = Render::new(reading, outputs)?;
+    job.drawing = drawing;
+    job.sequence.figure = Some(FigureOptions {
+        is_bare: args.bare,
+        ..figure
+    });
+    job.kept = kept
+        .into_iter()
+        .flatten()
+        .filter(|path| path.exists())
+        .collect();
+    Ok(job)
+}
+
+/// Draws again whenever the style file changes, until interrupted. The bag is read once.
+fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<u8, Error> {
+    let mission = read(&job.reading, terminal)?;
+    let path = PathBuf::from(&args.look.style);
+    if !path.is_file() {
+        return Err(Error::usage(
+            "`--watch` watches a style file",
+            "`bagreel styles light > mine.toml`, then `--style mine.toml`",
+        ));
+    }
+    let mut seen = None;
+    while !terminal.stopped() {
+        let now = file::read_text(&path, budget::USER_TEXT).ok();
+        if now == seen {
+            terminal.wait();
+            continue;
+        }
+        seen = now;
+        let style = look::style(&args.look.style);
+        let drawn = style.and_then(|style| {
+            job.drawing.style = style;
+            crate::pipeline::show(&job, mission.clone(), terminal)
+        });
+        match drawn {
+            Ok(done) => report(&done, args.timings, terminal),
+            Err(error) => terminal.error(&error),
+        }
+    }
+    Ok(code(&mission))
+}
+
+/// Prints the files written, the number of windows and changes, and the time taken.
+fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+    for remark in done.written.iter().flat_map(|w| &w.remarks) {
+        terminal.note(remark);
+    }
+    terminal.notices(&done.notices);
+    if timings {
+        terminal.timings();
+    }
+    let windows = format!("{}, ", division(&done.mission));
+    terminal.say(&wrote(done, &windows, terminal.seconds()));
+}
+
+/// The files written, what is in them, and the time taken, in one line.
+fn wrote(done: &Rendered, what: &str, seconds: f64) -> String {
+    let mission = &done.mission;
+    let names = done.written.iter().map(|w| w.path.display().to_string());
+    let names: Vec<String> = names.collect();
+    let changes = mission.ledger.headlines(mission.span).count();
+    let changes = words::count(changes, "change");
+    format!(
+        "wrote {}: {what}{changes}, in {seconds:.1} s",
+        names.join(", ")
+    )
+}
+
+/// The division of the mission in words: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in
+/// length.
+fn division(mission: &Mission) -> String {
+    let windows = words::count(mission.windows.len(), "window");
+    if let [only] = &mission.windows[..] {
+        return format!("{windows} of {}", words::duration(only.span.nanos()));
+    }
+    let length = mission.period.nanos();
+    let mut whole = mission.windows.iter().filter(|w| !w.partial);
+    if whole.all(|w| w.span.nanos() == length) {
+        format!("{windows} of {}", mission.period)
+    } else {
+        windows
+    }
+}
+
+/// The work that `render` was asked to do.
+fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
+    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    let phases = look::phases(&args.phases.phases, args.look.captions.as_deref())?;
+    let mut reading = reading.with_phases(phases);
+    let mut outputs = match &args.outputs[..] {
+        [] => {
+            let extension = if args.figure.is_some() { "pdf" } else { "gif" };
+            let name = default_output(&reading.inputs, extension);
+            vec![Output::parse(&name, args.format.as_deref())?]
+        }
+        some => some
+            .iter()
+            .map(|o| Output::named(o, args.format.as_deref().or(summary_format(o))))
+            .collect::<Result<_, _>>()?,
+    };
+    let is_still = applies::allows_still(given, &outputs);
+    reading.is_still_if_unchanged = is_still;
+    let still = default_output(&reading.inputs, "png");
+    let still = (is_still && args.outputs.is_empty()).then(|| Output::parse(&still, None));
+    outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
+    let purpose = args
+        .look
+        .purpose
+        .as_deref()
+        .map(Purpose::parse)
+        .transpose()?;
+    let drawing = Drawing {
+        body: look::body(args)?,
+        view: look::view(&args.view)?,
+        style: look::style(&args.look.style)?,
+        fonts: look::fonts(args.look.font.as_deref())?,
+        page: look::options(&args.look, args.change.rate_change),
+        is_sized: args.look.size.is_some(),
+        purpose: None,
+        is_fitted: args.look.fit == "auto",
+        splits_hubs: true,
+        engine: crate::layout::engine(&args.look.layout)?,
+        kept: look::kept(args.look.layout_from.as_deref())?,
+    };
+    Ok(Render {
+        drawing: match purpose {
+            Some(purpose) => drawing.seen(purpose),
+            None => drawing,
+        },
+        sequence: crate::export::sequence::SequenceOptions {
+            append_to: summary(),
+            figure: look::old_figure(args)?,
+            ..look::sequence(&args.sequence)?
+        },
+        kept: kept(args),
+        outputs,
+        still: still.transpose()?,
+        is_filtered: args.view.filtered,
+        reading,
+    })
+}
+
+/// The files that only a drawing reads. A style or captions may be a name that is not a file, which does no harm.
+fn kept(args: &RenderArgs) -> Vec<PathBuf> {
+    let look = &args.look;
+    let named = [
+        Some(&look.style),
+        look.captions.as_ref(),
+        Some(&args.phases.phases),
+    ];
+    let named = named.into_iter().flatten().map(PathBuf::from);
+    let files = [&look.font, &look.layout_from].into_iter().flatten();
+    let all = named.chain(files.cloned());
+    all.filter(|path| path.exists()).collect()
+}
+
+/// The file that collects the summary of a job of GitHub's; its name has no extension.
+pub(super) fn summary() -> Option<PathBuf> {
+    std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
+}
+
+fn summary_format(output: &OsStr) -> Option<&'static str> {
+    summary()
+        .is_some_and(|path| path == Path::new(output))
+        .then_some("md")
+}
+
+/// The output where none is given: `out/<bag name>.gif`, of a figure `.pdf`, of a still `.png`; the name is without the
+/// ending of the format.
+fn default_output(inputs: &[Input], extension: &str) -> String {
+    let name = inputs.first().map_or_else(String::new, Input::name);
+    let mut stem = name.as_str();
+    for end in [".active", ".zstd", ".bag", ".db3", ".mcap", ".json"] {
+        stem = stem.strip_suffix(end).unwrap_or(stem);
+    }
+    format!("out/{}.{extension}", stem.replace('/', "_"))
+}

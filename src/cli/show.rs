@@ -1,0 +1,108 @@
+//! The commands that print what a bag holds: `info`, `events`.
+
+use super::applies::{self, Given};
+use super::args::{ChangeArgs, EventsArgs, EventsFormat, InfoArgs, InfoFormat, TimeArgs};
+use super::reading::reading;
+use super::terminal::Terminal;
+use super::{DONE, SKIPPED, code};
+use crate::base::error::Error;
+use crate::base::notice::NoticeKind;
+use crate::graph::window::Length;
+use crate::mission::events::{LogFormat, LogOptions, lines, log};
+use crate::mission::info::{SurveyRow, json, survey_text};
+use crate::pipeline::{Survey, explain, is_survey, read, survey, survey_file};
+
+/// The number of parts of a mission for which `info` shows the activity.
+const PARTS: u32 = 32;
+
+/// Prints the log of a mission.
+pub(super) fn events(
+    args: &EventsArgs,
+    given: &Given,
+    terminal: &mut Terminal,
+) -> Result<u8, Error> {
+    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    applies::check_inputs(given, &reading)?;
+    if let Some(note) = applies::about_windows(given, "the log") {
+        terminal.note(&note);
+    }
+    if args.graph.source.is_some() {
+        terminal.note("what only source code declares has no times and is not in the log");
+    }
+    let mission = read(&reading, terminal)?;
+    let options = LogOptions {
+        parts: args.parts,
+        all: args.all,
+        phases: args.phases,
+    };
+    let format = match args.format {
+        EventsFormat::Text => LogFormat::Text,
+        EventsFormat::Csv => LogFormat::Csv,
+        EventsFormat::Ndjson => LogFormat::Ndjson,
+        EventsFormat::Markdown => LogFormat::Markdown,
+    };
+    match args.format {
+        EventsFormat::Text => terminal.log(&lines(&mission, options))?,
+        _ => terminal.results(&log(&mission, format, options))?,
+    }
+    // The log is the same for every period.
+    terminal.notices(&mission.notices.without(NoticeKind::Chosen));
+    Ok(code(&mission))
+}
+
+/// Prints the summary of a mission, or a row for each bag of a folder.
+#[cfg_attr(
+    not(feature = "parquet"),
+    expect(
+        clippy::match_wildcard_for_single_variants,
+        reason = "with Parquet there are two tables"
+    )
+)]
+pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
+    let time = TimeArgs {
+        period: Some(Length::Parts(PARTS)),
+        ..TimeArgs::default()
+    };
+    let mut reading = reading(&args.inputs, &time, &ChangeArgs::default(), &args.graph)?;
+    reading.collect.sizes = args.sizes.bytes;
+    applies::check_inputs(given, &reading)?;
+    if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
+        && is_survey(input)
+    {
+        if !args.why.is_empty() {
+            let what = "`--why` explains one mission, but a folder of bags contains many";
+            return Err(Error::usage(what, "name one of the bags"));
+        }
+        let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
+        match args.format {
+            InfoFormat::Text => terminal.results(&survey_text(&rows, terminal.width()))?,
+            InfoFormat::Json => terminal.results(&json(&rows))?,
+            table => terminal.table(&survey_file(&rows, table.of_table())?)?,
+        }
+        return Ok(if skipped { SKIPPED } else { DONE });
+    }
+    if !args.why.is_empty() {
+        let mut reading = reading;
+        reading.collect.why.clone_from(&args.why);
+        let (mission, pieces) = explain(&reading, terminal)?;
+        terminal.results(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;
+        terminal.notices(&mission.notices);
+        return Ok(code(&mission));
+    }
+    let mission = read(&reading, terminal)?;
+    let info = || crate::mission::info::info(&mission);
+    match args.format {
+        InfoFormat::Text => {
+            terminal.results(&crate::mission::info::text(&info(), terminal.width()))?;
+        }
+        InfoFormat::Json => terminal.results(&json(&info()))?,
+        table => {
+            let bag = mission.bags.first();
+            let name = bag.map_or_else(String::new, |bag| bag.name.clone());
+            let row = SurveyRow::of(name, &mission);
+            terminal.table(&survey_file(&[row], table.of_table())?)?;
+        }
+    }
+    terminal.notices(&mission.notices);
+    Ok(code(&mission))
+}

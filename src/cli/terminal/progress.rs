@@ -1,0 +1,139 @@
+//! The progress bar, and the time of each part of the work; the only file that measures time.
+
+use std::collections::BTreeMap;
+use std::io::{self, IsTerminal as _};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::pipeline::Stage;
+
+/// How often a bar moves where no progress is reported, as in one long layout.
+const TICK: Duration = Duration::from_millis(120);
+
+/// The part of the work that is under way.
+#[derive(Debug)]
+pub(super) struct Progress {
+    is_shown: bool,
+    bar: Option<ProgressBar>,
+    stage: Option<(Stage, Instant)>,
+    spent: BTreeMap<Stage, Duration>,
+    /// The shares of the time of each stage, in words.
+    shares: BTreeMap<Stage, String>,
+    begun: Instant,
+}
+
+impl Progress {
+    /// Progress that is shown only where standard error is a terminal, and if `is_shown`.
+    pub(super) fn new(is_shown: bool) -> Self {
+        Self {
+            is_shown: is_shown && io::stderr().is_terminal(),
+            bar: None,
+            stage: None,
+            spent: BTreeMap::new(),
+            shares: BTreeMap::new(),
+            begun: Instant::now(),
+        }
+    }
+
+    /// Shows no bar from now on: results are written to the same terminal.
+    pub(super) fn hide(&mut self) {
+        self.end();
+        self.is_shown = false;
+    }
+
+    /// A new part of the work begins; the one before is over.
+    pub(super) fn begin(&mut self, stage: Stage) {
+        self.end();
+        self.stage = Some((stage, Instant::now()));
+        self.bar = self.is_shown.then(|| bar(stage));
+    }
+
+    /// The part that is under way has done `done` of `total`, which is 0 where it is not known.
+    pub(super) fn set(&self, done: u64, total: u64) {
+        if let Some(bar) = &self.bar {
+            if total > 0 {
+                if bar.length().is_none() {
+                    bar.set_style(style(counted(self.stage)));
+                }
+                bar.set_length(total.max(done));
+            }
+            bar.set_position(done);
+        }
+    }
+
+    /// The part that is under way is over: its bar is cleared.
+    pub(super) fn end(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+        if let Some((stage, since)) = self.stage.take() {
+            *self.spent.entry(stage).or_default() += since.elapsed();
+        }
+    }
+
+    /// Prints something while the bar is out of the way.
+    pub(super) fn aside(&self, print: impl FnOnce()) {
+        match &self.bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+
+    /// Keeps the shares of the time of the part that is under way.
+    pub(super) fn share(&mut self, shares: &[(&'static str, f64)]) {
+        let Some((stage, _)) = self.stage else {
+            return;
+        };
+        let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
+        let words: Vec<String> = shares
+            .map(|(word, share)| format!("{word} {:.0} %", share * 100.0))
+            .collect();
+        if !words.is_empty() {
+            self.shares
+                .insert(stage, format!(" ({})", words.join(", ")));
+        }
+    }
+
+    /// Seconds since the command began.
+    pub(super) fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// The time of each part, and its largest steps, a line each.
+    pub(super) fn timings(&self) -> Vec<String> {
+        let line = |(stage, time): (&Stage, &Duration)| {
+            let shares = self.shares.get(stage).map_or("", String::as_str);
+            format!("{:>9.3} s  {}{shares}", time.as_secs_f64(), stage.word())
+        };
+        self.spent.iter().map(line).collect()
+    }
+}
+
+/// A bar that turns until its total is known.
+fn bar(stage: Stage) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    let turning = match stage {
+        Stage::Read | Stage::Verify => "{msg:>9} {spinner} {bytes}",
+        _ => "{msg:>9} {spinner} {elapsed}",
+    };
+    bar.set_style(style(turning));
+    bar.set_message(stage.word());
+    bar.enable_steady_tick(TICK);
+    bar
+}
+
+/// The form of a bar whose total is known.
+fn counted(stage: Option<(Stage, Instant)>) -> &'static str {
+    match stage.map(|(stage, _)| stage) {
+        Some(Stage::Read | Stage::Verify) => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
+        Some(Stage::Draw) => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
+        _ => "{msg:>9} [{bar:40}] {pos}/{len}",
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    let style = ProgressStyle::with_template(template);
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.progress_chars("=> ")
+}

@@ -1,0 +1,250 @@
+//! The map with differences: nodes that come and go, and those they talk to, at the same places in every phase, with what
+//! the phase changes in colour.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::StepSource;
+use crate::base::error::{Error, Result};
+use crate::base::name::last_part;
+use crate::draw::figure::MOST_HEIGHT;
+use crate::draw::figure::band::{clock, title};
+use crate::draw::figure::canvas::{PX_PER_MM, ink};
+use crate::draw::figure::groups::groups;
+use crate::draw::figure::marks::Sign;
+use crate::draw::figure::notes::flow;
+use crate::draw::figure::page::FigureSheet;
+use crate::draw::figure::panel::{Fate, INSIDE, Panel, PanelBox, items};
+use crate::draw::figure::place::PlacedPanel;
+use crate::draw::figure::talks::Talk;
+use crate::draw::scene::Scene;
+
+/// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that come and go together.
+pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
+    let studio = StepSource::new(sheet)?;
+    let chosen = studio.chosen()?;
+    let phases: Vec<usize> = match sheet.options.steps[..] {
+        [] => std::iter::once(0).chain(chosen.iter().copied()).collect(),
+        _ => chosen.clone(),
+    };
+    let left = studio.left_out(&chosen);
+    for is_grouped in [false, true] {
+        for columns in (1..=studio.columns).rev() {
+            let mut wide = StepSource::new(sheet)?;
+            wide.columns = columns;
+            let panels = Union::new(&wide, &chosen, is_grouped).panels(&phases);
+            let scene = panels.map(|panels| wide.page(&panels, &[], left));
+            if let Some(scene) = scene.filter(|s| s.size.h <= MOST_HEIGHT * PX_PER_MM) {
+                return Ok((scene, Vec::new()));
+            }
+        }
+    }
+    Err(Error::usage(
+        format!("these phases are higher than {MOST_HEIGHT} mm at the same places"),
+        "`--steps 3,5` draws fewer of them, `--figure steps` each at its own places, `--ns-filter` leaves nodes out",
+    ))
+}
+
+/// All that a step changes, with its neighbours, over all phases.
+struct Union<'u, 's> {
+    studio: &'u StepSource<'s>,
+    /// The rows of each box, and whether it ever changes.
+    boxes: Vec<(bool, Vec<usize>)>,
+    /// The arrows of each phase: from, to, topics.
+    talks: Vec<BTreeMap<(usize, usize), Talk>>,
+}
+
+impl<'u, 's> Union<'u, 's> {
+    fn new(studio: &'u StepSource<'s>, chosen: &[usize], is_grouped: bool) -> Self {
+        let source = studio.sheet.source;
+        let changed: BTreeSet<usize> = chosen
+            .iter()
+            .flat_map(|k| {
+                let turned = [Sign::Start, Sign::End].map(|sign| studio.turned(*k, sign));
+                turned.into_iter().flat_map(BTreeMap::into_keys)
+            })
+            .collect();
+        let all = groups(source, &studio.tracks, studio.depth);
+        let mut boxes: Vec<(bool, Vec<usize>)> = Vec::new();
+        for group in &all {
+            let own = group.members.iter().filter(|at| changed.contains(at));
+            let own: Vec<usize> = own.copied().collect();
+            if is_grouped && !own.is_empty() {
+                boxes.push((true, own));
+            } else {
+                boxes.extend(own.into_iter().map(|at| (true, vec![at])));
+            }
+        }
+        let many = boxes.len();
+        for group in &all {
+            let others = group.members.iter().filter(|at| !changed.contains(at));
+            let others: Vec<usize> = others.copied().collect();
+            if !others.is_empty() {
+                boxes.push((false, others));
+            }
+        }
+        let mut union = Self {
+            studio,
+            boxes,
+            talks: Vec::new(),
+        };
+        union.talk(many);
+        // Neighbours without an arrow to a changed node say nothing.
+        let linked: BTreeSet<usize> = union
+            .talks
+            .iter()
+            .flat_map(BTreeMap::keys)
+            .flat_map(|(from, to)| [*from, *to])
+            .collect();
+        let mut at = 0..;
+        union.boxes.retain(|_| {
+            at.next()
+                .is_some_and(|at| at < many || linked.contains(&at))
+        });
+        union.talk(many);
+        union
+    }
+
+    /// Finds the arrows of every phase at the first `many` boxes.
+    fn talk(&mut self, many: usize) {
+        let studio = self.studio;
+        let mut vertex = vec![None; studio.tracks.len()];
+        for (at, (_, members)) in self.boxes.iter().enumerate() {
+            for member in members {
+                vertex[*member] = Some(at);
+            }
+        }
+        let of_phase = |span| {
+            let all = studio.talks.between(&vertex, span, true);
+            let own = all.into_iter().filter(|t| t.from < many || t.to < many);
+            own.map(|talk| ((talk.from, talk.to), talk)).collect()
+        };
+        let phases = studio.sheet.source.phases.iter();
+        self.talks = phases.map(|phase| of_phase(phase.span)).collect();
+    }
+
+    /// The panels of these phases; `None` where they are too wide.
+    fn panels(&self, phases: &[usize]) -> Option<Vec<Panel>> {
+        let (studio, source) = (self.studio, self.studio.sheet.source);
+        let mut links: BTreeMap<(usize, usize), Talk> = BTreeMap::new();
+        for (key, talk) in phases.iter().flat_map(|k| &self.talks[*k]) {
+            let all = links.entry(*key).or_insert_with(|| talk.clone());
+            let new = talk.topics.iter().filter(|(topic, _)| {
+                let known = all.topics.iter().any(|(other, _)| other == topic);
+                !known
+            });
+            let new: Vec<_> = new.copied().collect();
+            all.topics.extend(new);
+        }
+        let links: Vec<(Talk, Fate)> = links
+            .into_values()
+            .map(|talk| (talk, Fate::Neighbour))
+            .collect();
+        let looks: Vec<PanelBox> = (0..self.boxes.len())
+            .map(|at| self.look(at, Fate::Began))
+            .collect();
+        let labels: Vec<Vec<Vec<String>>> =
+            links.iter().map(|(t, _)| t.labels(source, 1)).collect();
+        let canvas = studio.sheet.canvas();
+        let placed = studio.placed(&canvas, &looks, &links, &labels)?;
+        let panel = |k: &usize| self.panel(*k, &links, &labels, &placed);
+        Some(phases.iter().map(panel).collect())
+    }
+
+    fn look(&self, at: usize, fate: Fate) -> PanelBox {
+        let (changes, members) = &self.boxes[at];
+        let named = members.first().copied().filter(|_| !changes);
+        self.studio.look(fate, members, named, None)
+    }
+
+    /// Phase `k`: what lives in it, and what ended as it began.
+    fn panel(
+        &self,
+        k: usize,
+        links: &[(Talk, Fate)],
+        labels: &[Vec<Vec<String>>],
+        placed: &PlacedPanel,
+    ) -> Panel {
+        let (studio, source) = (self.studio, self.studio.sheet.source);
+        let turned = |sign| match k {
+            0 => BTreeMap::new(),
+            _ => studio.turned(k, sign),
+        };
+        let (began, ended) = (turned(Sign::Start), turned(Sign::End));
+        let is_there = |at: &usize| studio.found[k].names.contains(&studio.tracks[*at].name);
+        let fates: Vec<Option<Fate>> = self
+            .boxes
+            .iter()
+            .map(|(_, members)| {
+                let any = |of: &dyn Fn(&usize) -> bool| members.iter().any(of);
+                if any(&|at| began.contains_key(at)) {
+                    Some(Fate::Began)
+                } else if any(&|at| ended.contains_key(at)) {
+                    Some(Fate::Ended)
+                } else {
+                    any(&is_there).then_some(Fate::Neighbour)
+                }
+            })
+            .collect();
+        let drawn: Vec<usize> = (0..fates.len()).filter(|at| fates[*at].is_some()).collect();
+        let fate_of = |(talk, _): &(Talk, Fate)| {
+            let (key, ends) = ((talk.from, talk.to), [fates[talk.from]?, fates[talk.to]?]);
+            let before = k.checked_sub(1).map(|before| &self.talks[before]);
+            if ends.contains(&Fate::Ended) {
+                let was = before.is_some_and(|talks| talks.contains_key(&key));
+                return was.then_some(Fate::Ended);
+            }
+            let is_new = ends.contains(&Fate::Began);
+            let fate = if is_new { Fate::Began } else { Fate::Neighbour };
+            self.talks[k].contains_key(&key).then_some(fate)
+        };
+        let arrows: Vec<(usize, Fate)> = links
+            .iter()
+            .enumerate()
+            .filter_map(|(at, link)| Some((at, fate_of(link)?)))
+            .collect();
+        let shown: Vec<usize> = arrows.iter().map(|(at, _)| *at).collect();
+        let looks = drawn.iter().filter_map(|at| {
+            let mut look = self.look(*at, fates[*at]?);
+            let turned = self.boxes[*at].1.iter();
+            let events = turned.flat_map(|m| began.get(m).into_iter().chain(ended.get(m)));
+            look.entries = events.flatten().copied().collect();
+            Some(look)
+        });
+        let looks: Vec<PanelBox> = looks.collect();
+        let handed = if k > 0 { studio.handed(k) } else { Vec::new() };
+        let notes: Vec<_> = handed
+            .iter()
+            .map(|(topic, from, to, _)| {
+                let [topic, from, to] = [source.topic(*topic), from, to].map(last_part);
+                (ink::CHANGED, format!("{topic}: {from} → {to}"))
+            })
+            .collect();
+        let inside = studio.panel_width() - 2.0 * INSIDE;
+        let foot = flow(&mut studio.sheet.canvas(), inside, 0.0, &items(&notes));
+        let pitch = studio.sheet.canvas().sizes.pitch();
+        let start = source.phases[k].span.start.since(source.span().start);
+        let names = studio.found[k].names.len();
+        let boxed = drawn.iter().flat_map(|at| &self.boxes[*at].1);
+        let mut entries: Vec<_> = looks.iter().flat_map(|l| &l.entries).copied().collect();
+        entries.extend(handed.iter().map(|h| h.3));
+        Panel {
+            entries,
+            heading: (
+                (k + 1).to_string(),
+                format!("{} {}", clock(start), title(source, k)),
+            ),
+            home: String::new(),
+            looks,
+            talks: arrows
+                .iter()
+                .map(|(at, fate)| (links[*at].0.clone(), *fate))
+                .collect(),
+            labels: shown.iter().map(|at| labels[*at].clone()).collect(),
+            height: INSIDE * 1.6 + pitch + 0.6 + placed.size.h + 0.8 + foot,
+            foot,
+            undrawn: names.saturating_sub(boxed.filter(|at| is_there(at)).count()),
+            placed: Some(placed.only(&drawn, &shown)),
+            notes,
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The nodes that stand as words in their namespace: `also here: camera_tf, imu_driver`.
+
+use std::collections::BTreeSet;
+
+use super::boxes::Boxes;
+use super::measured::LINE;
+use super::options;
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Group, Text};
+use crate::draw::style::Style;
+use crate::draw::text::{Fonts, Weight};
+use crate::view::{AlsoHere, Mark, Shown, View};
+
+/// The width at which the words are broken where their namespace is no wider, in the height of their text.
+const WIDTH: f64 = 22.0;
+/// The room above the words, in the height of their text.
+const ABOVE: f64 = 0.4;
+/// The distance of the words from the frame of their namespace, in pixels.
+const INSET: f64 = 8.0;
+const FIRST: &str = "also here:";
+
+/// The words for the nodes of one namespace.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Footer {
+    /// The namespace: a place in the view's; `None` for the words outside of all.
+    pub(crate) cluster: Option<usize>,
+    /// The names as they are drawn.
+    names: Vec<String>,
+    /// The room that they need where their namespace is no wider.
+    pub(crate) room: Size,
+}
+
+/// The words of each namespace.
+pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> {
+    let footer = |also: &AlsoHere| {
+        let space = also.cluster.and_then(|at| view.namespaces.get(at));
+        let short = |name: &str| {
+            let rest = space.and_then(|space| name.strip_prefix(&*space.name));
+            let rest = rest.and_then(|rest| rest.strip_prefix('/'));
+            fonts.shown(rest.unwrap_or(name)).into_owned()
+        };
+        let names: Vec<String> = also.items.iter().map(|item| short(&item.label)).collect();
+        let size = style.edge.size;
+        let words: Vec<String> = words(names.iter().map(|name| format!("− {name}")));
+        let places = broken(&words, fonts, size, WIDTH * size);
+        let ends = places.iter().zip(&words);
+        let ends = ends.map(|(at, word)| at.x + fonts.width(word, size, Weight::SemiBold));
+        let lines = places.last().map_or(0.0, |at| at.y) + 1.0;
+        Footer {
+            cluster: also.cluster,
+            room: Size::new(ends.fold(0.0, f64::max), size * (LINE * lines + ABOVE)),
+            names,
+        }
+    };
+    view.also.iter().map(footer).collect()
+}
+
+/// Names as they follow each other, each with its comma, after the words before them.
+fn words(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut words = vec![FIRST.to_owned()];
+    words.extend(names.map(|name| name + ","));
+    words.last_mut().map(String::pop);
+    words
+}
+
+/// The place of each word from the left, and its line, in lines of at most this width as far as no word is longer.
+fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
+    let blank = fonts.width(" ", size, Weight::Regular);
+    let mut at = Point::default();
+    let place = |word: &String| {
+        let width = fonts.width(word, size, Weight::SemiBold);
+        if at.x > 0.0 && at.x + width > most {
+            at = Point::new(0.0, at.y + 1.0);
+        }
+        let here = at;
+        at.x += width + blank;
+        here
+    };
+    words.iter().map(place).collect()
+}
+
+impl Boxes<'_> {
+    /// The words in window `k` at the bottom of this place: a namespace, or the room of the words outside of all.
+    pub(crate) fn footer(
+        &self,
+        footer: &Footer,
+        also: &AlsoHere,
+        place: Rect,
+        k: usize,
+    ) -> Option<Group> {
+        let (style, scale) = (&self.style.edge, self.fit.scale);
+        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
+        let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
+        let seen = seen.filter_map(|((item, shown), name)| Some((item, shown.at(k)?, name)));
+        let seen: Vec<_> = seen.collect();
+        let name = |shown: &Shown, name: &str| match shown.mark {
+            Some(Mark::Added) => format!("+ {name}"),
+            Some(Mark::Removed) => format!("− {name}"),
+            Some(Mark::Away) => format!("{name} (away)"),
+            _ => name.to_owned(),
+        };
+        let words = words(seen.iter().map(|(_, shown, short)| name(shown, short)));
+        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
+        let places = broken(&words, self.fonts, style.size, most);
+        let place = self.fit.rect(place);
+        let (size, step) = (style.size * scale, style.size * LINE * scale);
+        let last = places.last()?.y;
+        let names: Vec<&str> = seen.iter().map(|(item, ..)| &*item.name).collect();
+        let mut data = vec![("names", names.join(" "))];
+        let entries = seen.iter().flat_map(|(_, shown, _)| &shown.entries);
+        let entries: BTreeSet<_> = entries.collect();
+        if !entries.is_empty() {
+            let places: Vec<String> = entries.iter().map(ToString::to_string).collect();
+            data.push(("entries", places.join(" ")));
+        }
+        let mut group = Group {
+            id: format!(
+                "also{}",
+                footer.cluster.map_or_else(String::new, |at| at.to_string())
+            ),
+            class: "also".to_owned(),
+            data,
+            title: names.join("\n"),
+            ..Group::default()
+        };
+        let marks = std::iter::once(None).chain(seen.iter().map(|(_, shown, _)| shown.mark));
+        for ((word, at), mark) in words.into_iter().zip(places).zip(marks) {
+            group.text(Text {
+                at: Point::new(
+                    place.x + (inset + at.x) * scale,
+                    place.bottom() - inset * 0.8 * scale - step * (last - at.y + 0.15),
+                ),
+                anchor: Anchor::Start,
+                size,
+                weight: if mark.is_some() {
+                    Weight::SemiBold
+                } else {
+                    Weight::Regular
+                },
+                color: mark.map_or(self.style.page.quiet, |mark| {
+                    options::change(self.style, mark).color
+                }),
+                halo: None,
+                text: word,
+            });
+        }
+        (!names.is_empty()).then_some(group)
+    }
+}

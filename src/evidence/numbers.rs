@@ -1,0 +1,118 @@
+//! Sequence numbers in the headers of messages (ROS 1), which begin again with their publisher.
+//!
+//! Kept are those on both sides of each place where they may have begun again: at most a few per stream.
+
+use std::collections::BTreeMap;
+
+use crate::bag::{Connection, Encoding};
+use crate::base::rhythm::{BEGUN_AGAIN, GAP_NS};
+use crate::base::time::Stamp;
+use crate::evidence::message::definition::outline;
+
+/// The number of bytes from a payload's start to the end of its header's stamp.
+pub(crate) const HEAD: usize = 12;
+/// The most places per stream at which numbers are kept: no node restarts more often.
+const MOST: usize = 4096;
+
+/// The number in a header, with the stamp beside it as the message holds it: only copies have both in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Number {
+    pub(crate) number: u32,
+    pub(crate) stamp: u64,
+}
+
+impl Number {
+    /// The number at the start of a payload; `None` if it is too short.
+    pub(crate) fn of(payload: &[u8]) -> Option<Self> {
+        Some(Self {
+            number: u32::from_le_bytes(payload.get(..4)?.try_into().ok()?),
+            stamp: u64::from_le_bytes(payload.get(4..HEAD)?.try_into().ok()?),
+        })
+    }
+
+    /// Whether it is so small that its publisher may just have begun, after `before`.
+    pub(crate) fn begins_after(self, before: Self) -> bool {
+        self.number <= BEGUN_AGAIN && self.number < before.number
+    }
+}
+
+/// The numbers of one stream.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Numbers {
+    /// The number of messages looked into.
+    pub(crate) read: u64,
+    last: Option<(Stamp, Number)>,
+    kept: BTreeMap<Stamp, Number>,
+    /// The times on both sides of each place where numbers begin again after a gap.
+    pub(crate) falls: Vec<(Stamp, Stamp)>,
+}
+
+impl Numbers {
+    /// Looks at the next message of the stream, in the order of the file.
+    pub(crate) fn add(&mut self, time: Stamp, payload: &[u8]) {
+        let Some(number) = Number::of(payload) else {
+            return;
+        };
+        self.read += 1;
+        match self.last.replace((time, number)) {
+            None => self.keep(time, number),
+            Some((since, before)) => {
+                if number.begins_after(before) && time.since(since) >= GAP_NS {
+                    self.keep(since, before);
+                    self.keep(time, number);
+                    if self.falls.len() < MOST {
+                        self.falls.push((since, time));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Keeps the number of the message at this time.
+    pub(crate) fn keep(&mut self, time: Stamp, number: Number) {
+        if self.kept.len() < MOST {
+            self.kept.insert(time, number);
+        }
+    }
+
+    /// The number of the message at this time, if it was kept.
+    pub(crate) fn at(&self, time: Stamp) -> Option<Number> {
+        let last = self.last.filter(|(at, _)| *at == time);
+        let kept = self.kept.get(&time).copied();
+        kept.or(last.map(|(_, number)| number))
+    }
+}
+
+/// Whether the messages of a connection begin with a header that holds a number, as its definition says.
+pub(crate) fn is_numbered(connection: &Connection) -> bool {
+    let definition = connection.definition.as_deref().unwrap_or_default();
+    connection.encoding == Encoding::Ros1
+        && outline(definition)
+            .first()
+            .is_some_and(|(_, fields)| fields.starts_with("Header "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn payload(number: u32, stamp: u64) -> Vec<u8> {
+        [&number.to_le_bytes()[..], &stamp.to_le_bytes()].concat()
+    }
+
+    #[test]
+    fn numbers_are_kept_where_they_begin_again() {
+        let mut all = Numbers::default();
+        let seconds = |s: i64| Stamp(s * 1_000_000_000);
+        for (at, number) in [(0, 7), (1, 8), (2, 9), (10, 2), (11, 3), (12, 300), (13, 6)] {
+            all.add(seconds(at), &payload(number, 5));
+        }
+        all.add(seconds(14), &[1, 2, 3]);
+        let number = |s| all.at(seconds(s)).map(|n| n.number);
+        assert_eq!(all.read, 7);
+        assert_eq!(
+            [0, 1, 2, 10, 12, 13].map(number),
+            [Some(7), None, Some(9), Some(2), None, Some(6)]
+        );
+    }
+}

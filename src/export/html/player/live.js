@@ -1,0 +1,15 @@
+// Only in a page that is served while the recording grows: a newer page takes the place of this one where the newest window
+// is shown, and waits where one looks back.
+let shownPage, newestPage;
+const renew = () => {
+	if (newestPage == shownPage || now < last || timer || $.help.open) return;
+	history.replaceState(0, '', link().replace(/t=[^&]*/, 't=1e9'));
+	location.reload();
+};
+new EventSource('events').onmessage = ({ data }) => {
+	shownPage ??= data;
+	newestPage = data;
+	renew();
+};
+onSeek.push(renew);
+if (!location.hash) go(last);

@@ -1,0 +1,299 @@
+//! The recordings of a mission: the time that each covers, and the times at which none of its messages was recorded.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::restarts::Restarts;
+use super::senders::{Sender, Traffic};
+use crate::base::rhythm::{FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::claim::Name;
+use crate::evidence::collector::Recorded;
+use crate::evidence::proof::{Reliability, Stream};
+use crate::graph::history::Stretch;
+
+/// The first and the last moment of the recording that each bag is a part of, by bag. A bag is a part of another's
+/// recording if it lies before or behind it and has most topics with it in common.
+#[expect(
+    clippy::type_complexity,
+    reason = "a span and names, of each bag, for a moment"
+)]
+pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp, Stamp)> {
+    let mut bags: Vec<(Option<(Stamp, Stamp)>, BTreeSet<Name>)> = Vec::new();
+    for stream in streams {
+        if bags.len() <= stream.bag {
+            bags.resize(stream.bag + 1, (None, BTreeSet::new()));
+        }
+        let Some(bounds) = recorded.messages.bounds(stream.times) else {
+            continue;
+        };
+        let (span, topics) = &mut bags[stream.bag];
+        let all = span.get_or_insert(bounds);
+        *all = (all.0.min(bounds.0), all.1.max(bounds.1));
+        topics.insert(stream.topic);
+    }
+    let is_part = |a: usize, b: usize| {
+        let ((Some(one), topics), (Some(other), others)) = (&bags[a], &bags[b]) else {
+            return false;
+        };
+        let shared = one.1.min(other.1).since(one.0.max(other.0));
+        let common = topics.intersection(others).count();
+        shared <= OUT_OF_ORDER_NS && common * 2 > topics.len().min(others.len())
+    };
+    let mut of: Vec<usize> = (0..bags.len()).collect();
+    for a in 0..bags.len() {
+        for b in 0..a {
+            if of[a] != of[b] && is_part(a, b) {
+                let (old, new) = (of[a], of[b]);
+                of.iter_mut()
+                    .filter(|one| **one == old)
+                    .for_each(|one| *one = new);
+            }
+        }
+    }
+    let whole = |bag: usize| {
+        let parts = bags.iter().zip(&of).filter(|(_, one)| **one == of[bag]);
+        let spans = parts.filter_map(|((span, _), _)| *span);
+        spans
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .unwrap_or((Stamp::MIN, Stamp::MAX))
+    };
+    (0..bags.len()).map(whole).collect()
+}
+
+/// The nodes that several recordings show at the same time as publishers of one topic: of several robots, or recorded
+/// twice.
+#[expect(
+    clippy::type_complexity,
+    reason = "when each bag shows a node and topic, for a moment"
+)]
+pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name> {
+    let mut seen: BTreeMap<(Name, Name), Vec<(usize, (Stamp, Stamp))>> = BTreeMap::new();
+    let mut doubled = BTreeSet::new();
+    let named = streams
+        .iter()
+        .filter(|s| s.trust == Reliability::Whole && !s.latched);
+    for stream in named.filter(|s| !crate::base::name::is_quiet(s.connection.topic.as_str())) {
+        let (Some(node), Some(times)) = (stream.speaker, recorded.messages.bounds(stream.times))
+        else {
+            continue;
+        };
+        let before = seen.entry((node, stream.topic)).or_default();
+        let meets = |(bag, other): &(usize, (Stamp, Stamp))| {
+            *bag != stream.bag && times.1.min(other.1).since(times.0.max(other.0)) > OUT_OF_ORDER_NS
+        };
+        if before.iter().any(meets) {
+            doubled.insert(node);
+        }
+        before.push((stream.bag, times));
+    }
+    doubled
+}
+
+/// A sender with its recordings.
+struct Voice<'a> {
+    node: Option<Name>,
+    stretches: &'a [Stretch],
+    bags: BTreeSet<usize>,
+}
+
+impl Voice<'_> {
+    /// The messages that are being sent at a moment, if one should come long before `length` is over.
+    fn sending(&self, at: Stamp, length: i64) -> Option<&Stretch> {
+        let next = self.stretches.partition_point(|s| s.first <= at);
+        let stretch = self.stretches.get(next.checked_sub(1)?)?;
+        let late = at.since(stretch.last);
+        let is_fast = stretch.period.saturating_mul(GAP) <= length;
+        (stretch.count >= FEWEST && is_fast && late <= stretch.period.saturating_mul(2))
+            .then_some(stretch)
+    }
+
+    /// Whether it begins to send well inside a gap.
+    fn begins_in(&self, gap: Span) -> bool {
+        let edge = gap.nanos() / 8;
+        let inside = gap.start.plus(edge)..gap.end.plus(-edge);
+        self.stretches.iter().any(|s| inside.contains(&s.first))
+    }
+
+    /// The gap that begins around a moment, give or take `near` nanoseconds: the last message and the next one.
+    fn gap(&self, at: Stamp, near: i64) -> Option<(Stamp, Option<Stamp>)> {
+        let place = self.stretches.partition_point(|s| s.last < at.plus(-near));
+        let last = self.stretches.get(place)?.last;
+        let next = self.stretches.get(place + 1);
+        let is_gap = next.is_none_or(|next| !next.is_joined) && last.since(at) <= near;
+        is_gap.then(|| (last, next.map(|next| next.first)))
+    }
+}
+
+/// The most gaps of a sender of which any may be a pause of the recorder: one with more sends only when needed.
+const MOST_GAPS: usize = 64;
+
+/// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and begin again
+/// together without having restarted.
+pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream]) -> Vec<Span> {
+    let mut voices = Vec::new();
+    for of_topic in traffic.values() {
+        for (place, sender) in of_topic.list.iter().enumerate() {
+            if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
+                continue;
+            }
+            let own = of_topic.streams.iter().zip(&of_topic.of);
+            let own = own.filter(|(_, of)| **of == place);
+            voices.push(Voice {
+                node: sender.node,
+                stretches: &sender.stretches,
+                bags: own.map(|(at, _)| streams[*at].bag).collect(),
+            });
+        }
+    }
+    let bags: BTreeSet<usize> = voices
+        .iter()
+        .flat_map(|voice| &voice.bags)
+        .copied()
+        .collect();
+    let mut found: Vec<Span> = Vec::new();
+    for bag in bags {
+        let of_bag: Vec<&Voice<'_>> = voices.iter().filter(|v| v.bags.contains(&bag)).collect();
+        for gap in gaps(&of_bag) {
+            if !found.iter().any(|pause| pause.shared(gap) > 0) {
+                found.extend(pause(&of_bag, restarts, gap));
+            }
+        }
+    }
+    found.sort_unstable_by_key(|pause| pause.start);
+    found
+}
+
+/// The gaps of senders that seldom have any, sorted.
+fn gaps(voices: &[&Voice<'_>]) -> Vec<Span> {
+    let steady = voices
+        .iter()
+        .filter(|voice| voice.stretches.len() <= MOST_GAPS);
+    let pairs = steady.flat_map(|voice| voice.stretches.windows(2));
+    let apart = pairs.filter(|pair| !pair[1].is_joined);
+    let mut gaps: Vec<Span> = apart
+        .map(|pair| Span {
+            start: pair[0].last,
+            end: pair[1].first,
+        })
+        .collect();
+    gaps.sort_unstable_by_key(|gap| (gap.start, gap.end));
+    gaps
+}
+
+/// The pause of the recording around a gap of one sender, if nearly all others that should have sent have that gap too.
+fn pause(voices: &[&Voice<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
+    let (mut should, mut silent) = (0, 0);
+    let mut nodes: BTreeSet<Option<Name>> = BTreeSet::new();
+    let mut found = Span {
+        start: Stamp::MIN,
+        end: Stamp::MAX,
+    };
+    for voice in voices {
+        let Some(stretch) = voice.sending(gap.start, gap.nanos()) else {
+            should += u64::from(voice.begins_in(gap));
+            continue;
+        };
+        should += 1;
+        // The last messages of two senders lie at most a period of either apart.
+        let near = stretch.period.saturating_mul(2).max(GAP_NS / 2);
+        let Some((last, next)) = voice.gap(gap.start, near) else {
+            continue;
+        };
+        let of_node = voice.node.and_then(|node| restarts.get(&node)).into_iter();
+        let has_restarted = of_node
+            .flatten()
+            .any(|r| r.death < gap.end && gap.start < r.birth);
+        if has_restarted || next.is_some_and(|next| gap.end.since(next) > near) {
+            continue;
+        }
+        silent += 1;
+        nodes.insert(voice.node);
+        found.start = found.start.max(last);
+        found.end = found.end.min(next.unwrap_or(Stamp::MAX));
+    }
+    let is_most = silent >= PAUSE_FEWEST && silent * 100 >= should * PAUSE_SHARE;
+    let is_one_node = nodes.len() == 1 && !nodes.contains(&None);
+    (is_most && !is_one_node && found.nanos() >= GAP_NS).then_some(found)
+}
+
+/// Whether most of a silence lies in pauses of the recording.
+pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool {
+    let Some(to) = to else { return false };
+    let silence = Span {
+        start: from,
+        end: to,
+    };
+    let shared = pauses.iter().map(|pause| pause.shared(silence).max(0));
+    shared.sum::<i64>() > silence.nanos() / 2
+}
+
+impl Sender {
+    /// The lives of an element as far as the recordings of some senders reach.
+    pub(crate) fn within<'a>(senders: impl Iterator<Item = &'a Self>, lives: &[Span]) -> Vec<Span> {
+        let end = senders.map(|sender| sender.recording.1).max();
+        let end = end.map_or(Stamp::MAX, |end| end.plus(1));
+        let clipped = lives.iter().map(|life| Span {
+            start: life.start,
+            end: life.end.min(end),
+        });
+        clipped.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLI: i64 = 1_000_000;
+
+    fn stretch(first: i64, last: i64, period: i64) -> Stretch {
+        Stretch {
+            first: Stamp(first * MILLI),
+            last: Stamp(last * MILLI),
+            count: 100,
+            period: period * MILLI,
+            is_even: true,
+            is_joined: false,
+        }
+    }
+
+    fn told(all: &[(u32, &[Stretch])]) -> Vec<(i64, i64)> {
+        let voices: Vec<Voice<'_>> = all
+            .iter()
+            .map(|(node, stretches)| Voice {
+                node: Some(Name(*node)),
+                stretches,
+                bags: BTreeSet::new(),
+            })
+            .collect();
+        let voices: Vec<&Voice<'_>> = voices.iter().collect();
+        let found = gaps(&voices).into_iter();
+        let mut found: Vec<_> = found
+            .filter_map(|gap| pause(&voices, &Restarts::new(), gap))
+            .map(|pause| (pause.start.0 / MILLI, pause.end.0 / MILLI))
+            .collect();
+        found.dedup();
+        found
+    }
+
+    #[test]
+    fn senders_that_pause_together_show_a_pause_of_the_recorder() {
+        let fast = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
+        let slow = [stretch(0, 9_500, 500), stretch(15_400, 30_000, 500)];
+        // Too slow to show it: a message every four seconds.
+        let seldom = [stretch(0, 30_000, 4_000)];
+        let all: &[(u32, &[Stretch])] = &[(1, &fast), (2, &slow), (3, &fast), (4, &seldom)];
+        assert_eq!(told(all), [(9_990, 15_005)]);
+    }
+
+    #[test]
+    fn one_node_that_pauses_is_not_the_recorder() {
+        let on = [stretch(0, 30_000, 10)];
+        let off = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
+        assert_eq!(told(&[(1, &off), (1, &off), (1, &off)]), []);
+        assert_eq!(
+            told(&[(1, &off), (1, &off), (2, &off), (3, &on), (4, &on)]),
+            []
+        );
+    }
+}

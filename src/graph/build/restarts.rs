@@ -1,0 +1,332 @@
+//! Restarts of nodes under the same name: after a gap the numbers in the headers of a stream begin again, or latched
+//! messages come again.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+
+use super::senders::{Sender, Traffic};
+use crate::base::error::Result;
+use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
+use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
+use crate::evidence::collector::{Recorded, spool_error};
+use crate::evidence::conclude::Findings;
+use crate::evidence::numbers::Number;
+use crate::evidence::proof::{ElementKey, Proof, Reliability, Validity};
+use crate::graph::history::Stretch;
+
+/// A restart of a node: its last sign before, its first one after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Restart {
+    pub(crate) death: Stamp,
+    pub(crate) birth: Stamp,
+}
+
+/// Restarts by node, sorted by time.
+pub(crate) type Restarts = BTreeMap<Name, Vec<Restart>>;
+
+/// The most messages of a latched topic: one with more is sent again all the time.
+const LATCHED: u64 = 20;
+/// The most gaps of all nodes together around which numbers are asked for: each costs a look into two chunks.
+const MOST_ASKED: usize = 256;
+
+/// A stream of a node, and what is sent on its topic.
+struct Own<'a> {
+    topic: Name,
+    sender: &'a Sender,
+    /// The places of the streams of this sender.
+    streams: Vec<usize>,
+}
+
+/// The streams of each publisher with a reliable name.
+fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, Vec<Own<'a>>> {
+    let mut of: BTreeMap<Name, Vec<Own<'a>>> = BTreeMap::new();
+    for (topic, all) in traffic {
+        for (place, sender) in all.list.iter().enumerate() {
+            let streams = all.streams.iter().zip(&all.of);
+            let streams = streams.filter(|(_, of)| **of == place).map(|(at, _)| *at);
+            let streams: Vec<usize> = streams.collect();
+            let is_whole = |at: &usize| findings.streams[*at].trust == Reliability::Whole;
+            if let Some(node) = sender.node.filter(|_| streams.iter().all(is_whole)) {
+                of.entry(node).or_default().push(Own {
+                    topic: *topic,
+                    sender,
+                    streams,
+                });
+            }
+        }
+    }
+    of
+}
+
+/// The gaps in the messages of any of a node's streams in which no other of them went on.
+fn gaps(own: &[Own<'_>]) -> BTreeSet<(Stamp, Stamp)> {
+    let went_on = |(from, to): (Stamp, Stamp)| {
+        let middle = middle((from, to));
+        // The messages of a slow one may lie on both sides.
+        let is_fast = |s: &Stretch| s.period.saturating_mul(GAP) < to.since(from);
+        let is_in_it = |s: &Stretch| s.first < middle && middle < s.last && is_fast(s);
+        let all = own.iter().map(|own| own.sender);
+        all.flat_map(|sender| &sender.stretches).any(is_in_it)
+    };
+    let steady = own.iter().filter(|own| !own.sender.latched);
+    let pairs = steady.flat_map(|own| own.sender.stretches.windows(2));
+    let apart = pairs.filter(|pair| !pair[1].is_joined);
+    let gaps = apart.map(|pair| (pair[0].last, pair[1].first));
+    gaps.filter(|gap| !went_on(*gap)).collect()
+}
+
+fn middle((from, to): (Stamp, Stamp)) -> Stamp {
+    from.plus(to.since(from) / 2)
+}
+
+/// The last message of a stream before the middle of a gap, and the first one after it.
+fn around(times: &[Stamp], gap: (Stamp, Stamp)) -> Option<(Stamp, Stamp)> {
+    let next = times.partition_point(|time| *time <= middle(gap));
+    Some((*times.get(next.checked_sub(1)?)?, *times.get(next)?))
+}
+
+/// The messages, by stream and time, whose numbers would tell more restarts, and which were not read.
+pub(crate) fn unread(
+    recorded: &Recorded,
+    findings: &Findings,
+    traffic: &Traffic,
+) -> Result<BTreeSet<(usize, Stamp)>> {
+    let mut asked = BTreeSet::new();
+    for own in own_streams(findings, traffic).values() {
+        let is_unread = |at: &&usize| {
+            let read = recorded.numbers.get(at).map(|numbers| numbers.read);
+            read.is_some_and(|read| read < recorded.messages.count(recorded.streams[**at].times))
+        };
+        let streams = own.iter().flat_map(|own| &own.streams).filter(is_unread);
+        let unread: Vec<usize> = streams.copied().collect();
+        let gaps = if unread.is_empty() {
+            BTreeSet::new()
+        } else {
+            gaps(own)
+        };
+        if gaps.is_empty() {
+            continue;
+        }
+        for at in unread {
+            let times = recorded.messages.times(recorded.streams[at].times);
+            let times = times.map_err(spool_error)?;
+            let around = gaps.iter().filter_map(|gap| around(&times, *gap));
+            asked.extend(around.flat_map(|(from, to)| [(at, from), (at, to)]));
+            if asked.len() > 2 * MOST_ASKED {
+                return Ok(asked);
+            }
+        }
+    }
+    Ok(asked)
+}
+
+/// Finds the restarts of all nodes, but of those that several recordings show at the same time.
+pub(crate) fn restarts(
+    recorded: &Recorded,
+    findings: &Findings,
+    traffic: &Traffic,
+    doubled: &BTreeSet<Name>,
+) -> io::Result<Restarts> {
+    let mut nodes = own_streams(findings, traffic);
+    // The messages of two robots under one name lie over each other.
+    nodes.retain(|node, _| !doubled.contains(node));
+    let mut falls: BTreeMap<Name, Vec<Fall>> = BTreeMap::new();
+    for (node, own) in &nodes {
+        falls.insert(*node, falls_of(recorded, findings, *node, own)?);
+    }
+    let mut all = Restarts::new();
+    for (node, own) in &nodes {
+        let others = || falls.iter().filter(|(other, _)| *other != node);
+        let is_copy = |fall: &&Fall| others().any(|(_, of)| of.iter().any(|f| fall.is_copy_of(f)));
+        let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
+        let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
+        breaks.extend(sent_again(recorded, own)?);
+        let breaks = narrowed(breaks);
+        if breaks.is_empty() {
+            continue;
+        }
+        let streams = own.iter().flat_map(|own| &own.streams);
+        let times = streams.map(|at| recorded.messages.times(recorded.streams[*at].times));
+        let mut signs = times.collect::<io::Result<Vec<_>>>()?.concat();
+        signs.extend(said_of(*node, &findings.proofs));
+        signs.sort_unstable();
+        let gaps = breaks.iter();
+        let gaps = gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to));
+        let found: Vec<Restart> = gaps.collect();
+        if !found.is_empty() {
+            all.insert(*node, found);
+        }
+    }
+    Ok(all)
+}
+
+/// A gap after which the numbers of a stream began again.
+struct Fall {
+    from: Stamp,
+    to: Stamp,
+    /// The type of the messages, the last number before, and the header with which they begin again.
+    kind: std::sync::Arc<str>,
+    before: u32,
+    first: Number,
+}
+
+impl Fall {
+    /// Whether these are the messages of another stream, passed on with their headers: their numbers prove nothing of
+    /// the node that passes them on.
+    fn is_copy_of(&self, other: &Self) -> bool {
+        // A throttle leaves out messages, and the recorder may get the copy first.
+        let is_later = (other.before, self.to) > (self.before, other.to);
+        let is_same = self.first == other.first && self.kind == other.kind;
+        is_same && is_later && self.first.stamp != 0
+    }
+}
+
+/// The gaps after which numbers of a node's streams began again; not of streams that pass on another's messages.
+fn falls_of(
+    recorded: &Recorded,
+    findings: &Findings,
+    node: Name,
+    own: &[Own<'_>],
+) -> io::Result<Vec<Fall>> {
+    let mut falls = Vec::new();
+    let gaps = gaps(own);
+    for one in own {
+        let is_copy = findings.copies.contains(&(node, one.topic));
+        for at in one.streams.iter().filter(|_| !is_copy) {
+            let (stream, numbers) = (&recorded.streams[*at], recorded.numbers.get(at));
+            let Some(numbers) = numbers else { continue };
+            let mut breaks = BTreeSet::new();
+            if stream.connection.topic.as_str() == "/rosout" {
+                // These count all records of a process, which come without any rhythm.
+                breaks.extend(numbers.falls.iter().map(|fall| (*fall, *fall)));
+            }
+            if !gaps.is_empty() {
+                let times = recorded.messages.times(stream.times)?;
+                let known = gaps
+                    .iter()
+                    .filter_map(|gap| Some((around(&times, *gap)?, *gap)));
+                breaks.extend(known);
+            }
+            for ((last, next), gap) in breaks {
+                let numbers = numbers.at(last).zip(numbers.at(next));
+                let begun = numbers.filter(|(before, first)| first.begins_after(*before));
+                falls.extend(begun.map(|(before, first)| Fall {
+                    from: last.max(gap.0),
+                    to: next.min(gap.1),
+                    kind: stream.connection.type_name.clone(),
+                    before: before.number,
+                    first,
+                }));
+            }
+        }
+    }
+    Ok(falls)
+}
+
+/// The times of all statements about a node.
+fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
+    let of_node = proofs.iter().filter(move |proof| match proof.what {
+        ElementKey::Node(name) | ElementKey::Publish(name, _) | ElementKey::Subscribe(_, name) => {
+            name == node
+        }
+        ElementKey::Topic(_) => false,
+    });
+    of_node
+        .flat_map(|proof| match &proof.when {
+            Validity::Signs { signs, .. }
+            | Validity::Begins { signs, .. }
+            | Validity::Moments(signs) => &signs[..],
+            _ => &[],
+        })
+        .copied()
+}
+
+/// Stretches of time that end with a latched message sent again, and in which no stream with a rhythm had messages.
+fn sent_again(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<Vec<(Stamp, Stamp)>> {
+    let rhythms = || {
+        let all = own.iter().filter(|own| !own.sender.latched);
+        let stretches = all.map(|own| &own.sender.stretches[..]);
+        stretches.filter(|all| all.iter().map(|s| s.count).sum::<u64>() >= FEWEST)
+    };
+    let mut found = Vec::new();
+    if rhythms().next().is_none() {
+        return Ok(found);
+    }
+    for at in own
+        .iter()
+        .filter(|own| own.sender.latched)
+        .flat_map(|own| &own.streams)
+    {
+        let latched = recorded.streams[*at].times;
+        if !(2..=LATCHED).contains(&recorded.messages.count(latched)) {
+            continue;
+        }
+        for again in recorded.messages.times(latched)?.into_iter().skip(1) {
+            let silences: Option<Vec<Stamp>> = rhythms().map(|r| silent_since(r, again)).collect();
+            let since = silences.and_then(|s| s.into_iter().max());
+            found.extend(since.map(|since| (since, again)));
+        }
+    }
+    Ok(found)
+}
+
+/// The start of the gap at `at`; `None` if there is none.
+fn silent_since(stretches: &[Stretch], at: Stamp) -> Option<Stamp> {
+    let next = stretches.partition_point(|s| s.first < at);
+    let (before, after) = (stretches.get(next.checked_sub(1)?)?, stretches.get(next)?);
+    (!after.is_joined && before.last < at && at.since(before.last) >= GAP_NS).then_some(before.last)
+}
+
+/// Joins stretches that overlap, which show the same restart, to the part that they share.
+fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
+    breaks.sort_unstable();
+    let mut narrow: Vec<(Stamp, Stamp)> = Vec::new();
+    for (from, to) in breaks {
+        match narrow.last_mut() {
+            Some(last) if from < last.1 => *last = (last.0.max(from), last.1.min(to)),
+            _ => narrow.push((from, to)),
+        }
+    }
+    narrow
+}
+
+/// The longest time between two signs inside a stretch, during which the node was away.
+fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<Restart> {
+    let inside = &signs[signs.partition_point(|t| *t < from)..signs.partition_point(|t| *t <= to)];
+    let gaps = inside.windows(2).map(|pair| (pair[1].since(pair[0]), pair));
+    let (gap, pair) = gaps.max_by_key(|(gap, pair)| (*gap, std::cmp::Reverse(pair[0])))?;
+    (gap >= GAP_NS).then(|| Restart {
+        death: pair[0],
+        birth: pair[1],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stamps(times: &[i64]) -> Vec<Stamp> {
+        times.iter().map(|t| Stamp(t * 1_000_000_000)).collect()
+    }
+
+    #[test]
+    fn the_node_was_away_in_the_widest_gap() {
+        let signs = stamps(&[1, 2, 3, 20, 21, 22]);
+        let found = widest_gap(&signs, signs[1], signs[4]).unwrap();
+        assert_eq!((found.death, found.birth), (signs[2], signs[3]));
+    }
+
+    #[test]
+    fn a_node_that_is_always_heard_was_not_away() {
+        let signs: Vec<Stamp> = (0..100).map(|n| Stamp(n * 90_000_000)).collect();
+        assert_eq!(widest_gap(&signs, signs[1], signs[90]), None);
+    }
+
+    #[test]
+    fn what_two_streams_tell_of_one_restart_is_narrowed() {
+        let [a, b, c, d] = [1, 2, 3, 4].map(Stamp);
+        assert_eq!(narrowed(vec![(b, d), (a, c)]), [(b, c)]);
+        assert_eq!(narrowed(vec![(a, b), (c, d)]), [(a, b), (c, d)]);
+    }
+}

@@ -1,0 +1,69 @@
+//! Definitions of message types in folders of `.msg` files.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::base::error::{Error, Result};
+use crate::base::{budget, file};
+use crate::evidence::message::fields::KnownTypes;
+
+/// The most files and folders below a folder of definitions: ten times a whole installation of ROS.
+const MOST_FILES: usize = 1 << 16;
+
+/// The types of `.msg` files in folders.
+///
+/// # Errors
+/// Where a folder or a file cannot be read, or is no definition.
+pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
+    let mut types = KnownTypes::default();
+    for folder in folders {
+        let files = msg_files(folder)?;
+        for (name, path) in &files {
+            let text = file::read_text(path, budget::USER_TEXT)?;
+            types.add(name, &text).map_err(|reason| Error::BadFile {
+                path: path.clone(),
+                line: 0,
+                reason,
+                hint: "write one field a line, as ROS does".to_owned(),
+            })?;
+        }
+        if files.is_empty() {
+            return Err(Error::usage(
+                format!("`{}` holds no `.msg` file", folder.display()),
+                "name the folder of a package or of several: `my_msgs/msg/Thing.msg`",
+            ));
+        }
+    }
+    Ok(types)
+}
+
+/// The `.msg` files below a folder by the names of their types, sorted: `my_msgs/msg/Thing.msg` is `my_msgs/Thing`.
+fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
+    let whole = folder.canonicalize().map_err(Error::io("read", folder))?;
+    let (mut waiting, mut found) = (vec![whole], Vec::new());
+    while let Some(folder) = waiting.pop() {
+        let entries = fs::read_dir(&folder).map_err(Error::io("read", &folder))?;
+        for entry in entries {
+            let entry = entry.map_err(Error::io("read", &folder))?;
+            let (path, kind) = (entry.path(), entry.file_type());
+            if kind.is_ok_and(|kind| kind.is_dir()) {
+                waiting.push(path);
+            } else if path.extension().is_some_and(|end| end == "msg") {
+                let outer = folder.parent().filter(|_| folder.ends_with("msg"));
+                let name = |path: Option<&OsStr>| path.map(|n| n.to_string_lossy().into_owned());
+                let package = name(outer.unwrap_or(&folder).file_name()).unwrap_or_default();
+                let own = name(path.file_stem()).unwrap_or_default();
+                found.push((format!("{package}/{own}"), path));
+            }
+        }
+        if waiting.len() + found.len() > MOST_FILES {
+            return Err(Error::usage(
+                format!("`{}` holds more than {MOST_FILES} files", folder.display()),
+                "name the folder of your message packages",
+            ));
+        }
+    }
+    found.sort();
+    Ok(found)
+}

@@ -1,0 +1,124 @@
+//! The bags of a mission: each of them once.
+
+use std::collections::BTreeSet;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::path::PathBuf;
+
+use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Sink, Want};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
+
+/// Every input once, with a notice for those named twice, which would count twice.
+pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
+    let mut seen = BTreeSet::new();
+    let (mut once, mut twice) = (Vec::new(), Vec::new());
+    for input in inputs {
+        let real = match input {
+            Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Input::Url(url) => PathBuf::from(url),
+            Input::Stdin => PathBuf::from("-"),
+        };
+        if seen.insert(real) {
+            once.push(input.clone());
+        } else if input.is_pipe() {
+            let what = format!(
+                "{} was given twice, but can be read only once",
+                input.name()
+            );
+            return Err(Error::usage(what, "name it once"));
+        } else {
+            let text = format!("`{}` was given twice and read once", input.name());
+            twice.push(Notice::new(NoticeKind::Note, text));
+        }
+    }
+    refuse_copies(&once)?;
+    Ok((once, twice))
+}
+
+/// The time that all bags cover; `None` unless every one of them tells its own without being read.
+pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
+    let mut all: Option<Span> = None;
+    for reader in readers {
+        let Some(span) = reader.span()? else {
+            return Ok(None);
+        };
+        all = Some(all.map_or(span, |a| Span {
+            start: a.start.min(span.start),
+            end: a.end.max(span.end),
+        }));
+    }
+    Ok(all)
+}
+
+/// Refuses bags that hold the same messages, which would count twice: copies, and conversions to another format. Bags
+/// that can be read only once, or are far away, are not looked into.
+fn refuse_copies(inputs: &[Input]) -> Result<()> {
+    let near = inputs
+        .iter()
+        .filter(|i| matches!(i, Input::Path(_)) && !i.is_pipe());
+    let near: Vec<&Input> = near.collect();
+    // What cannot be opened is told when it is read.
+    let open = |input: &Input| bag::open(input, &OpenOptions::default()).ok();
+    // Copies have the same ends; where these are not known, the same size.
+    let ends = |input: &&Input| {
+        let span = open(input).and_then(|mut bag| bag.span().ok().flatten());
+        let size = if span.is_none() {
+            bag::size_on_disk(input)
+        } else {
+            None
+        };
+        (span, size)
+    };
+    let ends: Vec<(Option<Span>, Option<u64>)> = match near.len() {
+        0 | 1 => Vec::new(),
+        _ => near.iter().map(ends).collect(),
+    };
+    let contents = |at: usize| {
+        let mut contents = Contents::default();
+        open(near[at])?.read(None, &mut contents).ok()?;
+        Some((contents.messages, contents.sum)).filter(|(messages, _)| *messages > 0)
+    };
+    for at in 1..ends.len() {
+        let alike = (0..at).filter(|before| ends[*before] == ends[at]);
+        for before in alike {
+            if contents(at).is_some_and(|own| Some(own) == contents(before)) {
+                let (own, other) = (near[at].name(), near[before].name());
+                let what =
+                    format!("`{own}` holds the same messages as `{other}`: they would count twice");
+                return Err(Error::usage(what, "name one of them"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The number of messages in a bag, and a sum over their topics and times that does not depend on their order.
+#[derive(Default)]
+struct Contents {
+    messages: u64,
+    sum: u64,
+    /// The topic of each connection.
+    topics: Vec<String>,
+}
+
+impl Sink for Contents {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.topics.push(connection.topic.to_string());
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        let topic = self.topics.get(connection.0 as usize);
+        self.messages += stamps.len() as u64;
+        for stamp in stamps {
+            let mut hasher = DefaultHasher::new();
+            (topic, stamp.0).hash(&mut hasher);
+            self.sum = self.sum.wrapping_add(hasher.finish());
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+}

@@ -1,0 +1,87 @@
+//! Looks into single messages that the first reading passed over: into the numbers in their headers, before and after
+//! gaps.
+
+use std::collections::BTreeSet;
+
+use super::Reading;
+use super::collect::Collected;
+use super::inputs::each_once;
+use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
+use crate::base::error::Result;
+use crate::base::notice::Notice;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::numbers::{self, Number};
+
+/// The longest time between two messages that are read at once, in nanoseconds: they lie in one chunk.
+const AT_ONCE_NS: i64 = 100_000_000;
+
+/// Reads the numbers of these messages, named by stream and time. Not of bags that can be read only once, or that are
+/// far away, where each costs several requests.
+pub(super) fn probe(
+    reading: &Reading,
+    collected: &mut Collected,
+    messages: &BTreeSet<(usize, Stamp)>,
+) -> Result<()> {
+    if messages.is_empty() {
+        return Ok(());
+    }
+    let (inputs, _) = each_once(&reading.inputs)?;
+    for (bag, input) in inputs.iter().enumerate() {
+        let streams = &collected.recorded.streams;
+        let of_bag = messages.iter().filter(|(at, _)| streams[*at].bag == bag);
+        let mut wanted: Vec<(Stamp, usize, ConnectionId)> = of_bag
+            .map(|(at, time)| (*time, *at, streams[*at].connection.id))
+            .collect();
+        if wanted.is_empty() || input.is_pipe() || matches!(input, Input::Url(_)) {
+            continue;
+        }
+        wanted.sort_unstable();
+        let mut reader = bag::open(input, &OpenOptions::default())?;
+        for wanted in wanted.chunk_by(|a, b| b.0.since(a.0) <= AT_ONCE_NS) {
+            let mut sink = Probe {
+                wanted,
+                found: Vec::new(),
+            };
+            let span = Span {
+                start: wanted[0].0,
+                end: wanted[wanted.len() - 1].0.plus(1),
+            };
+            reader.read(Some(span), &mut sink)?;
+            for (at, time, number) in sink.found {
+                let numbers = collected.recorded.numbers.entry(at).or_default();
+                numbers.keep(time, number);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A sink for the numbers of a few messages.
+struct Probe<'a> {
+    wanted: &'a [(Stamp, usize, ConnectionId)],
+    found: Vec<(usize, Stamp, Number)>,
+}
+
+impl Sink for Probe<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        if self.wanted.iter().any(|(.., id)| *id == connection.id) {
+            Want::Head(numbers::HEAD)
+        } else {
+            Want::Stamps
+        }
+    }
+
+    fn stamps(&mut self, _: ConnectionId, _: &[Stamp], _: Option<&[u32]>) {}
+
+    fn message(&mut self, message: Message<'_>) {
+        let is_it = |(time, _, id): &&(Stamp, usize, ConnectionId)| {
+            (*time, *id) == (message.time, message.connection)
+        };
+        if let Some((time, at, _)) = self.wanted.iter().find(is_it) {
+            let number = Number::of(message.data);
+            self.found.extend(number.map(|number| (*at, *time, number)));
+        }
+    }
+
+    fn notice(&mut self, _: Notice) {}
+}

@@ -1,0 +1,160 @@
+//! The choices of bundles: the topics that draw no line, the names of the others, and the nodes that stand in words.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::group::Groups;
+use super::names::is_plumbing;
+use super::select::Selection;
+use super::{AlsoHere, Item, Namespace, Showing, ViewOptions};
+use crate::graph::{Elements, NodeId, Topic};
+use crate::mission::Mission;
+use crate::mission::ledger::{Entry, Kind};
+
+/// The name of each topic in a bundle: that of its group, if it is in one.
+pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
+    let mut names: Vec<Arc<str>> = elements.topics.iter().map(|t| t.name.shared()).collect();
+    for (name, ids) in groups {
+        let name: Arc<str> = name.as_str().into();
+        for id in ids {
+            names[*id as usize] = Arc::clone(&name);
+        }
+    }
+    names
+}
+
+/// Whether bundles draw each topic: not one of the plumbing that half the system is connected to, unless a connection of
+/// its own changes, or nothing else is there.
+pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
+    let elements = &mission.elements;
+    let plain = |topic: &Topic| !options.hide.quiet || !is_plumbing(topic.name.as_str());
+    let mut drawn: Vec<bool> = elements.topics.iter().map(plain).collect();
+    let mut connected = vec![0_u8; drawn.len()];
+    let both = [(&elements.publishes, 1), (&elements.subscribes, 2)];
+    for (edges, end) in both {
+        for edge in edges {
+            connected[edge.topic as usize] |= end;
+        }
+    }
+    if !drawn
+        .iter()
+        .zip(&connected)
+        .any(|(drawn, ends)| *drawn && *ends == 3)
+    {
+        return vec![true; drawn.len()];
+    }
+    let entries = mission.ledger.entries.iter();
+    for entry in entries.filter(|entry| entry.is_headline()) {
+        if let (Some(_), Some(topic)) = elements.ends(entry.what) {
+            drawn[topic as usize] = true;
+        }
+    }
+    drawn
+}
+
+/// Whether each node has no line to another, or, if leaves stand in words, only one, where neither end of it changes;
+/// none where fewer than half of the nodes have a line.
+pub(crate) fn nodes_in_words(
+    mission: &Mission,
+    (selection, drawn): (&Selection, &[bool]),
+    are_leaves_in_words: bool,
+) -> Vec<bool> {
+    let elements = &mission.elements;
+    let mut ends = vec![[Vec::new(), Vec::new()]; elements.topics.len()];
+    for (edges, end) in [(&elements.publishes, 0), (&elements.subscribes, 1)] {
+        for edge in edges {
+            if selection.nodes[edge.node as usize].is_none() {
+                ends[edge.topic as usize][end].push(edge.node);
+            }
+        }
+    }
+    let (changes, changes_itself) = changing_nodes(mission, drawn, &ends);
+    let is_drawn = drawn.iter().zip(&selection.topics);
+    let is_drawn = is_drawn.map(|(drawn, reason)| *drawn && reason.is_none());
+    // The only partner of each node; itself where there are several.
+    let mut partner: Vec<Option<NodeId>> = vec![None; elements.nodes.len()];
+    for (ends, _) in ends.iter().zip(is_drawn).filter(|(_, drawn)| *drawn) {
+        for (these, others) in [(&ends[0], &ends[1]), (&ends[1], &ends[0])] {
+            for node in these {
+                // Two others are enough to know that there are several.
+                for other in others.iter().filter(|other| *other != node).take(2) {
+                    let partner = &mut partner[*node as usize];
+                    *partner = Some(if partner.is_none_or(|old| old == *other) {
+                        *other
+                    } else {
+                        *node
+                    });
+                }
+            }
+        }
+    }
+    let seen = selection
+        .nodes
+        .iter()
+        .filter(|reason| reason.is_none())
+        .count();
+    if 2 * partner.iter().flatten().count() < seen {
+        return vec![false; partner.len()];
+    }
+    let is_hub = |node: NodeId| partner[node as usize] == Some(node);
+    let is_in_words = |(node, changes): (NodeId, &bool)| match partner[node as usize] {
+        None => true,
+        Some(other) if other != node && are_leaves_in_words => {
+            is_hub(other) && !changes && !changes_itself[other as usize]
+        }
+        Some(_) => false,
+    };
+    (0..).zip(&changes).map(is_in_words).collect()
+}
+
+/// Whether anything is told of each node, of itself, its connections, or a topic of its own, and whether of itself or
+/// its connections. That it starts in the first
+/// window is no change: it was there before most of the picture.
+fn changing_nodes(
+    mission: &Mission,
+    drawn: &[bool],
+    ends: &[[Vec<NodeId>; 2]],
+) -> (Vec<bool>, Vec<bool>) {
+    let mut changes = vec![false; mission.elements.nodes.len()];
+    let mut changes_itself = changes.clone();
+    let entries = mission.ledger.entries.iter();
+    let first = mission.windows.first().map(|window| window.span.end);
+    let is_first = |e: &Entry| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
+    for entry in entries.filter(|entry| entry.is_headline() && !is_first(entry)) {
+        let nodes = match mission.elements.ends(entry.what) {
+            (Some(node), _) => {
+                changes_itself[node as usize] = true;
+                vec![node]
+            }
+            (None, Some(topic)) if drawn[topic as usize] => ends[topic as usize].concat(),
+            (None, _) => Vec::new(),
+        };
+        for node in nodes {
+            changes[node as usize] = true;
+        }
+    }
+    (changes, changes_itself)
+}
+
+/// These nodes with their looks, by the innermost namespace with a box.
+pub(super) fn also_here(
+    items: Vec<Item>,
+    shown: Vec<Showing>,
+    namespaces: &[Namespace],
+) -> Vec<AlsoHere> {
+    let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();
+    let shown = shown.into_iter().map(Some).chain(std::iter::repeat(None));
+    for (item, shown) in items.into_iter().zip(shown) {
+        let is_around = |space: &Namespace| {
+            let rest = item.name.strip_prefix(&*space.name);
+            rest.is_some_and(|rest| rest.starts_with('/'))
+        };
+        // Children stand behind their parents.
+        let cluster = namespaces.iter().rposition(is_around);
+        let also = also.entry(cluster).or_default();
+        also.cluster = cluster;
+        also.items.push(item);
+        also.shown.extend(shown);
+    }
+    also.into_values().collect()
+}

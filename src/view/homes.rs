@@ -1,0 +1,112 @@
+//! The boxes that topics stand in: that of their group, or the collapsed namespace that they are part of.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::ItemKind;
+use super::collapse::{Collapse, swallows};
+use super::group::Groups;
+use super::select::Selection;
+use crate::graph::{Edge, Elements, Topic};
+
+/// The kind and name of a box.
+pub(crate) type ItemKey = (ItemKind, Arc<str>);
+
+/// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their name.
+/// Topics that several boxes publish are reported by the arrows alone, so they are in none.
+pub(crate) fn inside(
+    elements: &Elements,
+    collapse: &Collapse<'_>,
+    nodes: &[Option<ItemKey>],
+    selection: &Selection,
+) -> Vec<Option<ItemKey>> {
+    let mut homes: Vec<BTreeSet<Option<&ItemKey>>> = vec![BTreeSet::new(); elements.topics.len()];
+    for edge in &elements.publishes {
+        let node = nodes.get(edge.node as usize).and_then(Option::as_ref);
+        if let (Some(homes), Some(node)) = (homes.get_mut(edge.topic as usize), node) {
+            homes.insert((node.0 == ItemKind::Namespace).then_some(node));
+        }
+    }
+    let topics = elements.topics.iter().zip(&homes).zip(&selection.topics);
+    let home = |((topic, homes), hidden): ((&Topic, &BTreeSet<Option<&ItemKey>>), &Option<_>)| {
+        let mut homes = homes.iter();
+        match (hidden, homes.next(), homes.next()) {
+            (None, Some(home), None) => home.cloned(),
+            (None, None, _) => {
+                let space = collapse.of(topic.name.as_str())?;
+                Some((ItemKind::Namespace, space.into()))
+            }
+            _ => None,
+        }
+    };
+    topics.map(home).collect()
+}
+
+/// Puts the topics of each group into its box, whose name is made unlike that of every topic.
+pub(crate) fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
+    for ids in groups.values() {
+        for id in ids {
+            topics[*id as usize] = None;
+        }
+    }
+    let mut taken: BTreeSet<Arc<str>> = topics
+        .iter()
+        .flatten()
+        .map(|key| Arc::clone(&key.1))
+        .collect();
+    for (name, ids) in groups {
+        let mut name = name.clone();
+        while taken.contains(name.as_str()) {
+            name.push_str("_2");
+        }
+        let name: Arc<str> = name.into();
+        taken.insert(Arc::clone(&name));
+        for id in ids {
+            topics[*id as usize] = Some((ItemKind::Group, Arc::clone(&name)));
+        }
+    }
+}
+
+/// Moves topics and groups that belong inside a collapsed namespace into it.
+pub(crate) fn swallow(
+    elements: &Elements,
+    (collapse, names): (&Collapse<'_>, &[Arc<str>]),
+    nodes: &[Option<ItemKey>],
+    topics: &mut [Option<ItemKey>],
+) {
+    type Spaces<'a> = Vec<Option<&'a str>>;
+    let mut ends: BTreeMap<ItemKey, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
+    for key in topics.iter().flatten() {
+        ends.entry(key.clone()).or_default();
+    }
+    let space = |edge: &Edge| {
+        let node = edge.node as usize;
+        nodes.get(node)?.as_ref()?;
+        Some(names.get(node).and_then(|name| collapse.of(name)))
+    };
+    let publishes = elements.publishes.iter().map(|e| (e, true));
+    let subscribes = elements.subscribes.iter().map(|e| (e, false));
+    for (edge, publishes) in publishes.chain(subscribes) {
+        let key = topics.get(edge.topic as usize).and_then(Option::as_ref);
+        let lists = key.and_then(|key| ends.get_mut(key));
+        if let (Some((p, s)), Some(space)) = (lists, space(edge)) {
+            if publishes {
+                p.push(space);
+            } else {
+                s.push(space);
+            }
+        }
+    }
+    let inside: BTreeMap<ItemKey, Arc<str>> = ends
+        .into_iter()
+        .filter_map(|(key, (p, s))| {
+            let space = swallows(collapse.of(&key.1), &p, &s)?;
+            (!collapse.keeps(&key.1)).then(|| (key, space.into()))
+        })
+        .collect();
+    for topic in topics.iter_mut().flatten() {
+        if let Some(space) = inside.get(topic) {
+            *topic = (ItemKind::Namespace, Arc::clone(space));
+        }
+    }
+}

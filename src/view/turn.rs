@@ -1,0 +1,185 @@
+//! A window in which something changes: the marks of its items and arrows.
+
+use super::items::Viewed;
+use super::marks::{News, Told};
+use super::state::{LivingItems, Now};
+use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
+use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
+
+/// The items and arrows there before and after a window, and the news in between.
+#[derive(Default)]
+pub(super) struct WindowTurn {
+    pub(super) before: LivingItems,
+    pub(super) after: LivingItems,
+    pub(super) news: News,
+}
+
+/// An item in a window with headlines.
+pub(super) struct Marked {
+    /// Whether anything of it lives.
+    is_there: bool,
+    pub(super) marked: Option<Shown>,
+}
+
+impl WindowTurn {
+    pub(super) fn items(&self, viewed: &Viewed, now: &Now<'_>) -> Vec<Marked> {
+        let ids = (0..).zip(&viewed.items);
+        let item = |(id, item): (u32, &super::Item)| {
+            let shown = now.item(id);
+            let at = id as usize;
+            let there = (self.before.items[at], self.after.items[at]);
+            Marked {
+                is_there: shown.is_some(),
+                marked: shown.and_then(|shown| {
+                    let mut shown = marked(shown, there, self.news.items.get(&id))?;
+                    let is_folded = item.kind == ItemKind::Namespace;
+                    shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
+                    Some(shown)
+                }),
+            }
+        };
+        ids.map(item).collect()
+    }
+
+    /// An arrow comes and goes with its ends, if nothing is reported of itself.
+    pub(super) fn arrows(
+        &self,
+        viewed: &Viewed,
+        now: &Now<'_>,
+        items: &[Marked],
+    ) -> Vec<Option<Shown>> {
+        let arrow = |(id, arrow): (u32, &super::Arrow)| {
+            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end as usize));
+            let (from, to) = (from?, to?);
+            let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
+            let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
+            let at = id as usize;
+            // A node that restarts keeps its arrows, though it is away when the window ends.
+            let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
+            let is_kept = ends.iter().any(is_back);
+            let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
+            let told = self.news.arrows.get(&id).cloned();
+            let ends = ends.map(|end| Some((end.mark, &end.entries[..])));
+            let told = told.or_else(|| with_ends(there, ends));
+            let shown = marked(shown, there, told.as_ref())?;
+            if arrow.kind != ArrowKind::Bundle {
+                return Some(shown);
+            }
+            let inside = self.inside(&shown);
+            Some(Shown {
+                inside,
+                ..self.with_topics(viewed, now, arrow, shown)
+            })
+        };
+        (0..).zip(&viewed.arrows).map(arrow).collect()
+    }
+
+    /// A changed bundle with the changes of its topics, unless it came or went as a whole.
+    fn with_topics(
+        &self,
+        viewed: &Viewed,
+        now: &Now<'_>,
+        arrow: &super::Arrow,
+        mut shown: Shown,
+    ) -> Shown {
+        if shown.mark.is_none_or(|mark| mark.class() != "changed") {
+            return shown;
+        }
+        let lives = |items: &LivingItems, row: &TopicRow| {
+            let all = items.topics.get(shown.id as usize);
+            all.and_then(|all| all.get(row.topic as usize)) == Some(&true)
+        };
+        for row in &mut shown.topics {
+            let there = (lives(&self.before, row), lives(&self.after, row));
+            match there {
+                (false, true) => row.mark = Some(Mark::Added),
+                (true, false) => row.mark = Some(Mark::Removed),
+                _ => {
+                    let name = &arrow.topics[row.topic as usize];
+                    for entry in shown.entries.iter().filter_map(|id| now.entry(*id)) {
+                        let topic = viewed.topic_of(entry.what);
+                        if topic.is_some_and(|topic| viewed.bundled[topic as usize] == *name) {
+                            (row.mark, row.rates) = changed(entry);
+                        }
+                    }
+                }
+            }
+        }
+        shown
+    }
+
+    /// The number of headlines reported on a folded namespace or a bundle; `None` without any.
+    fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
+        let told = self.news.headlines.iter();
+        let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));
+        (counts.total() > 0).then(|| Box::new(counts))
+    }
+}
+
+/// The mark of a topic of a bundle for an event, with its rates before and after.
+fn changed(entry: &Entry) -> (Option<Mark>, Option<(f64, f64)>) {
+    match (entry.kind, &entry.detail) {
+        (_, Detail::Rates { from_hz, to_hz }) => {
+            let mark = if to_hz > from_hz {
+                Mark::Faster
+            } else {
+                Mark::Slower
+            };
+            (Some(mark), Some((*from_hz, *to_hz)))
+        }
+        (Kind::HandedOver, _) => (Some(Mark::HandedOver), None),
+        (Kind::Silent, _) => (Some(Mark::Paused), None),
+        _ => (Some(Mark::Changed), None),
+    }
+}
+
+/// The news of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
+/// before and is there after.
+pub(super) fn with_ends(
+    there: (bool, bool),
+    ends: [Option<(Option<Mark>, &[EntryId])>; 2],
+) -> Option<Told> {
+    let marks: &[Mark] = match there {
+        (false, true) => &[Mark::Added],
+        (_, false) => &[Mark::Removed],
+        // Lines stay, dotted, while one of their ends is away.
+        (true, true) => &[Mark::Removed, Mark::Away],
+    };
+    let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
+    let mut ends = ends.into_iter().flatten();
+    let (mark, entries) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
+    Some(Told {
+        came: mark == Mark::Added,
+        went: mark == Mark::Removed,
+        mark: Some(mark).filter(|_| there == (true, true)),
+        entries: entries.to_vec(),
+        ..Told::default()
+    })
+}
+
+/// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
+/// entry.
+pub(super) fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
+    let Some(told) = told else {
+        return there.1.then_some(shown);
+    };
+    let mark = match there {
+        (false, true) if told.came => Some(Mark::Added),
+        (_, false) if told.went => Some(Mark::Removed),
+        // It ended and began within one window.
+        (true, true) if told.came && told.went => told.mark.or(Some(Mark::Restarted)),
+        // One of several that are drawn as one.
+        (true, true) if told.came || told.went => told.mark.or(Some(Mark::Inside)),
+        _ => told.mark,
+    };
+    let is_gone = mark == Some(Mark::Removed);
+    Some(Shown {
+        mark,
+        hz: if is_gone { Some(0.0) } else { shown.hz },
+        rates: told
+            .rates
+            .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
+        entries: told.entries.clone(),
+        ..shown
+    })
+}

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""What is wrong in pictures of a mission, measured on their SVG. Run by hand:
+
+    tests/bench/pictures.py BAGREEL BAG... [-- OPTION...]
+
+Prints per bag, over all frames: boxes and lines per frame; lines with a twin between the same two boxes; new lines without a
+name; labels with a line of others under them; changes that are folded away; the smallest text in pixels; the part of the
+graph's page that boxes fill.
+"""
+
+import collections
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+
+SVG = "{http://www.w3.org/2000/svg}"
+# The width of a letter as a share of its size.
+LETTER = 0.55
+
+
+def points(path):
+    """Points along a path, close enough to each other to find what it runs under."""
+    found, here = [], (0.0, 0.0)
+    for letter, rest in re.findall(r"([MLCZ])([^MLCZ]*)", path):
+        numbers = [float(n) for n in re.findall(r"-?[\d.]+", rest)]
+        pairs = list(zip(numbers[::2], numbers[1::2]))
+        if letter == "C":
+            for k in range(0, len(pairs) - 2, 3):
+                a, b, c = pairs[k : k + 3]
+                for step in range(1, 17):
+                    t = step / 16
+                    u = 1 - t
+                    found.append(tuple(
+                        u**3 * here[d] + 3 * u * u * t * a[d] + 3 * u * t * t * b[d] + t**3 * c[d] for d in (0, 1)
+                    ))
+                here = c
+        elif letter == "L":
+            for end in pairs:
+                found += [tuple(here[d] + (end[d] - here[d]) * k / 16 for d in (0, 1)) for k in range(1, 17)]
+                here = end
+        elif pairs:
+            here = pairs[-1]
+            found.append(here)
+    return found
+
+
+def box(text):
+    """The rectangle of a text: left, top, right, bottom."""
+    size, x, y = (float(text.get(key, 0)) for key in ("font-size", "x", "y"))
+    wide = len("".join(text.itertext())) * size * LETTER
+    left = x - {"middle": wide / 2, "end": wide}.get(text.get("text-anchor"), 0)
+    return left, y - size * 0.75, left + wide, y + size * 0.1
+
+
+def shape(group):
+    """The rectangle of the box of a node or topic."""
+    for form in group:
+        numbers = {key: float(value) for key, value in form.attrib.items() if re.fullmatch(r"-?[\d.]+", value)}
+        if form.tag == SVG + "rect":
+            return numbers["width"] * numbers["height"]
+        if form.tag == SVG + "ellipse":
+            return numbers["rx"] * numbers["ry"] * 3.14
+    return 0.0
+
+
+def frame(root, sums):
+    """Adds what is found in one frame."""
+    lines, labels, filled = {}, [], 0.0
+    smallest = 1e9
+    for group in root.iter(SVG + "g"):
+        words = group.get("class", "").split()
+        kind = words[0] if words else ""
+        texts = [text for text in group if text.tag == SVG + "text"]
+        for text in texts:
+            smallest = min(smallest, float(text.get("font-size")))
+        if kind == "edge":
+            name = group.get("id").split("..over")[0]
+            ends = group.get("data-from"), group.get("data-to")
+            line = lines.setdefault(name, {"ends": ends, "points": [], "words": words, "label": False})
+            line["label"] |= any(re.search("[a-z]{2}", "".join(t.itertext()).replace("Hz", "")) for t in texts)
+            labels += [(name, box(text)) for text in texts]
+            for path in group.iter(SVG + "path"):
+                line["points"] += points(path.get("d"))
+        elif kind in ("node", "topic"):
+            sums["boxes"] += 1
+            filled += shape(group)
+            sums["folded"] += group.get("data-mark") == "inside"
+    pairs = collections.Counter(frozenset(line["ends"]) for line in lines.values())
+    sums["lines"] += len(lines)
+    sums["twins"] += sum(pairs[frozenset(line["ends"])] > 1 for line in lines.values())
+    new = [line for line in lines.values() if "added" in line["words"] and {"direct", "bundle"} & set(line["words"])]
+    sums["new"] += len(new)
+    sums["nameless"] += sum(not line["label"] for line in new)
+    sums["labels"] += len(labels)
+    for own, (left, top, right, bottom) in labels:
+        sums["covered"] += any(
+            left < x < right and top < y < bottom
+            for name, line in lines.items()
+            if name != own
+            for x, y in line["points"]
+        )
+    wide, high = (float(n) for n in root.get("viewBox").split()[2:])
+    sums["filled"] += filled / (wide * high)
+    return smallest
+
+
+def main():
+    args = sys.argv[1:]
+    options = args[args.index("--") + 1 :] if "--" in args else []
+    bagreel, *bags = args[: args.index("--")] if "--" in args else args
+    print("| bag | frames | boxes | lines | twins | new without a name | labels over lines | folded | smallest text | filled |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for bag in bags:
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([bagreel, "render", "-q", bag, *options, "-o", folder + "/x{n}.svg"], check=True)
+            files = sorted(pathlib.Path(folder).iterdir())
+            sums = collections.Counter()
+            smallest = min(frame(ET.parse(file).getroot(), sums) for file in files)
+        many = len(files)
+        share = f"{100 * sums['covered'] / max(sums['labels'], 1):.0f} %"
+        print(
+            f"| {pathlib.Path(bag).name} | {many} | {sums['boxes'] / many:.0f} | {sums['lines'] / many:.0f} | {sums['twins']} "
+            f"| {sums['nameless']} of {sums['new']} | {share} | {sums['folded']} | {smallest:.1f} px "
+            f"| {100 * sums['filled'] / many:.0f} % |"
+        )
+
+
+if __name__ == "__main__":
+    main()

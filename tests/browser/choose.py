@@ -1,0 +1,165 @@
+"""What a reader chooses in the page: a range of the timeline, namespaces, a plot, what is searched, what is embedded or printed."""
+
+import base64
+import time
+
+from webdriver import Browser
+
+ESC = "\ue00c"
+ENTER = "\ue007"
+
+
+def drag(b, start, end):
+    """A mouse that goes from one place of the life lines to another; both are shares of the time."""
+    x, y, w = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")
+    move = lambda share: {"type": "pointerMove", "duration": 20, "x": round(x + share * w), "y": round(y)}
+    steps = [move(start), {"type": "pointerDown", "button": 0}, *(move(start + (end - start) * k / 8) for k in range(1, 9)), {"type": "pointerUp", "button": 0}]
+    b.call("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": steps}]})
+    time.sleep(0.3)
+
+
+def there(window):
+    return {e["name"] for kind in ("nodes", "topics") for e in window[kind]}
+
+
+def ranges(b, url, evolution):
+    windows = evolution["windows"]
+    b.open("about:blank")
+    b.open(url + "#t=0")
+    drag(b, 10.5 / 50, 20.5 / 50)
+    where = b.js("return document.getElementById('where').textContent")
+    assert where.startswith("windows 11 to 21 of 50"), where
+    drawn = set(b.js("return [...document.querySelectorAll('#graph .items > g:not(.off)')].map(g => g.dataset.name)"))
+    wanted = set().union(*(there(w) for w in windows[10:21]))
+    # What ended as the range began was there no longer than a moment.
+    assert wanted <= drawn <= wanted | there(windows[9]), (wanted - drawn, drawn - wanted)
+    link = b.js("return location.hash")
+    assert "t=100" in link and "e=210" in link, link
+    b.keys(ESC)
+    assert "windows" not in b.js("return document.getElementById('where').textContent")
+    b.open("about:blank")
+    b.open(url + link)
+    assert b.js("return document.getElementById('where').textContent") == where, "a link keeps the range"
+    b.keys(ESC, "r")
+    for _ in range(3):
+        b.keys("\ue014")
+    assert b.js("return document.getElementById('where').textContent").split(" ")[3] == str(11 + 3)
+    b.keys("r")
+    print("  a drag, keys and a link choose a range, and its graph is what was there")
+
+
+def search(b):
+    def hits(text):
+        b.js("const q = document.getElementById('q'); q.value = arguments[0]; q.dispatchEvent(new Event('input'))", text)
+        return b.js("return [...document.querySelectorAll('#hits button')].map(b => b.title)")
+    assert hits("lidar")[0] == "/sensors/lidar", hits("lidar")
+    assert hits("planer")[0] == "/nav/planner", hits("planer")
+    assert hits("ctrllr")[0].startswith("/nav/controller"), hits("ctrllr")
+    assert not hits("zzzzzz")
+    hits("")
+    print("  search puts an exact last part first, and forgives letters")
+
+
+def panel(b):
+    count = "return [...document.querySelectorAll('#graph .items > g:not(.off)')].filter(g => getComputedStyle(g).visibility == 'visible' && g.dataset.name.startsWith('/nav/')).length"
+    assert b.js(count) > 0
+    b.js("document.querySelector('#spaces').open = true; [...document.querySelectorAll('#spacelist label')].find(l => l.textContent.includes('/nav ')).querySelector('input').click()")
+    assert b.js(count) == 0, "a namespace is left out"
+    b.js("document.querySelector('#spacelist input:not(:checked)').click()")
+    assert b.js(count) > 0
+    b.js("document.querySelector('#graph .topic:not(.off) rect').dispatchEvent(new MouseEvent('click', {bubbles: true}))")
+    b.js("document.activeElement.blur()")
+    b.keys("g")
+    line = b.js("return [document.getElementById('big').hidden, document.querySelectorAll('#bigplot .line').length, document.getElementById('bigplot').getBoundingClientRect().width]")
+    assert line[0] is False and line[1] == 1 and line[2] > 600, line
+    b.keys(ESC)
+    assert b.js("return document.getElementById('big').hidden")
+    print("  namespaces are left out, and a rate is plotted large")
+
+
+COVERED = """const mini = document.getElementById('mini'), m = mini.getBoundingClientRect();
+return [mini.hasAttribute('hidden') || mini.classList.contains('faint'), [...document.querySelectorAll('#graph .items > .near')].some(g => {
+    const r = g.getBoundingClientRect();
+    return r.width && r.left < m.right && r.right > m.left && r.top < m.bottom && r.bottom > m.top;
+})]"""
+
+
+def minimap(b):
+    names = b.js("return [...document.querySelectorAll('#graph .items > g:not(.off)')].map(g => g.dataset.name)")
+    for name in names:
+        b.js("location.hash = '#t=0&sel=' + arguments[0]", name)
+        time.sleep(0.15)
+        gone, covers = b.js(COVERED)
+        assert gone or not covers, name
+    print("  the minimap covers nothing that is selected")
+
+
+def first_view(b, url):
+    blank = """const stage = document.getElementById('stage').getBoundingClientRect();
+return [...document.querySelectorAll('.graph:not([hidden]) .items > g:not(.off)')].filter(g => {
+    const r = g.getBoundingClientRect(), text = g.querySelector('text');
+    return r.right > stage.left && r.left < stage.right && r.bottom > stage.top && r.top < stage.bottom && getComputedStyle(text).visibility != 'visible';
+}).length"""
+    b.open("about:blank")
+    b.open(url)
+    time.sleep(0.3)
+    assert b.js(blank) == 0, "empty boxes at first sight"
+
+
+def timeline_page(b, url):
+    b.open("about:blank")
+    b.open(url)
+    seen = b.js("""const shown = id => document.getElementById(id).getBoundingClientRect(), rows = [...document.querySelectorAll('#rownames button')];
+        return [shown('stage').height, shown('deck').width, rows.length, rows.filter(r => r.querySelector('.type').textContent && r.querySelector('.hz').textContent).length,
+            document.querySelectorAll('#legend .node, #legend .edge').length]""")
+    assert seen[0] == 0 and seen[1] > 800 and seen[2] == seen[3] > 5 and seen[4] == 0, seen
+    drag(b, 0.25, 0.75)
+    assert b.js("return document.getElementById('where').textContent").startswith("windows ")
+    b.keys("t")
+    assert b.js("return document.getElementById('stage').getBoundingClientRect().height") > 200, "the table has room"
+    print("  a page of topics is their timeline, with types and rates")
+
+
+def embedded(b, url, board):
+    for page, part in ((url, "stage"), (board, "time")):
+        b.open("about:blank")
+        b.open(page + "#bare&loop")
+        time.sleep(0.3)
+        assert b.js("return ['header', 'aside', '#buttons'].every(css => getComputedStyle(document.querySelector(css)).display == 'none' || document.querySelector(css).getBoundingClientRect().height <= 1)")
+        assert b.js("return document.getElementById(arguments[0]).getBoundingClientRect().width", part) > 1000
+    b.js("const s = document.getElementById('seek'); s.value = s.max; s.dispatchEvent(new Event('input'))")
+    b.keys(" ")
+    time.sleep(1.4)
+    assert b.js("const s = document.getElementById('seek'); return +s.value < +s.max"), "it begins again"
+    print("  #bare&loop shows the picture alone, again and again")
+
+
+def printed(b, url):
+    b.open("about:blank")
+    b.open(url)
+    paper = base64.b64decode(b.cdp("Page.printToPDF", printBackground=True)["data"])
+    assert paper.startswith(b"%PDF") and len(paper) > 20_000, len(paper)
+    b.cdp("Emulation.setEmulatedMedia", media="print")
+    b.js("dispatchEvent(new Event('beforeprint'))")
+    hidden, names = b.js("""const all = [...document.querySelectorAll('#graph .items > g:not(.off) > text:not(.r)')];
+        return [all.filter(t => getComputedStyle(t).visibility != 'visible').length, [...document.querySelectorAll('#rownames > *')].filter(r => r.getBoundingClientRect().height > 5).length]""")
+    assert hidden == 0 and names > 5, (hidden, names)
+    b.js("dispatchEvent(new Event('afterprint'))")
+    b.cdp("Emulation.setEmulatedMedia", media="")
+    print("  paper shows all names and lives")
+
+
+def drive(b, url, board, evolution):
+    first_view(b, url)
+    ranges(b, url, evolution)
+    search(b)
+    panel(b)
+    minimap(b)
+    timeline_page(b, board)
+    embedded(b, url, board)
+
+
+def check(url, board, evolution):
+    with Browser(1440, 900) as b:
+        drive(b, url, board, evolution)
+        printed(b, url)

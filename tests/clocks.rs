@@ -1,0 +1,259 @@
+//! Recordings whose time is no straight line, made of a healthy one: what the robot did is reported as for that one, and
+//! what the recorder did as an interruption.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use bagreel::bag::{self, Connection, Input, Message, OpenOptions, Sink, Want};
+use bagreel::internals::base::notice::{Notice, NoticeKind};
+use bagreel::internals::base::time::Stamp;
+use bagreel::internals::mission::Mission;
+use bagreel::internals::mission::ledger::Kind;
+use bagreel::{Reading, read};
+
+use crate::support::rosbag1::{Pack, write};
+use crate::support::{Publisher, Recording};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// A sink that makes a recording of everything.
+#[derive(Default)]
+struct Copied(Recording);
+
+impl Sink for Copied {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let text =
+            |text: &Option<std::sync::Arc<str>>| text.as_deref().unwrap_or_default().to_owned();
+        self.0.publishers.push(Publisher {
+            node: connection
+                .publisher
+                .as_ref()
+                .map(ToString::to_string)
+                .unwrap_or_default(),
+            topic: connection.topic.to_string(),
+            type_name: connection.type_name.to_string(),
+            latching: connection.latching,
+            qos: String::new(),
+            definition: text(&connection.definition),
+        });
+        Want::Payload
+    }
+
+    fn stamps(&mut self, _: bag::ConnectionId, _: &[Stamp], _: Option<&[u32]>) {}
+
+    fn message(&mut self, message: Message<'_>) {
+        let publisher = message.connection.0 as usize;
+        self.0
+            .messages
+            .push((publisher, message.time.0, message.data.to_vec()));
+    }
+
+    fn notice(&mut self, _: Notice) {}
+}
+
+/// The healthy recording, with its first moment and its length.
+struct Healthy {
+    all: Recording,
+    begin: i64,
+    length: i64,
+    /// The topics in the order of their names.
+    topics: Vec<String>,
+}
+
+impl Healthy {
+    fn new() -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+        let mut copied = Copied::default();
+        let mut reader = bag::open(&Input::Path(path), &OpenOptions::default()).unwrap();
+        reader.read(None, &mut copied).unwrap();
+        let all = copied.0;
+        let times = || all.messages.iter().map(|m| m.1);
+        let (begin, end) = (times().min().unwrap(), times().max().unwrap());
+        let mut topics: Vec<String> = all.publishers.iter().map(|p| p.topic.clone()).collect();
+        topics.sort();
+        topics.dedup();
+        Self {
+            begin,
+            length: end - begin,
+            topics,
+            all,
+        }
+    }
+
+    /// A copy with other times, seconds after the first moment of the healthy one, and without some messages.
+    fn copy(&self, mut time: impl FnMut(&str, i64) -> Option<i64>) -> Recording {
+        let mut copy = self.all.clone();
+        copy.messages.retain_mut(|(publisher, at, _)| {
+            let moved = time(&self.all.publishers[*publisher].topic, *at - self.begin);
+            *at = self.begin + moved.unwrap_or(0);
+            moved.is_some()
+        });
+        copy
+    }
+
+    /// Whether a topic belongs to the first half of all of them.
+    fn is_first(&self, topic: &str) -> bool {
+        let place = self.topics.iter().position(|t| t == topic).unwrap();
+        place < self.topics.len() / 2
+    }
+}
+
+/// A line about one mission: the numbers of headlines, the restarts, the interruptions, the notes.
+fn told(name: &str, recordings: &[Recording]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |(at, recording): (usize, &Recording)| -> PathBuf {
+        let path = folder.path().join(format!("{at}.bag"));
+        std::fs::write(&path, write(recording, Pack::None, 768 * 1024)).unwrap();
+        path
+    };
+    let paths: Vec<PathBuf> = recordings.iter().enumerate().map(place).collect();
+    let mission = read(&Reading::of(paths)).unwrap();
+    let mut line = format!("{name}:");
+    for kind in Kind::ALL {
+        let entries = mission.ledger.entries.iter();
+        let many = entries
+            .filter(|e| e.kind == kind && e.is_headline())
+            .count();
+        if many > 0 {
+            write!(line, " {many} {}", kind.word()).unwrap();
+        }
+    }
+    line.push_str(&details(&mission));
+    line
+}
+
+fn details(mission: &Mission) -> String {
+    let mut text = String::new();
+    let seconds = |time: Stamp| mission.offset(time) / SECOND;
+    for entry in mission
+        .ledger
+        .entries
+        .iter()
+        .filter(|e| e.kind == Kind::Restarted && e.is_headline())
+    {
+        let (node, _) = mission.elements.ends(entry.what);
+        let role = &mission.elements.nodes[node.unwrap() as usize].role;
+        write!(text, "\n  {} restarted at {} s", role, seconds(entry.time)).unwrap();
+    }
+    for one in &mission.ledger.interruptions {
+        let (word, length) = (one.kind.word(), one.length as f64 / 1e9);
+        write!(text, "\n  {word} at {} s: {length:.1} s", seconds(one.time)).unwrap();
+    }
+    for notice in mission.notices.iter() {
+        if matches!(notice.kind, NoticeKind::Note | NoticeKind::ImpossibleTime) {
+            write!(text, "\n  note: {} (×{})", notice.text, notice.count).unwrap();
+        }
+    }
+    text.push('\n');
+    text
+}
+
+#[test]
+#[expect(clippy::too_many_lines, reason = "a recording after the other")]
+fn only_the_recorder_is_told_of_when_its_clock_is_not_straight() {
+    let healthy = Healthy::new();
+    let (length, half) = (healthy.length, healthy.length / 2);
+    let from_half = |at: i64, step: i64| if at < half { at } else { at + step };
+    let begin = healthy.begin;
+    let holes = [1, 2, 4].map(|fifth| length * fifth / 5);
+    let in_hole = |at: i64| {
+        holes
+            .iter()
+            .any(|hole| (*hole..*hole + 3 * SECOND).contains(&at))
+    };
+    let loses = |percent: u64| {
+        let mut dice = 2_463_534_242 + percent;
+        healthy.copy(|_, at| {
+            dice = dice
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((dice >> 33) % 100 >= percent).then_some(at)
+        })
+    };
+    let first = |at: i64, topic: &str| healthy.is_first(topic).then_some(at);
+    let second = |at: i64, topic: &str| (!healthy.is_first(topic)).then_some(at);
+    let all = [
+        ("healthy", vec![healthy.copy(|_, at| Some(at))]),
+        (
+            "without /rosout_agg",
+            vec![healthy.copy(|topic, at| (topic != "/rosout_agg").then_some(at))],
+        ),
+        ("3 % lost", vec![loses(3)]),
+        ("10 % lost", vec![loses(10)]),
+        ("30 % lost", vec![loses(30)]),
+        (
+            "three times 3 s not recorded",
+            vec![healthy.copy(|_, at| (!in_hole(at)).then_some(at))],
+        ),
+        (
+            "a fifth not recorded",
+            vec![healthy.copy(|_, at| (!(half..half + length / 5).contains(&at)).then_some(at))],
+        ),
+        (
+            "5 s ahead",
+            vec![healthy.copy(|_, at| Some(from_half(at, 5 * SECOND)))],
+        ),
+        (
+            "an hour ahead",
+            vec![healthy.copy(|_, at| Some(from_half(at, 3600 * SECOND)))],
+        ),
+        (
+            "20 s back",
+            vec![healthy.copy(|_, at| Some(from_half(at, -20 * SECOND)))],
+        ),
+        (
+            "simulated",
+            vec![healthy.copy(|_, at| Some(at - begin + SECOND / 100))],
+        ),
+        (
+            "simulated, and begun again half way",
+            vec![healthy.copy(|_, at| Some(from_half(at, -half) - begin + SECOND / 100))],
+        ),
+        (
+            "simulated after 2 s",
+            vec![healthy.copy(|_, at| {
+                Some(if at < 2 * SECOND {
+                    at
+                } else {
+                    at - begin + SECOND / 100
+                })
+            })],
+        ),
+        (
+            "five times as slow",
+            vec![healthy.copy(|_, at| Some(at * 5))],
+        ),
+        (
+            "two robots with the same names",
+            vec![
+                healthy.copy(|_, at| Some(at)),
+                healthy.copy(|_, at| Some(at + 5_012_345_678)),
+            ],
+        ),
+        (
+            "half of the topics each",
+            vec![
+                healthy.copy(|topic, at| first(at, topic)),
+                healthy.copy(|topic, at| second(at, topic)),
+            ],
+        ),
+        (
+            "half of the topics each, one 30 s ahead",
+            vec![
+                healthy.copy(|topic, at| first(at, topic)),
+                healthy.copy(|topic, at| second(at + 30 * SECOND, topic)),
+            ],
+        ),
+        (
+            "half of the topics each, one for a third of the time",
+            vec![
+                healthy.copy(|topic, at| first(at, topic)),
+                healthy.copy(|topic, at| {
+                    second(at, topic).filter(|at| (half..length * 5 / 6).contains(at))
+                }),
+            ],
+        ),
+    ];
+    let lines = all.iter().map(|(name, recordings)| told(name, recordings));
+    insta::assert_snapshot!("clocks", lines.collect::<String>());
+}

@@ -1,0 +1,203 @@
+//! What a folder is to each command: one recording, several, a copy, or nothing.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::{Recording, mcap, rosbag1, small};
+
+/// A recording that differs from others in its messages.
+fn run(number: i64) -> Recording {
+    let mut bag = small();
+    let topic = bag.publisher("/extra", "/extra", "std_msgs/String");
+    bag.send(topic, (number * 1000, 50_000), 1000, b"\x05\0\0\0found");
+    bag
+}
+
+fn bag1(path: &Path, number: i64) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(
+        path,
+        rosbag1::write(&run(number), rosbag1::Pack::None, 50_000),
+    )
+    .unwrap();
+}
+
+fn mcap2(path: &Path, number: i64) {
+    let options = mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    };
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, mcap::write(&run(number), &options)).unwrap();
+}
+
+const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - run_0.mcap\n";
+
+/// What the commands that take one mission say of a folder.
+enum Is {
+    /// One recording.
+    One,
+    /// One recording, with a note that holds these words.
+    Noted(&'static str),
+    /// An error that holds these words.
+    Refused(&'static str),
+}
+
+/// A name, what makes the folder, what it is to commands that take one mission, and the rows of a survey; 0 rows: `info`
+/// shows the one recording.
+type Row = (&'static str, fn(&Path), Is, usize);
+
+#[rustfmt::skip]
+const FOLDERS: &[Row] = &[
+    ("one.bag", |f| bag1(&f.join("a.bag"), 1), Is::One, 0),
+    ("one.mcap", |f| mcap2(&f.join("a.mcap"), 1), Is::One, 0),
+    ("rosbag2", |f| { mcap2(&f.join("run_0.mcap"), 1); fs::write(f.join("metadata.yaml"), METADATA).unwrap(); }, Is::One, 0),
+    ("split", |f| { mcap2(&f.join("run_0.mcap"), 1); mcap2(&f.join("run_1.mcap"), 2); }, Is::One, 0),
+    ("below", |f| mcap2(&f.join("deep/run/a.mcap"), 1), Is::One, 0),
+    ("rosbag2 and a bag", |f| {
+        mcap2(&f.join("run_0.mcap"), 1);
+        fs::write(f.join("metadata.yaml"), METADATA).unwrap();
+        bag1(&f.join("old.bag"), 2);
+    }, Is::Noted("`old.bag` is not named in `metadata.yaml` and was left out"), 2),
+    ("two formats", |f| { bag1(&f.join("a.bag"), 1); mcap2(&f.join("b.mcap"), 2); }, Is::Refused("2 recordings: a.bag and b.mcap"), 2),
+    ("two bags", |f| { bag1(&f.join("a.bag"), 1); bag1(&f.join("b.bag"), 2); }, Is::Refused("2 recordings: a.bag and b.bag"), 2),
+    ("two files", |f| { mcap2(&f.join("a.mcap"), 1); mcap2(&f.join("b.mcap"), 2); }, Is::Refused("2 recordings: a.mcap and b.mcap"), 2),
+    ("two names", |f| { mcap2(&f.join("a_0.mcap"), 1); mcap2(&f.join("b_0.mcap"), 2); }, Is::Refused("2 recordings: a_0.mcap and b_0.mcap"), 2),
+    ("copies", |f| { mcap2(&f.join("a.mcap"), 1); mcap2(&f.join("b.mcap"), 1); }, Is::Refused("2 recordings: a.mcap and b.mcap"), 2),
+    ("two below", |f| { mcap2(&f.join("x/a.mcap"), 1); bag1(&f.join("y/b.bag"), 2); }, Is::Refused("2 recordings: x/a.mcap and y/b.bag"), 2),
+    ("empty", |f| fs::write(f.join("notes.txt"), "no bag").unwrap(), Is::Refused("a folder without a recording"), 0),
+];
+
+/// Commands that take one mission.
+const COMMANDS: &[&str] = &[
+    "render F -o out.json",
+    "figure F --kind lives --rows topics --width 181mm -o out.svg",
+    "events F",
+    "extract F -o out.csv",
+    "baseline F",
+    "check F --expect expected.yaml",
+    "diff F F",
+];
+
+/// The exit code, and what was printed on standard error and output.
+fn bagreel(folder: &Path, line: &str, what: &str) -> (i32, String, String) {
+    let args = line
+        .split(' ')
+        .map(|word| if word == "F" { what } else { word });
+    let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (
+        done.status.code().unwrap(),
+        text(done.stderr),
+        text(done.stdout),
+    )
+}
+
+/// Every folder of the table, made.
+fn made() -> tempfile::TempDir {
+    let all = tempfile::tempdir().unwrap();
+    for (name, make, ..) in FOLDERS {
+        let folder = all.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        make(&folder);
+    }
+    fs::write(
+        all.path().join("expected.yaml"),
+        "schema: bagreel.expect/1\ntopics:\n  /scan: {}\n",
+    )
+    .unwrap();
+    all
+}
+
+#[test]
+fn a_folder_is_one_recording_or_an_error_that_lists_them() {
+    let all = made();
+    for (name, _, is, _) in FOLDERS {
+        for line in COMMANDS {
+            let (code, said, _) = bagreel(all.path(), line, name);
+            let at = format!("{line} of {name}: {code}: {said}");
+            match is {
+                Is::One => {
+                    assert_eq!(code, 0, "{at}");
+                    assert!(!said.contains("left out"), "{at}");
+                }
+                Is::Noted(words) => assert!(code == 0 && said.contains(words), "{at}"),
+                Is::Refused(words) => {
+                    assert!(code == 1 || code == 2, "{at}");
+                    assert!(said.contains(words) && said.contains("hint: name "), "{at}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_folder_of_one_recording_counts_as_its_files_do() {
+    let all = made();
+    let messages = |what: &str| {
+        let (_, _, text) = bagreel(all.path(), "info F --format json", what);
+        let info: serde_json::Value = serde_json::from_str(&text).unwrap();
+        info["messages"].as_u64().unwrap()
+    };
+    assert_eq!(messages("one.bag"), messages("one.bag/a.bag"));
+    assert_eq!(messages("one.mcap"), messages("one.mcap/a.mcap"));
+    let parts = messages("split/run_0.mcap") + messages("split/run_1.mcap");
+    assert_eq!(messages("split"), parts);
+}
+
+#[test]
+fn info_and_tables_take_several_recordings_as_a_fleet() {
+    let all = made();
+    for (name, _, is, rows) in FOLDERS {
+        let (code, said, text) = bagreel(all.path(), "info F --format csv", name);
+        if name == &"empty" {
+            assert_eq!(code, 1, "{said}");
+            continue;
+        }
+        assert_eq!(text.lines().count() - 1, (*rows).max(1), "{name}: {text}");
+        let (code, said, _) = bagreel(all.path(), "tables F -o fleet", name);
+        let bags = match (is, rows) {
+            (Is::One, _) => "1 bag".to_owned(),
+            (_, rows) => format!("{rows} bags"),
+        };
+        assert!(
+            code == 0 && said.contains(&format!("{bags},")),
+            "{name}: {said}"
+        );
+        fs::remove_dir_all(all.path().join("fleet")).unwrap();
+    }
+}
+
+#[test]
+fn copies_of_one_recording_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    mcap2(&at("run.mcap"), 1);
+    fs::copy(at("run.mcap"), at("copy.mcap")).unwrap();
+    bag1(&at("converted.bag"), 1);
+    mcap2(&at("other.mcap"), 2);
+    for line in [
+        "render F -o out.json",
+        "events F",
+        "info F",
+        "extract F -o out.csv",
+    ] {
+        for other in ["copy.mcap", "converted.bag"] {
+            let both = line.replace('F', &format!("F {other}"));
+            let (code, said, _) = bagreel(folder.path(), &both, "run.mcap");
+            assert_eq!(code, 2, "{both}: {said}");
+            assert!(
+                said.contains("the same messages as `run.mcap`"),
+                "{both}: {said}"
+            );
+        }
+        let both = line.replace('F', "F other.mcap");
+        let (code, said, _) = bagreel(folder.path(), &both, "run.mcap");
+        assert_eq!(code, 0, "{both}: {said}");
+    }
+}

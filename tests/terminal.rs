@@ -1,0 +1,498 @@
+//! The command on a terminal: what is left on the screen when it ends, how wide results are, when there are colours.
+#![cfg(target_os = "linux")]
+
+use std::fs::{self, File};
+use std::io::Read as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
+use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::time::Stamp;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{Winsize, tcsetwinsize};
+
+const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+
+/// The streams of a command that are the terminal; the other one goes nowhere.
+#[derive(Clone, Copy, PartialEq)]
+enum On {
+    Both,
+    Output,
+    Errors,
+}
+
+/// All that the command writes to a terminal of so many columns.
+fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> String {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&master).unwrap();
+    unlockpt(&master).unwrap();
+    let size = Winsize {
+        ws_row: 50,
+        ws_col: columns,
+        ws_xpixel: 0,
+        ws_ypixel: 0,
+    };
+    tcsetwinsize(&master, size).unwrap();
+    let name = ptsname(&master, Vec::new()).unwrap();
+    let slave = File::options()
+        .read(true)
+        .write(true)
+        .open(name.to_str().unwrap())
+        .unwrap();
+    let terminal = |is: bool| {
+        if is {
+            Stdio::from(slave.try_clone().unwrap())
+        } else {
+            Stdio::null()
+        }
+    };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command
+        .current_dir(folder)
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(terminal(on != On::Errors))
+        .stderr(terminal(on != On::Output))
+        .env("TERM", "xterm")
+        .env_remove("NO_COLOR");
+    if !colour {
+        command.env("NO_COLOR", "1");
+    }
+    let mut child = command.spawn().unwrap();
+    drop((command, slave));
+    let mut all = Vec::new();
+    let mut master = File::from(master);
+    let mut part = [0; 4096];
+    // The end of a terminal without anybody on it is an error.
+    while let Ok(n @ 1..) = master.read(&mut part) {
+        all.extend_from_slice(&part[..n]);
+    }
+    child.wait().unwrap();
+    String::from_utf8(all).unwrap()
+}
+
+/// The lines that a terminal of so many columns shows in the end, without what was cleared.
+fn screen(written: &str, columns: usize) -> Vec<String> {
+    let mut lines = vec![Vec::new()];
+    let (mut row, mut column) = (0, 0);
+    let mut chars = written.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '\r' => column = 0,
+            '\n' => row += 1,
+            '\u{1b}' if chars.next_if_eq(&'[').is_some() => {
+                let mut number = String::new();
+                let end = loop {
+                    match chars.next().unwrap() {
+                        digit @ ('0'..='9' | '?' | ';') => number.push(digit),
+                        end => break end,
+                    }
+                };
+                let n: usize = number.parse().unwrap_or(1);
+                let line: &mut Vec<char> = &mut lines[row];
+                match (end, number.as_str()) {
+                    ('A', _) => row = row.saturating_sub(n),
+                    ('B', _) => row += n,
+                    ('K', "2") => line.clear(),
+                    ('K', _) => line.truncate(column),
+                    ('J', _) => {
+                        line.truncate(column);
+                        lines.truncate(row + 1);
+                    }
+                    ('m' | 'h' | 'l', _) => {}
+                    (end, number) => panic!("unknown sequence {number}{end}"),
+                }
+            }
+            c => {
+                if column == columns {
+                    (row, column) = (row + 1, 0);
+                }
+                while lines.len() <= row {
+                    lines.push(Vec::new());
+                }
+                let line = &mut lines[row];
+                while line.len() <= column {
+                    line.push(' ');
+                }
+                line[column] = c;
+                column += 1;
+            }
+        }
+        while lines.len() <= row {
+            lines.push(Vec::new());
+        }
+    }
+    let lines = lines.into_iter().map(String::from_iter);
+    let mut lines: Vec<String> = lines
+        .map(|line: String| line.trim_end().to_owned())
+        .collect();
+    while lines.last().is_some_and(String::is_empty) {
+        lines.pop();
+    }
+    lines
+}
+
+/// The lines with every number made the same: times differ from run to run.
+fn timeless(lines: Vec<String>) -> Vec<String> {
+    let digit = |c: char| if c.is_ascii_digit() { '0' } else { c };
+    let seconds = |line: String| match line.rfind(", in ") {
+        Some(at) => line[..at].to_owned(),
+        None => line.chars().map(digit).collect(),
+    };
+    lines.into_iter().map(seconds).collect()
+}
+
+/// Every command that reads or draws, with its arguments.
+const COMMANDS: &[&str] = &[
+    "render W -o x.gif --size 320x200",
+    "render W -o x.json",
+    "render W -o - --format json --period all",
+    "render C -o x.html",
+    "render gone.bag -o x.gif",
+    "figure W -o fig.pdf",
+    "info W",
+    "info W --why /map_server",
+    "info E",
+    "info E --format csv",
+    "events W",
+    "events W --parts --phases",
+    "extract C -o x.csv",
+    "extract C -o - --format csv",
+    "extract C -o fields --fields",
+    "tables W -o fleet",
+    "baseline W -o x.yaml",
+    "baseline W",
+    "check W --expect expected.yaml",
+    "diff W C",
+    "styles",
+    "styles light",
+    "completions bash",
+    "man render",
+    "--help",
+    "render --help",
+];
+
+fn words(line: &str) -> Vec<&str> {
+    let word = |word| match word {
+        "W" => WAREHOUSE,
+        "C" => COURIER,
+        "E" => EXAMPLES,
+        other => other,
+    };
+    line.split(' ').map(word).collect()
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("expected.yaml"),
+        "schema: bagreel.expect/1\nnodes:\n  /planner: {}\n",
+    )
+    .unwrap();
+    folder
+}
+
+#[test]
+fn nothing_but_results_and_messages_is_left_on_the_screen() {
+    let folder = folder();
+    let mut bars = 0;
+    for line in COMMANDS {
+        let run = |on| {
+            let written = typed(folder.path(), &words(line), on, 80, true);
+            (
+                written.contains("\u{1b}[2K"),
+                timeless(screen(&written, 80)),
+            )
+        };
+        let (has_bar, both) = run(On::Both);
+        let (results, messages) = (run(On::Output).1, run(On::Errors).1);
+        bars += usize::from(has_bar);
+        let before = [messages.clone(), results.clone()].concat();
+        let after = [results, messages].concat();
+        assert!(
+            both == before || both == after,
+            "{line}:\n{}\nshould be\n{}",
+            both.join("\n"),
+            after.join("\n")
+        );
+    }
+    assert!(bars > 8, "{bars} commands showed a bar");
+}
+
+#[test]
+fn results_fit_the_terminal() {
+    let folder = folder();
+    for columns in [60, 80, 120] {
+        for line in [
+            "info W",
+            "info C",
+            "info E",
+            "events W",
+            "events W --parts",
+            "events C",
+        ] {
+            let written = typed(folder.path(), &words(line), On::Output, columns, true);
+            let widest = screen(&written, 1000)
+                .into_iter()
+                .max_by_key(|line| line.chars().count())
+                .unwrap();
+            let is_one_word = !widest.trim().contains(' ');
+            assert!(
+                is_one_word || widest.chars().count() <= usize::from(columns),
+                "{line} at {columns}: {widest}"
+            );
+        }
+    }
+}
+
+#[test]
+fn tables_have_heads_that_stay_above_their_columns() {
+    let folder = folder();
+    let written = typed(folder.path(), &["info", WAREHOUSE], On::Output, 80, true);
+    let lines = screen(&written, 1000);
+    let head = lines
+        .iter()
+        .find(|line| line.starts_with("  topic "))
+        .unwrap();
+    let row = lines
+        .iter()
+        .find(|line| line.starts_with("  /robot1/odom "))
+        .unwrap();
+    let end =
+        |text: &str, line: &str| line.split(text).next().unwrap().chars().count() + text.len();
+    assert_eq!(end("messages", head), end("1627", row), "{head}\n{row}");
+    assert!(head.contains("rate") && head.contains("activity"), "{head}");
+    assert!(lines.iter().any(|line| line.starts_with("  node ")));
+}
+
+#[test]
+fn long_events_hang_below_their_own_words() {
+    let folder = folder();
+    let written = typed(folder.path(), &["events", WAREHOUSE], On::Output, 60, true);
+    let lines = screen(&written, 1000);
+    let hanging = lines
+        .iter()
+        .filter(|line| line.starts_with("               "));
+    assert!(hanging.count() > 10, "{}", lines.join("\n"));
+}
+
+#[test]
+fn events_are_sorted_by_the_time_that_they_show() {
+    let folder = folder();
+    let written = typed(folder.path(), &["events", WAREHOUSE], On::Output, 500, true);
+    let shown = screen(&written, 1000).into_iter().map(|line| {
+        let time = line.trim_start_matches([' ', '~']);
+        let time: String = time.chars().take(5).collect();
+        time
+    });
+    let shown: Vec<String> = shown.collect();
+    assert!(shown.len() > 30 && shown.is_sorted(), "{shown:?}");
+}
+
+#[test]
+fn colours_tell_kinds_unless_they_are_not_wanted() {
+    let folder = folder();
+    let run = |args: &[&str], colour| typed(folder.path(), args, On::Output, 80, colour);
+    let coloured = run(&["events", WAREHOUSE], true);
+    for colour in [
+        "\u{1b}[32m",
+        "\u{1b}[31m",
+        "\u{1b}[33m",
+        "\u{1b}[35m",
+        "\u{1b}[36m",
+    ] {
+        assert!(coloured.contains(colour), "no {colour:?}");
+    }
+    assert!(
+        !run(&["events", WAREHOUSE], false).contains("\u{1b}[3"),
+        "NO_COLOR"
+    );
+    assert!(!run(&["events", WAREHOUSE, "--color", "never"], true).contains("\u{1b}[3"));
+    assert!(run(&["events", WAREHOUSE, "--color", "always"], false).contains("\u{1b}[32m"));
+    let piped = |args: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .args(args)
+            .output()
+            .unwrap();
+        String::from_utf8(run.stdout).unwrap()
+    };
+    let plain = piped(&["events", WAREHOUSE]);
+    assert!(!plain.contains('\u{1b}'));
+    assert!(piped(&["events", WAREHOUSE, "--color", "always"]).contains("\u{1b}[32m"));
+    let wide = run(&["events", WAREHOUSE], true);
+    assert_eq!(
+        screen(&plain.replace('\n', "\r\n"), 1000)
+            .join(" ")
+            .split_whitespace()
+            .collect::<Vec<_>>(),
+        screen(&wide, 1000)
+            .join(" ")
+            .split_whitespace()
+            .collect::<Vec<_>>(),
+        "colours and breaks change no word"
+    );
+}
+
+/// A sink that keeps what it is told of the progress: bytes done, bytes in all.
+struct Progress(Vec<(u64, u64)>);
+
+impl Sink for Progress {
+    fn connection(&mut self, _: &Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, _: ConnectionId, _: &[Stamp], _: Option<&[u32]>) {}
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.0.push((done, total));
+    }
+}
+
+#[test]
+fn progress_counts_the_bytes_of_the_files() {
+    for bag in ["warehouse.bag", "courier.mcap", "courier"] {
+        let path = Path::new(EXAMPLES).join(bag);
+        let input = Input::Path(path.clone());
+        let storage = if path.is_dir() {
+            path.join("courier_0.db3")
+        } else {
+            path
+        };
+        let bytes = fs::metadata(storage).unwrap().len();
+        let mut seen = Progress(Vec::new());
+        let mut reader = bag::open(&input, &OpenOptions::default()).unwrap();
+        reader.read(None, &mut seen).unwrap();
+        assert!(seen.0.is_sorted(), "{bag}: {:?}", seen.0);
+        assert!(
+            seen.0.iter().all(|(_, total)| *total == bytes),
+            "{bag}: {:?}",
+            seen.0
+        );
+        assert_eq!(seen.0.last(), Some(&(bytes, bytes)), "{bag}");
+    }
+}
+
+#[test]
+fn notes_about_what_is_left_out_are_one_line_unless_all_are_asked_for() {
+    let folder = folder();
+    let notes = |args: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(folder.path())
+            .args(["render", WAREHOUSE, "--period", "all", "-o", "x.svg"])
+            .args(args)
+            .output()
+            .unwrap();
+        let said = String::from_utf8(run.stderr).unwrap();
+        said.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let said = notes(&[]);
+    assert_eq!(said.len(), 2, "{said:?}");
+    assert!(
+        said[0].contains("left out") && said[0].contains("`-v`"),
+        "{said:?}"
+    );
+    assert!(said[1].starts_with("wrote x.svg: "), "{said:?}");
+    let all = notes(&["-v"]);
+    assert!(
+        all.len() > 2 && all.iter().any(|line| line.contains("--show-recorder")),
+        "{all:?}"
+    );
+    assert_eq!(notes(&["-q"]), [""; 0]);
+}
+
+#[test]
+fn names_that_match_nothing_are_told_with_the_nearest_name() {
+    let folder = folder();
+    for (option, value, says) in [
+        ("--collapse", "/robt1", "`/robot1`"),
+        ("--topic-filter", "/scam", "matches no topic; "),
+        ("--ns-filter", "/.*,-/map_servr", "`/map_server`"),
+        ("--expand", "/robot11", "`/robot1`"),
+    ] {
+        let output = if option == "--expand" {
+            "x.svg"
+        } else {
+            "x.dot"
+        };
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(folder.path())
+            .args([
+                "render", WAREHOUSE, "--period", "all", "-o", output, option, value,
+            ])
+            .output()
+            .unwrap();
+        let said = String::from_utf8(run.stderr).unwrap();
+        assert!(said.contains(says), "{option} {value}: {said}");
+    }
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let page = |args: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .arg("man")
+            .args(args)
+            .output()
+            .unwrap();
+        (
+            run.status.code(),
+            String::from_utf8(run.stdout).unwrap(),
+            String::from_utf8(run.stderr).unwrap(),
+        )
+    };
+    for command in [
+        "render", "figure", "info", "extract", "tables", "events", "diff", "baseline", "check",
+        "styles",
+    ] {
+        let (code, text, _) = page(&[command]);
+        assert_eq!(code, Some(0));
+        assert!(
+            text.contains(".SH OPTIONS") || command == "styles",
+            "{command}: {text}"
+        );
+        assert!(
+            text.contains(&format!("bagreel\\-{command}")),
+            "{command}: {text}"
+        );
+    }
+    assert!(page(&[]).1.contains("bagreel"));
+    let (code, _, said) = page(&["rendr"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("the nearest is `render`"), "{said}");
+}
+
+#[test]
+fn a_closed_pipe_is_silent_for_every_command() {
+    let folder = folder();
+    for line in [
+        "info W",
+        "events W",
+        "extract C -o - --format csv",
+        "styles light",
+        "completions bash",
+        "man",
+        "diff W C",
+        "baseline W",
+        "render W -o - --format json",
+        "--help",
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(folder.path())
+            .args(words(line))
+            .arg("-q")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(String::from_utf8(done.stderr).unwrap(), "", "{line}");
+    }
+}
