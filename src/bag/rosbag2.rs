@@ -196,9 +196,8 @@ impl Reader for BagFolder {
                 continue;
             };
             parts += 1;
-            whole = Some(whole.map_or(span, |w| Span {
-                start: w.start.min(span.start),
-                end: w.end.max(span.end),
+            whole = Some(whole.map_or(span, |w| {
+                Span::new(w.start.min(span.start), w.end.max(span.end))
             }));
         }
         // A part without a span is empty or must be read; either way the spans of the other parts alone are not enough.

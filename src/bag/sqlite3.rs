@@ -222,10 +222,7 @@ impl Sqlite3Bag {
     fn ends(&self) -> Result<Option<Span>, Refusal> {
         let db = Db::open(&self.ready)?;
         let ends = self.end(&db, "ASC")?.zip(self.end(&db, "DESC")?);
-        Ok(ends.map(|(start, last)| Span {
-            start,
-            end: last.plus(1),
-        }))
+        Ok(ends.map(|(start, last)| Span::new(start, last.plus(1))))
     }
 }
 

@@ -70,6 +70,11 @@ pub struct Span {
 }
 
 impl Span {
+    /// The interval from `start` to `end`.
+    pub const fn new(start: Stamp, end: Stamp) -> Self {
+        Self { start, end }
+    }
+
     /// The time that two intervals share, in nanoseconds; 0 or less where they share none.
     pub(crate) fn shared(&self, other: Self) -> i64 {
         self.end.min(other.end).since(self.start.max(other.start))
@@ -257,10 +262,7 @@ mod tests {
 
     #[test]
     fn moments_count_from_either_end() {
-        let bag = Span {
-            start: Stamp(100 * SECOND),
-            end: Stamp(200 * SECOND),
-        };
+        let bag = Span::new(Stamp(100 * SECOND), Stamp(200 * SECOND));
         let at = |t| Moment::parse(t).map(|m| m.on(bag).0 / SECOND);
         assert_eq!(at("1:30"), Some(190));
         assert_eq!(at("-30s"), Some(170));

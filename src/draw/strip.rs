@@ -396,10 +396,7 @@ mod tests {
         let period = Period::parse("1m").unwrap();
         let mission = Mission {
             bags: Vec::new(),
-            span: Span {
-                start: minute(0),
-                end: minute(4),
-            },
+            span: Span::new(minute(0), minute(4)),
             messages: 0,
             period,
             step: period,
@@ -436,13 +433,7 @@ mod tests {
                 })
                 .into_iter()
                 .collect(),
-            ..Frame::empty(
-                index,
-                Span {
-                    start: minute(index),
-                    end: minute(index + 1),
-                },
-            )
+            ..Frame::empty(index, Span::new(minute(index), minute(index + 1)))
         };
         let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
         let seen = |mark: &Option<Mark>| SeenWindow {

@@ -46,10 +46,10 @@ pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     let is_too_long = whole >= budget::SPAN_DAYS;
     if strangers < bulk.messages && (is_rare || is_unset) || is_too_long {
         let last = bulk.last.min(bulk.first + budget::SPAN_DAYS - 1);
-        let span = Span {
-            start: Stamp(bulk.first.saturating_mul(DAY)),
-            end: Stamp((last + 1).saturating_mul(DAY)),
-        };
+        let span = Span::new(
+            Stamp(bulk.first.saturating_mul(DAY)),
+            Stamp((last + 1).saturating_mul(DAY)),
+        );
         return Belief {
             span: (strangers > 0 || is_too_long).then_some(span),
             jump: None,

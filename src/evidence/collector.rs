@@ -500,10 +500,7 @@ impl Recorded {
 }
 
 fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
-    let all = span.get_or_insert(Span {
-        start: first,
-        end: last.plus(1),
-    });
+    let all = span.get_or_insert(Span::new(first, last.plus(1)));
     all.start = all.start.min(first);
     all.end = all.end.max(last.plus(1));
 }

@@ -96,10 +96,7 @@ impl SourceContext<'_> {
         let now = self.time.unwrap_or(measurement.span.end);
         let nanos = measurement.span.nanos().clamp(1, 3_600_000_000_000);
         // Intervals count on the node's clock: what matters is how long they are.
-        let span = Span {
-            start: now.plus(-nanos),
-            end: now,
-        };
+        let span = Span::new(now.plus(-nanos), now);
         self.facts.measure(Measurement {
             span,
             ..measurement

@@ -57,9 +57,11 @@ impl SpellOf {
                 Some((topic_id, node_id)),
             ),
         };
-        let inside = |life: &Span| Span {
-            start: life.start.max(mission.span.start),
-            end: life.end.min(mission.span.end),
+        let inside = |life: &Span| {
+            Span::new(
+                life.start.max(mission.span.start),
+                life.end.min(mission.span.end),
+            )
         };
         let lives = elements.runs(what).iter().map(inside);
         let mut all = Self {

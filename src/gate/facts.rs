@@ -291,10 +291,7 @@ impl<'a> Facts<'a> {
             [] => self.lives(&[node]),
             runs => runs.to_vec(),
         };
-        let span = Span {
-            start: runs.first()?.start,
-            end: runs.last()?.end,
-        };
+        let span = Span::new(runs.first()?.start, runs.last()?.end);
         let rows = mission.graphs.rows(Element::Publish(edge));
         Some((span, rows.filter_map(|(_, row)| row.count).sum()))
     }

@@ -110,10 +110,7 @@ impl During {
         let start = self.from.map_or(mission.start, |m| m.on(mission));
         let end = self.to.map_or(mission.end, |m| m.on(mission));
         let start = start.clamp(mission.start, mission.end);
-        Span {
-            start,
-            end: end.clamp(start, mission.end),
-        }
+        Span::new(start, end.clamp(start, mission.end))
     }
 }
 
@@ -140,10 +137,7 @@ mod tests {
     #[test]
     fn stretches_count_from_either_end() {
         let second = |s: i64| Stamp(s * 1_000_000_000);
-        let mission = Span {
-            start: second(100),
-            end: second(200),
-        };
+        let mission = Span::new(second(100), second(200));
         let on = |text| {
             let span = During::parse(text).unwrap().on(mission);
             (span.start.0 / 1_000_000_000, span.end.0 / 1_000_000_000)

@@ -290,10 +290,8 @@ impl LongestPauses {
     /// All pauses in order.
     pub(crate) fn spans(self) -> Vec<Span> {
         let longest = self.longest.into_iter();
-        let span = |Reverse((pause, start)): Reverse<(i64, Stamp)>| Span {
-            start,
-            end: start.plus(pause),
-        };
+        let span =
+            |Reverse((pause, start)): Reverse<(i64, Stamp)>| Span::new(start, start.plus(pause));
         let mut all: Vec<Span> = longest.map(span).collect();
         all.sort_unstable_by_key(|span| span.start);
         all
@@ -337,10 +335,7 @@ mod tests {
             stretches: vec![stretch(0, 100, 50), stretch(200, 200, 3)],
         };
         let count = |start: i64, end: i64| {
-            let span = Span {
-                start: Stamp(start),
-                end: Stamp(end),
-            };
+            let span = Span::new(Stamp(start), Stamp(end));
             libm::round(sender.count_in(span))
         };
         assert!((count(0, 51) - 25.0).abs() < 0.1);

@@ -42,9 +42,11 @@ fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usiz
     let recorded = collector.finish().unwrap();
     let span = recorded.span.unwrap();
     let windows: Vec<_> = (0..1000)
-        .map(|n| Span {
-            start: span.start.plus(n * period * SECOND),
-            end: span.start.plus((n + 1) * period * SECOND),
+        .map(|n| {
+            Span::new(
+                span.start.plus(n * period * SECOND),
+                span.start.plus((n + 1) * period * SECOND),
+            )
         })
         .take_while(|w| w.start < span.end)
         .collect();
@@ -245,9 +247,11 @@ fn windows_may_overlap() {
     bag.stamps(ConnectionId(0), &stamps, None);
     let recorded = collector.finish().unwrap();
     let windows: Vec<_> = (0..4)
-        .map(|n| Span {
-            start: Stamp(n * 10 * SECOND),
-            end: Stamp((n * 10 + 20).min(40) * SECOND),
+        .map(|n| {
+            Span::new(
+                Stamp(n * 10 * SECOND),
+                Stamp((n * 10 + 20).min(40) * SECOND),
+            )
         })
         .collect();
     let all = build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap();
@@ -302,10 +306,7 @@ fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
     }
     let recorded = collector.finish().unwrap();
     let windows: Vec<_> = (0..10)
-        .map(|n| Span {
-            start: Stamp(n * 10 * SECOND),
-            end: Stamp((n + 1) * 10 * SECOND),
-        })
+        .map(|n| Span::new(Stamp(n * 10 * SECOND), Stamp((n + 1) * 10 * SECOND)))
         .collect();
     build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap()
 }

@@ -112,7 +112,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
         .max(bag.start);
     let end = division.end.map_or(bag.end, |m| m.on(bag)).min(bag.end);
     if start < end {
-        return Ok(Span { start, end });
+        return Ok(Span::new(start, end));
     }
     Err(Error::usage(
         format!(
@@ -188,10 +188,8 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
         return Err(too_many(many, nanos));
     }
     let starts = (0..many).map(|k| first.plus(k * step.nanos()));
-    let spans = starts.map(|at| Span {
-        start: at.max(span.start),
-        end: at.plus(period.nanos()).min(span.end),
-    });
+    let spans =
+        starts.map(|at| Span::new(at.max(span.start), at.plus(period.nanos()).min(span.end)));
     Ok(Windows {
         span,
         period,
@@ -208,7 +206,7 @@ pub(crate) fn at_turns(span: Span, turns: impl Iterator<Item = Stamp>) -> Window
     let spans: Vec<Span> = starts
         .iter()
         .zip(ends)
-        .map(|(start, end)| Span { start: *start, end })
+        .map(|(start, end)| Span::new(*start, end))
         .filter(|window| window.start < window.end)
         .collect();
     let shortest = spans.iter().map(Span::nanos).min().unwrap_or(1);
@@ -248,10 +246,7 @@ pub(crate) fn every(span: Span, step: i64) -> Vec<Span> {
     let step = step.max(1);
     let many = count(span.nanos().max(1), step);
     let starts = (0..many).map(|k| span.start.plus(k * step));
-    let piece = |start: Stamp| Span {
-        start,
-        end: start.plus(step).min(span.end),
-    };
+    let piece = |start: Stamp| Span::new(start, start.plus(step).min(span.end));
     starts.map(piece).collect()
 }
 
@@ -272,10 +267,7 @@ mod tests {
     use super::*;
 
     fn secs(from: i64, to: i64) -> Span {
-        Span {
-            start: Stamp(from * SECOND),
-            end: Stamp(to * SECOND),
-        }
+        Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
     }
 
     fn every(text: &str) -> Division {
@@ -336,10 +328,7 @@ mod tests {
     #[test]
     fn no_span_is_too_long_for_600_windows() {
         for end in [i64::MAX / 2, i64::MAX] {
-            let span = Span {
-                start: Stamp(0),
-                end: Stamp(end),
-            };
+            let span = Span::new(Stamp(0), Stamp(end));
             let windows = divide(&Division::default(), span).unwrap();
             assert!((500..=600).contains(&windows.spans.len()), "{end}");
             assert_eq!(windows.spans.last().unwrap().end, Stamp(end));

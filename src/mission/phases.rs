@@ -62,9 +62,7 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
 fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
     let ends = starts.iter().skip(1).copied().chain([end]);
     let pairs = starts.iter().zip(ends);
-    pairs
-        .map(|(start, end)| Span { start: *start, end })
-        .collect()
+    pairs.map(|(start, end)| Span::new(*start, end)).collect()
 }
 
 /// The phases for intervals chosen elsewhere, such as by the user, with the changes between them, by majority.

@@ -157,7 +157,7 @@ impl Sink for Bounds {
     fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
         for at in stamps {
             let end = at.plus(1);
-            let span = self.0.get_or_insert(Span { start: *at, end });
+            let span = self.0.get_or_insert(Span::new(*at, end));
             span.start = span.start.min(*at);
             span.end = span.end.max(end);
         }

@@ -43,9 +43,8 @@ pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
         let Some(span) = reader.span()? else {
             return Ok(None);
         };
-        all = Some(all.map_or(span, |a| Span {
-            start: a.start.min(span.start),
-            end: a.end.max(span.end),
+        all = Some(all.map_or(span, |a| {
+            Span::new(a.start.min(span.start), a.end.max(span.end))
         }));
     }
     Ok(all)

@@ -106,7 +106,7 @@ impl Basis<'_> {
             .iter()
             .copied()
             .zip(ends)
-            .map(|(start, end)| Span { start, end })
+            .map(|(start, end)| Span::new(start, end))
             .collect();
         let mut all = of_spans(self.elements, self.sending, whole, &spans);
         let named = all.iter_mut().skip(usize::from(is_led));

@@ -42,10 +42,7 @@ pub(super) fn probe(
                 wanted,
                 found: Vec::new(),
             };
-            let span = Span {
-                start: wanted[0].0,
-                end: wanted[wanted.len() - 1].0.plus(1),
-            };
+            let span = Span::new(wanted[0].0, wanted[wanted.len() - 1].0.plus(1));
             reader.read(Some(span), &mut sink)?;
             for (at, time, number) in sink.found {
                 let numbers = collected.recorded.numbers.entry(at).or_default();

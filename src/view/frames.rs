@@ -73,7 +73,7 @@ fn join_empty(frames: &mut [Frame]) {
         let (start, end) = (first.span.start, last.span.end);
         if run.len() > MOST_EMPTY {
             for frame in run {
-                frame.empty = Some(Span { start, end });
+                frame.empty = Some(Span::new(start, end));
             }
         }
     }

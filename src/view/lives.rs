@@ -42,7 +42,7 @@ impl<'a> ItemTurns<'a> {
                 Kind::Restarted | Kind::Silent => {
                     let (start, end) = (entry.time, entry.until.unwrap_or(entry.time));
                     if let Some(pauses) = lives.pauses.of_mut(entry.what) {
-                        pauses.push(Span { start, end });
+                        pauses.push(Span::new(start, end));
                     }
                     continue;
                 }

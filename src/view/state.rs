@@ -145,10 +145,7 @@ impl<'a> Now<'a> {
             options,
             viewed,
             senders,
-            span: Span {
-                start: Stamp(0),
-                end: Stamp(0),
-            },
+            span: Span::new(Stamp(0), Stamp(0)),
             lives: (Alive::default(), Alive::default()),
             rows: PerElement::new(&mission.elements, |_| None),
             sole: mission.elements.sole_publishers(),

@@ -36,10 +36,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
     let mut mission = Mission {
         undrawn: Vec::new(),
         bags: Vec::new(),
-        span: Span {
-            start: span(0).start,
-            end: span(windows.len()).start,
-        },
+        span: Span::new(span(0).start, span(windows.len()).start),
         messages: 0,
         period,
         step: period,
@@ -57,10 +54,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
 
 fn span(index: usize) -> Span {
     let start = i64::try_from(index).unwrap() * SECOND;
-    Span {
-        start: Stamp(start),
-        end: Stamp(start + SECOND),
-    }
+    Span::new(Stamp(start), Stamp(start + SECOND))
 }
 
 #[derive(Clone, Copy, PartialEq)]

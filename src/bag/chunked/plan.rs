@@ -186,10 +186,7 @@ struct Extremes(Option<(Stamp, Stamp)>);
 impl Extremes {
     fn span(&self) -> Option<Span> {
         let (start, last) = self.0?;
-        Some(Span {
-            start,
-            end: last.plus(1),
-        })
+        Some(Span::new(start, last.plus(1)))
     }
 }
 

@@ -141,10 +141,8 @@ impl<'a> FigureSource<'a> {
     pub(crate) fn lives(&self, what: Element) -> impl Iterator<Item = Span> + '_ {
         let whole = self.span();
         let lives = self.mission.elements.runs(what).iter();
-        let inside = lives.map(move |life| Span {
-            start: life.start.max(whole.start),
-            end: life.end.min(whole.end),
-        });
+        let inside =
+            lives.map(move |life| Span::new(life.start.max(whole.start), life.end.min(whole.end)));
         inside.filter(|life| life.start < life.end)
     }
 

@@ -159,9 +159,11 @@ impl<'a> Talks<'a> {
 /// The time that both lists of lives have in common inside `time`, in nanoseconds.
 fn shared(a: &[Span], b: &[Span], time: Span) -> i64 {
     let both = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
-    let inside = both.map(|(a, b)| Span {
-        start: a.start.max(b.start).max(time.start),
-        end: a.end.min(b.end).min(time.end),
+    let inside = both.map(|(a, b)| {
+        Span::new(
+            a.start.max(b.start).max(time.start),
+            a.end.min(b.end).min(time.end),
+        )
     });
     inside.map(|span| span.nanos().max(0)).sum()
 }

@@ -169,10 +169,7 @@ impl Steps {
             let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
             let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
             Some(Piece {
-                span: Span {
-                    start,
-                    end: end.plus(1),
-                },
+                span: Span::new(start, end.plus(1)),
                 hz: match run {
                     [one] => one.hz(),
                     _ if nanos > 0 => mean,
@@ -214,10 +211,7 @@ fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
     for (pair, next) in turns.iter().zip(turns.iter().skip(1)) {
         hz += pair.1;
         many += pair.2;
-        let span = Span {
-            start: pair.0,
-            end: next.0,
-        };
+        let span = Span::new(pair.0, next.0);
         if many == 0 || span.start >= span.end {
             continue;
         }
@@ -267,10 +261,7 @@ mod tests {
     const SECOND: i64 = 1_000_000_000;
 
     fn span(from: i64, to: i64) -> Span {
-        Span {
-            start: Stamp(from * SECOND),
-            end: Stamp(to * SECOND),
-        }
+        Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
     }
 
     fn told(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {

@@ -89,10 +89,10 @@ impl<'a> Timeline<'a> {
         )]
         let most = (plot.w / NARROWEST).max(1.0) as usize;
         let per_bar = view.frames.len().div_ceil(most).max(1);
-        let span = Span {
-            start: view.frames.first().map_or(Stamp(0), |f| f.span.start),
-            end: view.frames.last().map_or(Stamp(1), |f| f.span.end),
-        };
+        let span = Span::new(
+            view.frames.first().map_or(Stamp(0), |f| f.span.start),
+            view.frames.last().map_or(Stamp(1), |f| f.span.end),
+        );
         let starts = view.frames.iter().step_by(per_bar).map(|f| f.span.start);
         let ends = starts.skip(1).chain([span.end]);
         let bars = view.frames.chunks(per_bar).zip(ends);
@@ -255,7 +255,7 @@ impl TimelineBar {
         let messages: u64 = frames.iter().fold(0, |n, f| n.saturating_add(f.messages));
         let nanos: f64 = frames.iter().map(|f| f.span.nanos() as f64).sum();
         Some(Self {
-            span: Span { start, end },
+            span: Span::new(start, end),
             rate: messages as f64 * 1e9 / nanos.max(1.0),
         })
     }

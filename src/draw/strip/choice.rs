@@ -108,13 +108,7 @@ mod tests {
                 nodes_added: *nodes_added,
                 ..Counts::default()
             },
-            ..Frame::empty(
-                10 + place,
-                Span {
-                    start: Stamp(0),
-                    end: Stamp(1),
-                },
-            )
+            ..Frame::empty(10 + place, Span::new(Stamp(0), Stamp(1)))
         };
         View {
             frames: added.iter().enumerate().map(frame).collect(),

@@ -30,10 +30,7 @@ impl Closed {
             if let (Claim::Lists(node, _) | Claim::Publish(node, _), Some((first, last)), true) =
                 (fact.claim, known.facts.times.bounds(fact.times), listed)
             {
-                let span = heard.entry(node).or_insert(Span {
-                    start: first,
-                    end: last,
-                });
+                let span = heard.entry(node).or_insert(Span::new(first, last));
                 span.start = span.start.min(first);
                 span.end = span.end.max(last);
             }

@@ -45,7 +45,7 @@ pub(crate) fn read(
         topic: of,
         publisher: from,
         subscriber: to,
-        span: Span { start, end },
+        span: Span::new(start, end),
         count: count(delivered).unwrap_or(0),
         drops: count(dropped),
         bytes: count(traffic),

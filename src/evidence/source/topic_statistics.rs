@@ -57,10 +57,7 @@ pub(crate) fn read(
                 publisher: None,
                 subscriber: Some(name),
                 // The collector reports once a second.
-                span: Span {
-                    start: Stamp(0),
-                    end: Stamp(1_000_000_000),
-                },
+                span: Span::new(Stamp(0), Stamp(1_000_000_000)),
                 count: u64::try_from(count).unwrap_or(0),
                 drops: None,
                 bytes: None,

@@ -70,10 +70,10 @@ impl StateRun {
 
     fn span(&self, mission: &Mission) -> Span {
         let at = |place: usize| mission.windows.get(place).map(|w| w.span);
-        Span {
-            start: at(self.first).map_or(Stamp(0), |span| span.start),
-            end: at(self.last).map_or(Stamp(0), |span| span.end),
-        }
+        Span::new(
+            at(self.first).map_or(Stamp(0), |span| span.start),
+            at(self.last).map_or(Stamp(0), |span| span.end),
+        )
     }
 
     /// The number of its messages, and their number per second; unknown where windows overlap and count messages twice.

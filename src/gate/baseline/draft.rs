@@ -494,10 +494,7 @@ mod tests {
     fn rates(counts: &[u64]) -> Vec<Rate> {
         let rate = |(window, count): (usize, &u64)| Rate {
             window,
-            span: Span {
-                start: Stamp(0),
-                end: Stamp(10_000_000_000),
-            },
+            span: Span::new(Stamp(0), Stamp(10_000_000_000)),
             count: *count,
             median_s: None,
         };

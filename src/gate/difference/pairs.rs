@@ -79,10 +79,8 @@ pub(crate) fn pairs(
 
 /// The row of a track, its times counted from `start`, and its highest rate drawn as `share` of all.
 fn line(label: &str, what: Element, track: Option<&Track>, start: Stamp, share: f64) -> LifeLine {
-    let moved = |span: Span| Span {
-        start: Stamp(span.start.since(start)),
-        end: Stamp(span.end.since(start)),
-    };
+    let moved =
+        |span: Span| Span::new(Stamp(span.start.since(start)), Stamp(span.end.since(start)));
     let lives = track.iter().flat_map(|t| &t.lives).map(|life| TrackLife {
         span: moved(life.span),
         ..*life

@@ -105,10 +105,7 @@ pub(crate) fn union(
     let (a, b) = (MissionSide::of(first), MissionSide::of(second));
     let elements = elements(&a, &b);
     let at = Stamp(SECOND);
-    let span = |from: i64| Span {
-        start: Stamp(from),
-        end: Stamp(from + SECOND),
-    };
+    let span = |from: i64| Span::new(Stamp(from), Stamp(from + SECOND));
     let window = |index: usize, span: Span, seen: &MissionSide| Window {
         index,
         span,
@@ -129,10 +126,10 @@ pub(crate) fn union(
         .iter()
         .map(|(span, seen)| (*span, graph(&elements, seen)));
     let graphs = graphs.collect();
-    let whole = Span {
-        start: windows.first().map_or(at, |w| w.span.start),
-        end: Stamp(2 * SECOND),
-    };
+    let whole = Span::new(
+        windows.first().map_or(at, |w| w.span.start),
+        Stamp(2 * SECOND),
+    );
     let nodes = (0..)
         .zip(&elements.nodes)
         .map(|(id, n)| (n.name.as_str(), id));

@@ -53,10 +53,7 @@ impl<'a> Facts<'a> {
         let stretches = of.flat_map(|sender| &sender.stretches);
         let first = stretches.clone().map(|s| s.first).min()?;
         let last = stretches.map(|s| s.last).max()?;
-        Some(Span {
-            start: first,
-            end: last.plus(1),
-        })
+        Some(Span::new(first, last.plus(1)))
     }
 
     /// The windows in which a topic is, each with its row of the graph.
@@ -167,10 +164,7 @@ impl<'a> Facts<'a> {
         all.extend(self.pauses(topic).filter_map(|gap| clipped(gap, during)));
         let whole = self.mission.span;
         if let (Some(heard), false) = (self.heard(topic), may_end) {
-            let span = Span {
-                start: heard.end.plus(-1),
-                end: whole.end,
-            };
+            let span = Span::new(heard.end.plus(-1), whole.end);
             // Where it does not end with the robot.
             if span.nanos() > CLOSING_NS {
                 all.extend(clipped(span, during));
@@ -188,10 +182,7 @@ impl<'a> Facts<'a> {
 
 /// The part of a window from a topic's first message on; `None` if that is less than half of it.
 fn begun(window: Span, first: Stamp) -> Option<Span> {
-    let span = Span {
-        start: first.max(window.start),
-        end: window.end,
-    };
+    let span = Span::new(first.max(window.start), window.end);
     (span.nanos() >= window.nanos() / 2).then_some(span)
 }
 
@@ -206,10 +197,7 @@ pub(crate) struct TopicSilence {
 
 /// The part of a silence that lies in a stretch of time.
 fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
-    let span = Span {
-        start: gap.start.max(during.start),
-        end: gap.end.min(during.end),
-    };
+    let span = Span::new(gap.start.max(during.start), gap.end.min(during.end));
     let nanos = span.end.since(span.start);
     (nanos > 0).then_some(TopicSilence { span, nanos })
 }

@@ -220,18 +220,12 @@ impl Judge<'_> {
         );
         let mut finding = finding
             .saw(format!("ended at {clock}"), expected)
-            .at(Span {
-                start: end,
-                end: whole.end,
-            })
+            .at(Span::new(end, whole.end))
             .detail(format!(
                 "{} before the end of the mission",
                 words::duration(whole.end.since(end))
             ));
-        let around = Span {
-            start: end.plus(-CLOSING_NS),
-            end: end.plus(CLOSING_NS),
-        };
+        let around = Span::new(end.plus(-CLOSING_NS), end.plus(CLOSING_NS));
         finding.cause = self.facts.cause(&nodes.iter().copied().collect(), around);
         Some(finding)
     }
@@ -260,10 +254,11 @@ impl Judge<'_> {
             }
             let says = format!("{role} appeared at {clock}, expected {expected}");
             let finding = Finding::new(FindingKind::NodeLate, role, at, says);
-            Some(finding.saw(format!("at {clock}"), &expected).at(Span {
-                start: whole.start,
-                end: began.time,
-            }))
+            Some(
+                finding
+                    .saw(format!("at {clock}"), &expected)
+                    .at(Span::new(whole.start, began.time)),
+            )
         });
         late.collect()
     }
@@ -292,10 +287,7 @@ impl Judge<'_> {
                     time: Some(first.time),
                     text: format!("{role} restarted at {}", self.facts.clock(first.time)),
                 });
-                finding.when = Some(Span {
-                    start: first.time,
-                    end: first.until.unwrap_or(first.time),
-                });
+                finding.when = Some(Span::new(first.time, first.until.unwrap_or(first.time)));
             }
             Some(finding)
         });

@@ -42,10 +42,10 @@ impl Judge<'_> {
             let name = topic.or(node).unwrap_or_default();
             let mut found = Finding::new(finding, name, self.expectation.policy.at, says);
             found.severity = severity;
-            found.at(Span {
-                start: entry.time,
-                end: entry.until.unwrap_or(entry.time).plus(1),
-            })
+            found.at(Span::new(
+                entry.time,
+                entry.until.unwrap_or(entry.time).plus(1),
+            ))
         });
         found.collect()
     }

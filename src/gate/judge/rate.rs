@@ -73,10 +73,7 @@ impl Judge<'_> {
         };
         let name = self.facts.topic(topic);
         let hz = words::rate(mean);
-        let span = Span {
-            start: first.span.start,
-            end: last.span.end,
-        };
+        let span = Span::new(first.span.start, last.span.end);
         let says = format!("{name} at {hz} from first to last message, expected {range}");
         let finding = Finding::new(kind, name, at, says)
             .saw(&hz, words::rate_range(range.from, range.to))
@@ -103,10 +100,7 @@ impl Judge<'_> {
         let expected = format!("within {}", self.facts.stretch(allowed));
         let says = format!("{name} began at {clock}, expected {expected}");
         let finding = Finding::new(FindingKind::TopicLate, name, at, says);
-        let span = Span {
-            start: whole.start,
-            end: heard.start,
-        };
+        let span = Span::new(whole.start, heard.start);
         let mut finding = finding.saw(format!("at {clock}"), expected).at(span);
         finding.details.extend(Self::senders(facts));
         vec![finding]
@@ -127,16 +121,10 @@ impl Judge<'_> {
         let clock = self.facts.clock(heard.end);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let says = format!("{name} ended at {clock}, expected {expected}");
-        let around = Span {
-            start: heard.end.plus(-CLOSING_NS),
-            end: heard.end.plus(CLOSING_NS),
-        };
+        let around = Span::new(heard.end.plus(-CLOSING_NS), heard.end.plus(CLOSING_NS));
         let mut finding = Finding::new(FindingKind::TopicGone, name, at, says)
             .saw(format!("ended at {clock}"), expected)
-            .at(Span {
-                start: heard.end,
-                end: whole.end,
-            });
+            .at(Span::new(heard.end, whole.end));
         finding.details.extend(Self::senders(facts));
         finding.cause = self.facts.cause_for_topic(topic, around);
         vec![finding]
@@ -205,10 +193,7 @@ impl Judge<'_> {
     ) -> Option<Finding> {
         let (first, last) = (bad.first()?, bad.last()?);
         let name = self.facts.topic(topic);
-        let span = Span {
-            start: first.span.start,
-            end: last.span.end,
-        };
+        let span = Span::new(first.span.start, last.span.end);
         let count: u64 = bad.iter().map(|r| r.count).sum();
         let nanos: i64 = bad.iter().map(|r| r.span.nanos()).sum();
         let hz = words::rate(count as f64 / (nanos.max(1) as f64 / 1e9));
@@ -232,10 +217,10 @@ impl Judge<'_> {
             .saw(hz, words::rate_range(range.from, range.to))
             .at(span)
             .detail(detail);
-        let around = Span {
-            start: first.span.start.plus(-first.span.nanos() / 2),
-            end: first.span.end,
-        };
+        let around = Span::new(
+            first.span.start.plus(-first.span.nanos() / 2),
+            first.span.end,
+        );
         finding.cause = self.facts.cause_for_topic(topic, around);
         Some(finding)
     }

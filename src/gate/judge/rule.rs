@@ -158,10 +158,7 @@ impl Judge<'_> {
         let seen = format!("{other} at {}, {one} at {}", at(began), at(earlier));
         Finding::new(FindingKind::OrderBroken, other, second.at, says)
             .saw(seen, order_of(names))
-            .at(Span {
-                start: began.time,
-                end: earlier.time,
-            })
+            .at(Span::new(began.time, earlier.time))
     }
 
     fn reaction(&self, rule: &Rule, when: &Event, expect: &Event, within: i64) -> Vec<Finding> {
@@ -211,10 +208,7 @@ impl Judge<'_> {
         let says = format!("{what} at {clock}, and {expected} did not follow");
         let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, says)
             .saw("nothing", expected)
-            .at(Span {
-                start: cause.time,
-                end: cause.latest.plus(within),
-            });
+            .at(Span::new(cause.time, cause.latest.plus(within)));
         let after = self
             .entries(expect)
             .into_iter()

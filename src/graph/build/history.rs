@@ -408,10 +408,7 @@ impl Assembly<'_> {
 
 /// The intervals in which an element exists, half-open.
 fn spans(track: &Liveness) -> Vec<Span> {
-    let span = |life: &Lifetime| Span {
-        start: life.from,
-        end: life.to.plus(1),
-    };
+    let span = |life: &Lifetime| Span::new(life.from, life.to.plus(1));
     track.lives.iter().map(span).collect()
 }
 

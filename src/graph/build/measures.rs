@@ -85,10 +85,7 @@ impl WindowMeasures {
         let whole = of.span.nanos().max(1) as f64;
         for at in windows.over(of.span.start, of.span.end.plus(-1)) {
             let window = windows.0[at];
-            let shared = Span {
-                start: of.span.start.max(window.start),
-                end: of.span.end.min(window.end),
-            };
+            let shared = Span::new(of.span.start.max(window.start), of.span.end.min(window.end));
             let share = shared.nanos().max(0) as f64 / whole;
             for what in ends.into_iter().flatten().chain([Element::Topic(topic)]) {
                 self.0.entry((what, at)).or_default().take(of, share);

@@ -171,10 +171,7 @@ fn gaps(voices: &[&Voice<'_>]) -> Vec<Span> {
     let pairs = steady.flat_map(|voice| voice.stretches.windows(2));
     let apart = pairs.filter(|pair| !pair[1].is_joined);
     let mut gaps: Vec<Span> = apart
-        .map(|pair| Span {
-            start: pair[0].last,
-            end: pair[1].first,
-        })
+        .map(|pair| Span::new(pair[0].last, pair[1].first))
         .collect();
     gaps.sort_unstable_by_key(|gap| (gap.start, gap.end));
     gaps
@@ -184,10 +181,7 @@ fn gaps(voices: &[&Voice<'_>]) -> Vec<Span> {
 fn pause(voices: &[&Voice<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
     let (mut should, mut silent) = (0, 0);
     let mut nodes: BTreeSet<Option<Name>> = BTreeSet::new();
-    let mut found = Span {
-        start: Stamp::MIN,
-        end: Stamp::MAX,
-    };
+    let mut found = Span::new(Stamp::MIN, Stamp::MAX);
     for voice in voices {
         let Some(stretch) = voice.sending(gap.start, gap.nanos()) else {
             should += u64::from(voice.begins_in(gap));
@@ -219,10 +213,7 @@ fn pause(voices: &[&Voice<'_>], restarts: &Restarts, gap: Span) -> Option<Span> 
 /// Whether most of a silence lies in pauses of the recording.
 pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool {
     let Some(to) = to else { return false };
-    let silence = Span {
-        start: from,
-        end: to,
-    };
+    let silence = Span::new(from, to);
     let shared = pauses.iter().map(|pause| pause.shared(silence).max(0));
     shared.sum::<i64>() > silence.nanos() / 2
 }
@@ -232,10 +223,9 @@ impl Sender {
     pub(crate) fn within<'a>(senders: impl Iterator<Item = &'a Self>, lives: &[Span]) -> Vec<Span> {
         let end = senders.map(|sender| sender.recording.1).max();
         let end = end.map_or(Stamp::MAX, |end| end.plus(1));
-        let clipped = lives.iter().map(|life| Span {
-            start: life.start,
-            end: life.end.min(end),
-        });
+        let clipped = lives
+            .iter()
+            .map(|life| Span::new(life.start, life.end.min(end)));
         clipped.collect()
     }
 }

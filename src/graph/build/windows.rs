@@ -47,10 +47,7 @@ mod tests {
     use super::*;
 
     fn spans(list: &[(i64, i64)]) -> Vec<Span> {
-        let span = |(a, b): &(i64, i64)| Span {
-            start: Stamp(*a),
-            end: Stamp(*b),
-        };
+        let span = |(a, b): &(i64, i64)| Span::new(Stamp(*a), Stamp(*b));
         list.iter().map(span).collect()
     }
 

@@ -130,7 +130,7 @@ proptest! {
         let mut graphs: Vec<(Span, Graph)> = Vec::new();
         for (graph, times, length) in list {
             for _ in 0..times {
-                graphs.push((Span { start: at, end: at.plus(length) }, graph.clone()));
+                graphs.push((Span::new(at, at.plus(length)), graph.clone()));
                 at = at.plus(length);
             }
         }
@@ -161,10 +161,7 @@ proptest! {
 
 #[test]
 fn what_stays_the_same_takes_no_room() {
-    let second = |n: i64| Span {
-        start: Stamp(n * 1_000_000_000),
-        end: Stamp((n + 1) * 1_000_000_000),
-    };
+    let second = |n: i64| Span::new(Stamp(n * 1_000_000_000), Stamp((n + 1) * 1_000_000_000));
     let topic = TopicState {
         id: 0,
         state: State::Active,
@@ -197,10 +194,7 @@ fn very_many_elements_take_only_their_own_room() {
         nodes: (0..1000).map(node).collect(),
         ..Graph::default()
     };
-    let span = Span {
-        start: Stamp(0),
-        end: Stamp(1),
-    };
+    let span = Span::new(Stamp(0), Stamp(1));
     let all: Graphs = [(span, graph)].into_iter().collect();
     assert_eq!(all.nodes.capacity(), 1000);
 }

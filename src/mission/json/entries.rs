@@ -149,10 +149,7 @@ impl From<&Phase> for PhaseRow {
 /// The phases of rows that were read; a reference to a later phase as the same one is dropped.
 pub(crate) fn phases(rows: Vec<PhaseRow>) -> Vec<Phase> {
     let phase = |(at, row): (u32, PhaseRow)| Phase {
-        span: Span {
-            start: Stamp(row.start_ns),
-            end: Stamp(row.end_ns.max(row.start_ns)),
-        },
+        span: Span::new(Stamp(row.start_ns), Stamp(row.end_ns.max(row.start_ns))),
         name: row.name.into(),
         nodes_added: row.nodes_added,
         nodes_removed: row.nodes_removed,

@@ -197,10 +197,7 @@ impl RawState {
 }
 
 fn spans(raw: &[[i64; 2]]) -> Vec<Span> {
-    let span = |[start, end]: &[i64; 2]| Span {
-        start: Stamp(*start),
-        end: Stamp(*end.max(start)),
-    };
+    let span = |[start, end]: &[i64; 2]| Span::new(Stamp(*start), Stamp(*end.max(start)));
     raw.iter().map(span).collect()
 }
 

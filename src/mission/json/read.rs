@@ -61,10 +61,7 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
     let spans: Vec<Span> = raw
         .windows
         .iter()
-        .map(|w| Span {
-            start: Stamp(w.start_ns),
-            end: Stamp(w.end_ns),
-        })
+        .map(|w| Span::new(Stamp(w.start_ns), Stamp(w.end_ns)))
         .collect();
     for (index, span) in spans.iter().enumerate() {
         if span.start >= span.end {
@@ -80,10 +77,7 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
 /// The mission of windows made elsewhere, each with its full graph; changes are left for [`Mission::find_changes`].
 /// There is at least one window, and they are in order of time.
 pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
-    let span = |w: &RawWindow| Span {
-        start: Stamp(w.start_ns),
-        end: Stamp(w.end_ns),
-    };
+    let span = |w: &RawWindow| Span::new(Stamp(w.start_ns), Stamp(w.end_ns));
     let spans: Vec<Span> = raw.windows.iter().map(span).collect();
     build(raw, &spans)
 }
@@ -101,10 +95,10 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
     let (elements, places) = names.elements();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
-    let span = Span {
-        start: raw.start_ns.map_or(start, Stamp).min(start),
-        end: raw.end_ns.map_or(end, Stamp).max(end),
-    };
+    let span = Span::new(
+        raw.start_ns.map_or(start, Stamp).min(start),
+        raw.end_ns.map_or(end, Stamp).max(end),
+    );
     let longest = spans.iter().map(Span::nanos).max().unwrap_or(1);
     let fallback = || Period::from_nanos(longest.max(1));
     let period = raw

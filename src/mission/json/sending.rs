@@ -123,10 +123,10 @@ impl RawSending {
         for raw in self.pauses {
             if let Some(topic) = ids.topic(&raw.topic) {
                 pauses.resize(ids.topics(), Vec::new());
-                let spans = raw.spans.into_iter().map(|[start, end]| Span {
-                    start: Stamp(start),
-                    end: Stamp(end.max(start)),
-                });
+                let spans = raw
+                    .spans
+                    .into_iter()
+                    .map(|[start, end]| Span::new(Stamp(start), Stamp(end.max(start))));
                 pauses[topic as usize] = spans.collect();
             }
         }

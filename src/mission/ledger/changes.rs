@@ -21,10 +21,7 @@ pub(crate) fn explain(
         let mut list = Vec::new();
         if let Some((old_span, old)) = &before {
             structure(old, &graph, span, elements, &turns, &mut list);
-            let news = Span {
-                start: old_span.end.max(span.start),
-                end: span.end,
-            };
+            let news = Span::new(old_span.end.max(span.start), span.end);
             list.extend(values(ledger, news));
         }
         all.push(list.into_iter().unzip());

@@ -22,10 +22,7 @@ mod tests {
 
     /// The number of cells and the length of the first in seconds, for a span of this many seconds.
     fn cells(seconds: i64) -> (usize, i64) {
-        let cells = grid(Span {
-            start: Stamp(5),
-            end: Stamp(5 + seconds * SECOND),
-        });
+        let cells = grid(Span::new(Stamp(5), Stamp(5 + seconds * SECOND)));
         (cells.len(), cells[0].nanos() / SECOND)
     }
 

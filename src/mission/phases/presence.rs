@@ -100,10 +100,7 @@ pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> 
 
 /// The times in which a topic carries messages, or a publication that has sent any: while it lives, but for silences.
 fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
-    let stretch = |s: &Stretch| Span {
-        start: s.first,
-        end: s.last.plus(1),
-    };
+    let stretch = |s: &Stretch| Span::new(s.first, s.last.plus(1));
     let Element::Publish(_) = what else {
         let topic = elements.ends(what).1;
         let senders = topic.map_or(&[][..], |topic| sending.of_topic(topic));
@@ -123,16 +120,10 @@ fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
         let mut start = life.start;
         let silent = silences(&sender.stretches, &[*life]);
         for (from, to) in silent.into_iter().filter(|_| !sender.is_latched) {
-            times.push(Span {
-                start,
-                end: from.plus(1),
-            });
+            times.push(Span::new(start, from.plus(1)));
             start = to.unwrap_or(life.end);
         }
-        times.push(Span {
-            start,
-            end: life.end,
-        });
+        times.push(Span::new(start, life.end));
     }
     times.retain(|time| time.start < time.end);
     times
@@ -193,10 +184,7 @@ pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
         }
         let edges = known_on.get(&sender.topic).map_or(&[][..], Vec::as_slice);
         for stretch in &sender.stretches {
-            let span = Span {
-                start: stretch.first,
-                end: stretch.last.plus(1),
-            };
+            let span = Span::new(stretch.first, stretch.last.plus(1));
             let lives = |edge: &&Edge| edge.runs.iter().any(|life| life.shared(span) > 0);
             all = all.saturating_add(stretch.count);
             if edges.iter().any(lives) {
@@ -233,10 +221,7 @@ mod tests {
 
     #[test]
     fn short_absences_inside_a_life_are_filled() {
-        let span = |start: i64, end: i64| Span {
-            start: Stamp(start),
-            end: Stamp(end),
-        };
+        let span = |start: i64, end: i64| Span::new(Stamp(start), Stamp(end));
         let presence = Presence {
             subject: PresentThing::Node(Arc::from("/n")),
             spans: Span::joined(vec![span(10, 20), span(40, 50), span(80, 90)], 20),

@@ -39,10 +39,7 @@ pub(crate) fn joined(
     for run in ways.chunk_by(|a, b| a.is_some() && a == b) {
         let end = at + run.len();
         if run[0].is_some() && run.len() >= FEWEST {
-            out.push(Span {
-                start: spans[at].start,
-                end: spans[end - 1].end,
-            });
+            out.push(Span::new(spans[at].start, spans[end - 1].end));
             kept.push(found[end - 1].clone());
             ramps.push(true);
         } else {
@@ -66,10 +63,7 @@ mod tests {
     fn lengths(phases: &[(usize, i64)]) -> Vec<(i64, bool)> {
         let mut start = Stamp(0);
         let span = |(_, length): &(usize, i64)| {
-            let span = Span {
-                start,
-                end: start.plus(*length),
-            };
+            let span = Span::new(start, start.plus(*length));
             start = span.end;
             span
         };

@@ -356,7 +356,7 @@ impl Sink for BagTally {
         self.messages += stamps.len() as u64;
         for at in stamps {
             let end = at.plus(1);
-            let span = self.span.get_or_insert(Span { start: *at, end });
+            let span = self.span.get_or_insert(Span::new(*at, end));
             span.start = span.start.min(*at);
             span.end = span.end.max(end);
         }

@@ -41,10 +41,10 @@ pub fn finish(counts: impl IntoIterator<Item = Count>) -> Result<Mission> {
                 .nanos()
                 .saturating_mul(i64::try_from(at).unwrap_or(0)),
         );
-        let whole = Span {
-            start: begins.max(span.start),
-            end: begins.plus(period.nanos()).min(span.end),
-        };
+        let whole = Span::new(
+            begins.max(span.start),
+            begins.plus(period.nanos()).min(span.end),
+        );
         window(at, whole, period, sums, &lives)
     });
     let mission = mission_of(Raw {
@@ -95,10 +95,10 @@ fn span(counts: &[Count], period: Period) -> Span {
         let end = c.start.plus(period.nanos());
         c.last.map_or(end, |last| last.plus(1))
     };
-    Span {
-        start: first.unwrap_or_default(),
-        end: counts.iter().map(last).max().unwrap_or_default(),
-    }
+    Span::new(
+        first.unwrap_or_default(),
+        counts.iter().map(last).max().unwrap_or_default(),
+    )
 }
 
 fn bags(counts: &[Count]) -> Vec<RawBag> {

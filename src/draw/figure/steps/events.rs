@@ -23,10 +23,7 @@ impl StepSource<'_> {
             let span = self.sheet.source.phases[k].span;
             span.start.plus(span.nanos() / 2)
         };
-        Span {
-            start: middle(k - 1),
-            end: middle(k),
-        }
+        Span::new(middle(k - 1), middle(k))
     }
 
     /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
@@ -36,10 +33,10 @@ impl StepSource<'_> {
             Sign::Start => (before, after),
             Sign::End | Sign::Dot => (after, before),
         };
-        let around = Span {
-            start: self.sheet.source.phases[k - 1].span.start,
-            end: self.sheet.source.phases[k].span.end,
-        };
+        let around = Span::new(
+            self.sheet.source.phases[k - 1].span.start,
+            self.sheet.source.phases[k].span.end,
+        );
         let events = |track: usize| -> Vec<EntryId> {
             let own = self.marks.signs.iter().filter(|s| s.track == track);
             let own = own.filter(|s| s.sign == sign && around.contains(s.at));

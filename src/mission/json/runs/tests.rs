@@ -16,10 +16,7 @@ fn elements() -> Elements {
         evidence: Evidence::of("connection"),
         first: Some(Stamp(3)),
         last: None,
-        runs: vec![Span {
-            start: Stamp(3),
-            end: Stamp(9),
-        }],
+        runs: vec![Span::new(Stamp(3), Stamp(9))],
     };
     let topic = |name: &str| Topic {
         name: name.into(),
@@ -52,7 +49,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
     let windows = graphs.into_iter().map(|(graph, length)| {
         let start = at;
         at = at.plus(length);
-        (Span { start, end: at }, graph)
+        (Span::new(start, at), graph)
     });
     let windows: Vec<(Span, Graph)> = windows.collect();
     let one = Period::from_nanos(1).unwrap();
@@ -67,10 +64,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
     let list = windows.iter().enumerate().map(window).collect();
     Mission {
         bags: Vec::new(),
-        span: Span {
-            start: Stamp(0),
-            end: at,
-        },
+        span: Span::new(Stamp(0), at),
         messages: 7,
         period: one,
         step: one,
