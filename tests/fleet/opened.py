@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,8 +27,10 @@ def arrow(path):
     """Its rows by the Parquet reader of Arrow (C++); times as whole nanoseconds."""
     table = pq.read_table(path)
     for at, field in enumerate(table.schema):
-        if str(field.type).startswith("timestamp"):
-            table = table.set_column(at, field.name, table.column(at).cast("int64"))
+        if pa.types.is_timestamp(field.type):
+            table = table.set_column(at, field.name, table.column(at).cast(pa.int64()))
+        elif pa.types.is_list(field.type) and pa.types.is_timestamp(field.type.value_type):
+            table = table.set_column(at, field.name, table.column(at).cast(pa.list_(pa.int64())))
     return rows(table.to_pydict())
 
 
@@ -36,10 +39,15 @@ def duckdb(path):
 
     # Its own reader of the file; a time would be cut to microseconds in Python, so as nanoseconds.
     relation = duckdb.sql(f"FROM read_parquet('{path}')")
-    cells = [
-        f'epoch_ns("{name}") AS "{name}"' if "TIMESTAMP" in str(kind) else f'"{name}"'
-        for name, kind in zip(relation.columns, relation.types)
-    ]
+
+    def cell(name, kind):
+        if "TIMESTAMP" not in kind:
+            return f'"{name}"'
+        if kind.endswith("[]"):
+            return f'list_transform("{name}", lambda time: epoch_ns(time)) AS "{name}"'
+        return f'epoch_ns("{name}") AS "{name}"'
+
+    cells = [cell(name, str(kind)) for name, kind in zip(relation.columns, relation.types)]
     return rows(relation.project(", ".join(cells)).to_arrow_table().to_pydict())
 
 
@@ -47,8 +55,13 @@ def polars(path):
     import polars
 
     frame = polars.read_parquet(path, use_pyarrow=False)
-    times = [name for name, kind in frame.schema.items() if isinstance(kind, polars.Datetime)]
-    return rows(frame.with_columns(polars.col(times).cast(polars.Int64) if times else []).to_dict(as_series=False))
+    casts = []
+    for name, kind in frame.schema.items():
+        if isinstance(kind, polars.Datetime):
+            casts.append(polars.col(name).cast(polars.Int64))
+        elif isinstance(kind, polars.List) and isinstance(kind.inner, polars.Datetime):
+            casts.append(polars.col(name).cast(polars.List(polars.Int64)))
+    return rows(frame.with_columns(casts).to_dict(as_series=False))
 
 
 def pandas(path):
