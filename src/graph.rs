@@ -12,6 +12,8 @@ pub mod window;
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
@@ -35,7 +37,7 @@ pub type TopicId = u32;
 pub type EdgeId = u32;
 
 /// A node, over the whole mission.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Node {
     /// The name as recorded.
     pub name: NodeName,
@@ -65,7 +67,7 @@ impl Node {
 }
 
 /// A topic, over the whole mission.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topic {
     /// The name as recorded.
     pub name: TopicName,
@@ -94,7 +96,7 @@ impl Topic {
 }
 
 /// A publication or a subscription, over the whole mission.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edge {
     /// The node that publishes or subscribes.
     pub node: NodeId,
@@ -168,14 +170,17 @@ pub struct NodeState {
 }
 
 /// What is known of the messages of a topic, or over an edge, in one window besides their number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Measures {
     /// The number of messages that a subscriber lost, as statistics of the middleware count them.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub drops: Option<u64>,
     /// The standard deviation of the time between messages in seconds; `None` with fewer than three messages.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter_s: Option<f64>,
     /// The mean time from a message's header stamp to its recording, or to its arrival where statistics say so, in
     /// seconds; negative where clocks differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,
 }
 
@@ -366,6 +371,22 @@ impl Elements {
             node.map(|node| node.name.as_str()),
             topic.map(|topic| topic.name.as_str()),
         )
+    }
+
+    /// The node of this name.
+    pub fn node(&self, name: &str) -> Option<NodeId> {
+        let at = self
+            .nodes
+            .binary_search_by(|node| node.name.as_str().cmp(name));
+        NodeId::try_from(at.ok()?).ok()
+    }
+
+    /// The topic of this name.
+    pub fn topic(&self, name: &str) -> Option<TopicId> {
+        let at = self
+            .topics
+            .binary_search_by(|topic| topic.name.as_str().cmp(name));
+        TopicId::try_from(at.ok()?).ok()
     }
 
     /// The publication of a topic by a node.

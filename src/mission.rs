@@ -12,6 +12,8 @@ pub use json::read::read_json;
 pub(crate) use json::write::Json;
 pub use json::write::{JsonForm, write_json};
 
+use serde::{Deserialize, Serialize};
+
 use crate::bag::Report;
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
@@ -75,7 +77,8 @@ pub struct Mission {
 }
 
 /// The places of a drawing, in pixels at scale 1, y down.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(default)]
 pub struct Places {
     /// The width of the whole drawing.
     pub width: f64,
@@ -88,13 +91,14 @@ pub struct Places {
 }
 
 /// The place of one node or topic.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Place {
     /// The kind of element, `node` or `topic`.
     pub what: String,
     /// The full name.
     pub name: String,
     /// The box.
+    #[serde(flatten)]
     pub rect: Rect,
 }
 

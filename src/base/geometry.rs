@@ -1,5 +1,7 @@
 //! Points, sizes and rectangles in pixels at scale 1, x to the right, y down.
 
+use serde::{Deserialize, Serialize};
+
 /// A point, or a vector between two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
@@ -33,7 +35,7 @@ impl Size {
 }
 
 /// An upright rectangle by its top left corner and its size.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Rect {
     /// The left edge.
     pub x: f64,

@@ -206,42 +206,36 @@ impl GraphsWriter {
             .as_ref()
             .map_or(0, |word| self.lifecycle(word));
         let row = Row::of_node(state, self.spans[at], lifecycle);
-        self.node_row(state.id, at, row);
+        self.row(Element::Node(state.id), at, row);
     }
 
     /// Adds the state of a topic.
     pub(crate) fn topic(&mut self, at: usize, state: &TopicState) {
-        self.topic_row(state.id, at, Row::of_topic(state, self.spans[at]));
+        let row = Row::of_topic(state, self.spans[at]);
+        self.row(Element::Topic(state.id), at, row);
     }
 
     /// Adds the state of a publication.
     pub(crate) fn publish(&mut self, at: usize, state: &EdgeState) {
-        self.publish_row(state.id, at, Row::of_edge(state, self.spans[at]));
+        let row = Row::of_edge(state, self.spans[at]);
+        self.row(Element::Publish(state.id), at, row);
     }
 
     /// Adds the state of a subscription.
     pub(crate) fn subscribe(&mut self, at: usize, state: &EdgeState) {
-        self.subscribe_row(state.id, at, Row::of_edge(state, self.spans[at]));
+        let row = Row::of_edge(state, self.spans[at]);
+        self.row(Element::Subscribe(state.id), at, row);
     }
 
-    /// Adds the row of a node in the window at a place.
-    pub(crate) fn node_row(&mut self, id: u32, at: usize, row: Row) {
-        column(&mut self.nodes, id).push(at, row);
-    }
-
-    /// Adds the row of a topic.
-    pub(crate) fn topic_row(&mut self, id: u32, at: usize, row: Row) {
-        column(&mut self.topics, id).push(at, row);
-    }
-
-    /// Adds the row of a publication.
-    pub(crate) fn publish_row(&mut self, id: u32, at: usize, row: Row) {
-        column(&mut self.publishes, id).push(at, row);
-    }
-
-    /// Adds the row of a subscription.
-    pub(crate) fn subscribe_row(&mut self, id: u32, at: usize, row: Row) {
-        column(&mut self.subscribes, id).push(at, row);
+    /// Adds the row of an element in the window at a place.
+    pub(crate) fn row(&mut self, what: Element, at: usize, row: Row) {
+        let (columns, id) = match what {
+            Element::Node(id) => (&mut self.nodes, id),
+            Element::Topic(id) => (&mut self.topics, id),
+            Element::Publish(id) => (&mut self.publishes, id),
+            Element::Subscribe(id) => (&mut self.subscribes, id),
+        };
+        column(columns, id).push(at, row);
     }
 
     /// The number of a lifecycle state in rows.

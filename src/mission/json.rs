@@ -1,12 +1,12 @@
 //! A mission as JSON, written as a stream and read back.
 
 pub(crate) mod changes;
+pub(crate) mod elements;
 pub(crate) mod entries;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod raw;
 pub(crate) mod read;
-pub(crate) mod rows;
 pub(crate) mod runs;
 mod sending;
 pub(crate) mod write;

@@ -2,43 +2,19 @@
 
 use serde::Serialize;
 
-use super::rows::nanos;
+use super::elements::Text;
+use super::entries::ElementName;
 use crate::base::time::Stamp;
 use crate::graph::diff::Change;
-use crate::graph::{Element, Elements};
+use crate::graph::{Element, Elements, NodeId};
 use crate::mission::EntryId;
-
-/// An element by its name, or an edge by its two names.
-#[derive(Serialize)]
-pub(crate) struct RawElementName<'a> {
-    what: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    name: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    node: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    topic: Option<&'a str>,
-}
-
-impl<'a> RawElementName<'a> {
-    pub(crate) fn new(what: Element, elements: &'a Elements) -> Self {
-        let (node, topic) = elements.names(what);
-        let is_edge = node.is_some() && topic.is_some();
-        Self {
-            what: what.word(),
-            name: node.or(topic).filter(|_| !is_edge),
-            node: node.filter(|_| is_edge),
-            topic: topic.filter(|_| is_edge),
-        }
-    }
-}
 
 #[derive(Serialize)]
 pub(crate) struct ChangeRow<'a> {
     kind: &'static str,
     entry: EntryId,
     #[serde(flatten)]
-    named: RawElementName<'a>,
+    named: ElementName<'a>,
     #[serde(flatten)]
     rest: ChangeValues<'a>,
 }
@@ -58,21 +34,16 @@ enum ChangeValues<'a> {
         to: Vec<&'a str>,
     },
     Value {
-        from: String,
-        to: String,
+        from: Text<'a>,
+        to: Text<'a>,
     },
 }
 
 impl<'a> ChangeRow<'a> {
-    pub(crate) fn new(change: &Change, entry: EntryId, elements: &'a Elements) -> Self {
-        let names = |nodes: &[u32]| {
-            nodes
-                .iter()
-                .map(|n| elements.nodes[*n as usize].name.as_str())
-                .collect()
-        };
+    pub(crate) fn new(change: &'a Change, entry: EntryId, elements: &'a Elements) -> Self {
+        let name = |id: &NodeId| elements.nodes[*id as usize].name.as_str();
         let time = |time: Option<Stamp>| ChangeValues::Time {
-            time_ns: nanos(time),
+            time_ns: time.map(|at| at.0),
         };
         let (what, rest) = match change {
             Change::Added { what, time: at } | Change::Removed { what, time: at } => {
@@ -83,32 +54,24 @@ impl<'a> ChangeRow<'a> {
                 what,
                 from_hz,
                 to_hz,
-            } => (
-                *what,
-                ChangeValues::Rate {
-                    from_hz: *from_hz,
-                    to_hz: *to_hz,
-                },
-            ),
-            Change::HandedOver { topic, from, to } => (
-                Element::Topic(*topic),
-                ChangeValues::Hands {
-                    from: names(from),
-                    to: names(to),
-                },
-            ),
-            Change::Value { what, from, to, .. } => (
-                *what,
-                ChangeValues::Value {
-                    from: from.to_string(),
-                    to: to.to_string(),
-                },
-            ),
+            } => {
+                let (from_hz, to_hz) = (*from_hz, *to_hz);
+                (*what, ChangeValues::Rate { from_hz, to_hz })
+            }
+            Change::HandedOver { topic, from, to } => {
+                let from = from.iter().map(name).collect();
+                let to = to.iter().map(name).collect();
+                (Element::Topic(*topic), ChangeValues::Hands { from, to })
+            }
+            Change::Value { what, from, to, .. } => {
+                let (from, to) = ((&**from).into(), (&**to).into());
+                (*what, ChangeValues::Value { from, to })
+            }
         };
         Self {
             kind: change.word(),
             entry,
-            named: RawElementName::new(what, elements),
+            named: ElementName::new(what, elements),
             rest,
         }
     }

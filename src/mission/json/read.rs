@@ -5,16 +5,16 @@
 
 use std::path::Path;
 
-use super::names::Names;
-use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice, RawWindow};
-use super::runs::RawElements;
+use super::names::{Names, graph};
+use super::raw::{BagJson, NoticeJson, Raw, RawWindow};
+use super::runs::JsonColumns;
 use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
-use crate::base::geometry::Rect;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Period, Span, Stamp};
-use crate::mission::{Mission, Place, Places, Window};
+use crate::graph::{Element, Elements, Graphs, GraphsWriter};
+use crate::mission::{Mission, Window};
 
 /// Reads the text of an evolution; `path` is only named in errors.
 ///
@@ -85,14 +85,11 @@ pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
 fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
     let mut names = Names::default();
     raw.windows.iter().for_each(|w| names.window(w));
-    let runs = RawElements {
-        nodes: raw.nodes,
-        topics: raw.topics,
-        publishes: raw.publishes,
-        subscribes: raw.subscribes,
-    };
-    names.whole(&runs);
-    let (elements, places) = names.elements();
+    names.elements(&raw.nodes, &raw.topics, &raw.publishes);
+    for edge in &raw.subscribes {
+        names.subscribe(&edge.node, &edge.topic, &edge.edge);
+    }
+    let elements = names.placed();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
     let span = Span::new(
@@ -116,7 +113,7 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
                 window
                     .topics
                     .iter()
-                    .filter_map(|t| t.rest.count)
+                    .filter_map(|t| t.numbers.as_ref()?.count)
                     .fold(0, u64::saturating_add)
             };
             Window {
@@ -130,12 +127,11 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         })
         .collect();
     let graphs = if raw.form.as_deref() == Some(RUNS) {
-        super::runs::graphs(&runs, &places, spans)
+        of_columns(&raw, &elements, spans)
     } else {
         let graphs = spans.iter().zip(&raw.windows);
-        graphs
-            .map(|(span, window)| (*span, places.graph(window)))
-            .collect()
+        let graphs = graphs.map(|(span, window)| (*span, graph(window, &elements)));
+        graphs.collect()
     };
     Ok(Mission {
         graphs,
@@ -149,12 +145,12 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         }),
         period,
         step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
+        sending: raw.sending.unwrap_or_default().sending(&elements)?,
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
-        sending: raw.sending.unwrap_or_default().sending(&places)?,
         undrawn: Vec::new(),
-        layout: raw.layout.map(layout),
+        layout: raw.layout,
         notices: notices(raw.notices),
     })
 }
@@ -164,17 +160,44 @@ const ONE: Period = match Period::from_nanos(1) {
     None => unreachable!(),
 };
 
-fn report(raw: RawBag) -> Report {
+/// The graphs of these windows by the elements' columns.
+fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
+    let mut graphs = GraphsWriter::new(spans.to_vec());
+    let mut add = |what: Option<Element>, columns: Option<&JsonColumns<'_>>| {
+        if let (Some(what), Some(columns)) = (what, columns) {
+            columns.add(what, spans.len(), &mut graphs);
+        }
+    };
+    for node in &raw.nodes {
+        let id = all.node(&node.name);
+        add(id.map(Element::Node), node.columns.as_deref());
+    }
+    for topic in &raw.topics {
+        let id = all.topic(&topic.name);
+        add(id.map(Element::Topic), topic.columns.as_deref());
+    }
+    for edge in &raw.publishes {
+        let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
+        let id = ends.and_then(|(node, topic)| all.publication(node, topic));
+        add(id.map(Element::Publish), edge.edge.columns.as_deref());
+    }
+    for edge in &raw.subscribes {
+        let ends = all.topic(&edge.topic).zip(all.node(&edge.node));
+        let id = ends.and_then(|(topic, node)| all.subscription(topic, node));
+        add(id.map(Element::Subscribe), edge.edge.columns.as_deref());
+    }
+    graphs.finish()
+}
+
+fn report(raw: BagJson<'_>) -> Report {
     let tiers = [Tier::Index, Tier::Chunks, Tier::Forward, Tier::Verify];
+    let tier = tiers.into_iter().find(|t| t.word() == raw.tier);
     Report {
-        name: raw.name,
-        format: raw.format,
-        compression: raw.compression,
-        tier: tiers
-            .into_iter()
-            .find(|t| t.word() == raw.tier)
-            .unwrap_or(Tier::Forward),
-        tier_reason: raw.tier_reason,
+        name: raw.name.into_owned(),
+        format: raw.format.into_owned(),
+        compression: raw.compression.into_iter().map(Into::into).collect(),
+        tier: tier.unwrap_or(Tier::Forward),
+        tier_reason: raw.tier_reason.map(Into::into),
         complete: raw.complete.unwrap_or(true),
         bytes_read: 0,
         file_bytes: raw.file_bytes,
@@ -182,22 +205,8 @@ fn report(raw: RawBag) -> Report {
     }
 }
 
-fn layout(raw: RawLayout) -> Places {
-    let place = |b: RawBox| Place {
-        what: b.what,
-        name: b.name,
-        rect: Rect::new(b.x, b.y, b.w, b.h),
-    };
-    Places {
-        width: raw.width,
-        height: raw.height,
-        orientation: raw.orientation,
-        boxes: raw.boxes.into_iter().map(place).collect(),
-    }
-}
-
 /// The notices of an earlier run as plain notes: data lost then is not lost now.
-fn notices(raw: Vec<RawNotice>) -> Notices {
+fn notices(raw: Vec<NoticeJson<'_>>) -> Notices {
     let mut notices = Notices::new();
     notices.extend(raw.into_iter().map(|n| Notice {
         kind: NoticeKind::from_word(&n.kind).unwrap_or(NoticeKind::Note),

@@ -11,98 +11,71 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
-use super::names::Ids;
-use super::rows::RunRows;
-use super::write::List;
-use crate::base::time::{Span, Stamp};
+use super::elements::{Text, pairs, spans};
+use crate::base::time::Stamp;
 use crate::graph::Elements;
 use crate::graph::history::{Sender, Sending, Stretch};
 
-/// The sending in the form for writing.
-pub(super) struct SendingOf<'a> {
-    pub(super) sending: &'a Sending,
-    pub(super) elements: &'a Elements,
+#[derive(Default, Deserialize, Serialize)]
+#[serde(default)]
+pub(crate) struct SendingJson<'a> {
+    senders: Vec<SenderJson<'a>>,
+    pauses: Vec<PausesJson<'a>>,
 }
 
 /// A stretch: first and last message, their number, the usual period, flags.
-type StretchRow = (i64, i64, u64, i64, u8);
+type StretchJson = (i64, i64, u64, i64, u8);
 
-#[derive(Serialize)]
-struct SenderRow<'a> {
-    topic: &'a str,
-    node: Option<&'a str>,
+#[derive(Deserialize, Serialize)]
+struct SenderJson<'a> {
+    topic: Text<'a>,
+    node: Option<Text<'a>>,
+    #[serde(default)]
     latched: bool,
-    stretches: Vec<StretchRow>,
+    stretches: Vec<StretchJson>,
 }
 
-#[derive(Serialize)]
-struct PausesRow<'a> {
-    topic: &'a str,
-    spans: RunRows<'a>,
+#[derive(Deserialize, Serialize)]
+struct PausesJson<'a> {
+    topic: Text<'a>,
+    spans: Vec<[i64; 2]>,
 }
 
-impl Serialize for SendingOf<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        use serde::ser::SerializeMap as _;
-        let Self { sending, elements } = *self;
-        let topic = |id: u32| elements.topics[id as usize].name.as_str();
-        let node = |id: u32| elements.nodes[id as usize].name.as_str();
+impl<'a> SendingJson<'a> {
+    pub(super) fn new(sending: &Sending, elements: &'a Elements) -> Self {
+        let topic = |id: u32| Text::from(elements.topics[id as usize].name.as_str());
+        let node = |id: u32| Text::from(elements.nodes[id as usize].name.as_str());
         let stretch = |s: &Stretch| {
             let flags = u8::from(s.is_even) + 2 * u8::from(s.is_joined);
             (s.first.0, s.last.0, s.count, s.period, flags)
         };
-        let senders = sending.senders.iter().map(|sender| SenderRow {
+        let senders = sending.senders.iter().map(|sender| SenderJson {
             topic: topic(sender.topic),
             node: sender.node.map(node),
             latched: sender.is_latched,
             stretches: sender.stretches.iter().map(stretch).collect(),
         });
-        let pauses = (0..).zip(&sending.pauses).map(|(id, spans)| PausesRow {
+        let pauses = (0..).zip(&sending.pauses).map(|(id, spans)| PausesJson {
             topic: topic(id),
-            spans: RunRows(spans),
+            spans: pairs(spans),
         });
-        let mut map = serializer.serialize_map(Some(2))?;
-        map.serialize_entry("senders", &List(senders))?;
-        map.serialize_entry("pauses", &List(pauses))?;
-        map.end()
+        Self {
+            senders: senders.collect(),
+            pauses: pauses.collect(),
+        }
     }
-}
 
-/// The sending as it is read.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct RawSending {
-    senders: Vec<RawSender>,
-    pauses: Vec<RawPauses>,
-}
-
-#[derive(Deserialize)]
-struct RawSender {
-    topic: String,
-    node: Option<String>,
-    #[serde(default)]
-    latched: bool,
-    stretches: Vec<StretchRow>,
-}
-
-#[derive(Deserialize)]
-struct RawPauses {
-    topic: String,
-    spans: Vec<[i64; 2]>,
-}
-
-impl RawSending {
     /// The sending of a mission with these names. Senders and topics that no window has are left out.
     ///
     /// # Errors
     /// The mistake in the stretches.
-    pub(super) fn sending(self, ids: &Ids) -> Result<Sending, String> {
+    pub(super) fn sending(self, elements: &Elements) -> Result<Sending, String> {
         let mut all: BTreeMap<(u32, Option<u32>), Sender> = BTreeMap::new();
         for raw in self.senders {
-            let node = raw.node.as_deref().map(|name| ids.node(name));
-            let (Some(topic), None | Some(Some(_))) = (ids.topic(&raw.topic), node) else {
+            let node = raw.node.as_deref().map(|name| elements.node(name));
+            let (Some(topic), None | Some(Some(_))) = (elements.topic(&raw.topic), node) else {
                 continue;
             };
             let stretches: Vec<Stretch> = raw.stretches.into_iter().map(stretch).collect();
@@ -121,13 +94,9 @@ impl RawSending {
         }
         let mut pauses = Vec::new();
         for raw in self.pauses {
-            if let Some(topic) = ids.topic(&raw.topic) {
-                pauses.resize(ids.topics(), Vec::new());
-                let spans = raw
-                    .spans
-                    .into_iter()
-                    .map(|[start, end]| Span::new(Stamp(start), Stamp(end.max(start))));
-                pauses[topic as usize] = spans.collect();
+            if let Some(topic) = elements.topic(&raw.topic) {
+                pauses.resize(elements.topics.len(), Vec::new());
+                pauses[topic as usize] = spans(&raw.spans);
             }
         }
         Ok(Sending {
@@ -137,7 +106,7 @@ impl RawSending {
     }
 }
 
-fn stretch((first, last, count, period, flags): StretchRow) -> Stretch {
+fn stretch((first, last, count, period, flags): StretchJson) -> Stretch {
     Stretch {
         first: Stamp(first),
         last: Stamp(last),

@@ -6,15 +6,15 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
 use super::changes::ChangeRow;
+use super::elements::Text;
 use super::entries::{InterruptionRow, PhaseRow, entries};
 use super::lines::LineFormatter;
-use super::rows::{NodeRow, PublishRow, SubscribeRow, TopicRow};
-use super::runs;
-use super::sending::SendingOf;
+use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, TopicJson};
+use super::runs::JsonColumns;
+use super::sending::SendingJson;
 use crate::bag::Report;
-use crate::evidence::Evidence;
-use crate::graph::{Elements, Graph};
-use crate::mission::{Mission, Place, Places, Window};
+use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
+use crate::mission::{Mission, Places, Window};
 
 /// The schema that is written and read.
 pub(crate) const SCHEMA: &str = "bagreel.evolution/2";
@@ -97,7 +97,7 @@ impl Serialize for Json<'_> {
         if self.is_runs() {
             map.serialize_entry("form", RUNS)?;
         }
-        map.serialize_entry("bags", &List(mission.bags.iter().map(BagRow::new)))?;
+        map.serialize_entry("bags", &List(mission.bags.iter().map(BagJson::new)))?;
         map.serialize_entry("start_ns", &mission.span.start.0)?;
         map.serialize_entry("end_ns", &mission.span.end.0)?;
         map.serialize_entry("messages", &mission.messages)?;
@@ -110,34 +110,31 @@ impl Serialize for Json<'_> {
         }
         let phases = mission.ledger.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
-        let elements = &mission.elements;
+        let all = &mission.elements;
+        let window = |(window, graph)| WindowOf {
+            window,
+            graph,
+            elements: all,
+        };
         if self.is_runs() {
-            let windows = mission.windows.iter();
-            let windows = windows.map(|window| WindowRow { window, elements });
+            let windows = mission.windows.iter().map(|w| window((w, None)));
             map.serialize_entry("windows", &List(windows))?;
-            runs::elements(mission, &mut map)?;
+            elements(mission, &mut map)?;
         } else {
-            let windows = mission.windows.iter().zip(&mission.graphs);
-            let windows = windows.map(|(window, graph)| WindowOf {
-                window,
-                graph,
-                elements,
-            });
+            let windows = mission.windows.iter();
+            let windows = windows.zip(mission.graphs.iter().map(Some)).map(window);
             map.serialize_entry("windows", &List(windows))?;
         }
-        let sending = &mission.sending;
-        map.serialize_entry("sending", &SendingOf { sending, elements })?;
+        map.serialize_entry("sending", &SendingJson::new(&mission.sending, all))?;
         if let Some(places) = places {
-            map.serialize_entry("layout", &LayoutRow::new(places))?;
+            map.serialize_entry("layout", places)?;
         }
-        map.serialize_entry(
-            "notices",
-            &List(mission.notices.iter().map(|n| NoticeRow {
-                kind: n.kind.word(),
-                count: n.count,
-                text: n.text,
-            })),
-        )?;
+        let notices = mission.notices.iter().map(|notice| NoticeJson {
+            kind: notice.kind.word().into(),
+            count: Some(notice.count),
+            text: notice.text,
+        });
+        map.serialize_entry("notices", &List(notices))?;
         map.end()
     }
 }
@@ -155,127 +152,77 @@ impl<I: Iterator<Item: Serialize> + Clone> Serialize for List<I> {
     }
 }
 
-#[derive(Serialize)]
-struct BagRow<'a> {
-    name: &'a str,
-    format: &'a str,
-    compression: &'a [String],
-    tier: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tier_reason: Option<&'a str>,
-    complete: bool,
-    file_bytes: u64,
-}
-
-impl<'a> BagRow<'a> {
+impl<'a> BagJson<'a> {
     fn new(bag: &'a Report) -> Self {
         Self {
-            name: &bag.name,
-            format: &bag.format,
-            compression: &bag.compression,
-            tier: bag.tier.word(),
-            tier_reason: bag.tier_reason.as_deref(),
-            complete: bag.complete,
+            name: (&*bag.name).into(),
+            format: (&*bag.format).into(),
+            compression: bag.compression.iter().map(Text::from).collect(),
+            tier: bag.tier.word().into(),
+            tier_reason: bag.tier_reason.as_deref().map(Text::from),
+            complete: Some(bag.complete),
             file_bytes: bag.file_bytes,
         }
     }
 }
 
-#[derive(Serialize)]
-struct NoticeRow {
-    kind: &'static str,
-    count: u64,
-    text: String,
-}
-
-#[derive(Serialize)]
-struct LayoutRow<'a> {
-    width: f64,
-    height: f64,
-    orientation: &'a str,
-    boxes: Vec<BoxRow<'a>>,
-}
-
-#[derive(Serialize)]
-struct BoxRow<'a> {
-    what: &'a str,
-    name: &'a str,
-    x: f64,
-    y: f64,
-    w: f64,
-    h: f64,
-}
-
-impl<'a> LayoutRow<'a> {
-    fn new(places: &'a Places) -> Self {
-        let row = |Place { what, name, rect }: &'a Place| BoxRow {
-            what,
-            name,
-            x: rect.x,
-            y: rect.y,
-            w: rect.w,
-            h: rect.h,
-        };
-        Self {
-            width: places.width,
-            height: places.height,
-            orientation: &places.orientation,
-            boxes: places.boxes.iter().map(row).collect(),
-        }
-    }
-}
-
+/// A window, with its elements unless they stand in columns.
 struct WindowOf<'a> {
     window: &'a Window,
-    graph: Graph,
+    graph: Option<Graph>,
     elements: &'a Elements,
 }
 
-impl Serialize for WindowOf<'_> {
+impl<'a> Serialize for WindowOf<'a> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let (window, elements) = (self.window, self.elements);
-        let graph = &self.graph;
+        let (window, all) = (self.window, self.elements);
         let mut map = serializer.serialize_map(None)?;
         head(window, &mut map)?;
-        map.serialize_entry(
-            "nodes",
-            &List(graph.nodes.iter().map(|s| NodeRow::new(s, elements))),
-        )?;
-        map.serialize_entry(
-            "topics",
-            &List(graph.topics.iter().map(|s| TopicRow::new(s, elements))),
-        )?;
-        map.serialize_entry(
-            "publishes",
-            &List(graph.publishes.iter().map(|s| PublishRow::new(s, elements))),
-        )?;
-        map.serialize_entry(
-            "subscribes",
-            &List(
-                graph
-                    .subscribes
-                    .iter()
-                    .map(|s| SubscribeRow::new(s, elements)),
-            ),
-        )?;
-        map.serialize_entry("changes", &changes(window, elements))?;
+        if let Some(graph) = &self.graph {
+            let nodes = graph.nodes.iter();
+            let nodes = nodes.map(|s| NodeJson::new(&all.nodes[s.id as usize], Some(s)));
+            map.serialize_entry("nodes", &List(nodes))?;
+            let topics = graph.topics.iter();
+            let topics = topics.map(|s| TopicJson::new(&all.topics[s.id as usize], Some(s)));
+            map.serialize_entry("topics", &List(topics))?;
+            let edge = |edges: &'a [Edge]| {
+                move |s: &EdgeState| PublishJson::new(&edges[s.id as usize], all, Some(s))
+            };
+            let publishes = graph.publishes.iter().map(edge(&all.publishes));
+            map.serialize_entry("publishes", &List(publishes))?;
+            let subscribes = graph.subscribes.iter().map(edge(&all.subscribes));
+            map.serialize_entry("subscribes", &List(subscribes.map(SubscribeJson::from)))?;
+        }
+        let changes = window.changes.iter().zip(&window.entries);
+        let changes = changes.map(|(change, entry)| ChangeRow::new(change, *entry, all));
+        map.serialize_entry("changes", &List(changes))?;
         map.end()
     }
 }
 
-/// A window without its elements.
-struct WindowRow<'a> {
-    window: &'a Window,
-    elements: &'a Elements,
-}
-
-impl Serialize for WindowRow<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        head(self.window, &mut map)?;
-        map.serialize_entry("changes", &changes(self.window, self.elements))?;
-        map.end()
-    }
+/// Writes the lists of all elements, each with its windows as columns, into the map of the mission.
+fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Result<(), M::Error> {
+    let all = &mission.elements;
+    let columns = |what| Some(Box::new(JsonColumns::of(&mission.graphs, what)));
+    let nodes = (0..).zip(&all.nodes).map(|(id, node)| NodeJson {
+        columns: columns(Element::Node(id)),
+        ..NodeJson::new(node, None)
+    });
+    map.serialize_entry("nodes", &List(nodes))?;
+    let topics = (0..).zip(&all.topics).map(|(id, topic)| TopicJson {
+        columns: columns(Element::Topic(id)),
+        ..TopicJson::new(topic, None)
+    });
+    map.serialize_entry("topics", &List(topics))?;
+    let edge = |(what, edge)| {
+        let mut json = PublishJson::new(edge, all, None);
+        json.edge.columns = columns(what);
+        json
+    };
+    let publishes = (0..).map(Element::Publish).zip(&all.publishes);
+    map.serialize_entry("publishes", &List(publishes.map(edge)))?;
+    let subscribes = (0..).map(Element::Subscribe).zip(&all.subscribes);
+    map.serialize_entry("subscribes", &List(subscribes.map(edge)))
 }
 
 fn head<M: SerializeMap>(window: &Window, map: &mut M) -> Result<(), M::Error> {
@@ -285,16 +232,4 @@ fn head<M: SerializeMap>(window: &Window, map: &mut M) -> Result<(), M::Error> {
     map.serialize_entry("length_ns", &window.span.nanos())?;
     map.serialize_entry("partial", &window.partial)?;
     map.serialize_entry("messages", &window.messages)
-}
-
-fn changes<'a>(
-    window: &'a Window,
-    elements: &'a Elements,
-) -> List<impl Iterator<Item = ChangeRow<'a>> + Clone> {
-    let changes = window.changes.iter().zip(&window.entries);
-    List(changes.map(|(change, entry)| ChangeRow::new(change, *entry, elements)))
-}
-
-pub(crate) fn words(evidence: Evidence) -> Vec<&'static str> {
-    evidence.words().collect()
 }

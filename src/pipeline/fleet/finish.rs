@@ -10,7 +10,10 @@ use crate::base::role;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::{State, per_second};
-use crate::mission::raw::{Raw, RawBag, RawEdge, RawNode, RawState, RawTopic, RawWindow};
+use crate::mission::raw::{
+    BagJson, EdgeJson, EdgeNumbers, LifeJson, NodeJson, NodeNumbers, PublishJson, Raw, RawWindow,
+    Text, TopicJson, TopicNumbers,
+};
 use crate::mission::{Mission, mission_of};
 
 /// Makes a mission of the counts of all its bags together, in any order: every window from the first message to the
@@ -101,12 +104,12 @@ fn span(counts: &[Count], period: Period) -> Span {
     )
 }
 
-fn bags(counts: &[Count]) -> Vec<RawBag> {
+fn bags(counts: &[Count]) -> Vec<BagJson<'static>> {
     let all: BTreeSet<(&str, &str)> = counts.iter().map(|c| (&*c.bag, &*c.format)).collect();
-    let bag = |(name, format): (&str, &str)| RawBag {
-        name: name.to_owned(),
-        format: format.to_owned(),
-        ..RawBag::default()
+    let bag = |(name, format): (&str, &str)| BagJson {
+        name: name.to_owned().into(),
+        format: format.to_owned().into(),
+        ..BagJson::default()
     };
     all.into_iter().map(bag).collect()
 }
@@ -183,6 +186,14 @@ impl WindowLife {
         self.last = self.last.zip(other.last).map(|(a, b)| a.max(b));
     }
 
+    fn json(&self) -> LifeJson {
+        LifeJson {
+            first_ns: self.first.map(|at| at.0),
+            last_ns: self.last.map(|at| at.0),
+            runs: Vec::new(),
+        }
+    }
+
     fn holds(&self, at: usize) -> bool {
         (self.from..=self.to).contains(&at)
     }
@@ -223,47 +234,76 @@ fn window(
     sums: &WindowSums,
     lives: &WindowLives,
 ) -> RawWindow {
-    let state = |life: &WindowLife, sum: Option<&CountSum>| {
-        state(life, sum.copied().unwrap_or_default(), span)
+    let state = |sum: Option<&CountSum>| {
+        let is_sent = sum.is_some_and(|sum| sum.n > 0);
+        let state = if is_sent {
+            State::Active
+        } else {
+            State::Silent
+        };
+        Some(state.word().into())
     };
+    let (degree, evidence) = (|| Some("measured".into()), || vec!["connection".into()]);
+    let sent = |sum: Option<&CountSum>| sum.map_or(0, |sum| sum.n);
     let topics = lives.topics.iter().filter(|(_, life)| life.holds(at));
     let topics = topics.map(|(name, life)| {
         let sum = sums.topics.get(name);
-        RawTopic {
-            name: name.to_string(),
+        TopicJson {
+            name: name.to_string().into(),
             types: types(lives, name),
-            max_gap_s: sum.and_then(|sum| Some(sum.gap? as f64 / 1e9)),
-            rest: RawState {
+            state: state(sum),
+            degree: degree(),
+            evidence: evidence(),
+            numbers: Some(TopicNumbers {
+                count: Some(sent(sum)),
                 bytes: sum.and_then(|sum| sum.bytes),
-                ..state(life, sum)
-            },
-            ..RawTopic::default()
+                hz: per_second(sent(sum), span),
+                max_gap_s: sum.and_then(|sum| Some(sum.gap? as f64 / 1e9)),
+                ..TopicNumbers::default()
+            }),
+            life: life.json(),
+            ..TopicJson::default()
         }
     });
     let edges = lives.edges.iter().filter(|(_, life)| life.holds(at));
-    let edges: Vec<RawEdge> = edges
-        .map(|(key, life)| RawEdge {
-            node: key.1.to_string(),
-            topic: key.0.to_string(),
-            rest: state(life, sums.edges.get(key)),
-        })
-        .collect();
+    let edges = edges.map(|(key, life)| {
+        let sum = sums.edges.get(key);
+        PublishJson {
+            node: key.1.to_string().into(),
+            topic: key.0.to_string().into(),
+            edge: EdgeJson {
+                state: state(sum),
+                degree: degree(),
+                evidence: evidence(),
+                numbers: Some(EdgeNumbers {
+                    count: Some(sent(sum)),
+                    hz: per_second(sent(sum), span),
+                    ..EdgeNumbers::default()
+                }),
+                life: life.json(),
+                columns: None,
+            },
+        }
+    });
     let nodes = lives.nodes.iter().filter(|(_, life)| life.holds(at));
     let nodes = nodes.map(|(name, life)| {
-        let own = edges.iter().filter(|edge| *edge.node == **name);
-        let sent = own.filter_map(|edge| edge.rest.count).sum();
+        let own = sums.edges.iter().filter(|((_, node), _)| node == name);
         let sum = CountSum {
-            n: sent,
+            n: own.map(|(_, sum)| sum.n).sum(),
             ..CountSum::default()
         };
-        RawNode {
-            name: name.to_string(),
-            role: Some(role::role(name).to_owned()),
-            rest: RawState {
-                count: None,
-                ..state(life, Some(&sum))
-            },
-            ..RawNode::default()
+        NodeJson {
+            name: name.to_string().into(),
+            role: Some(role::role(name).to_owned().into()),
+            state: state(Some(&sum)),
+            degree: degree(),
+            evidence: evidence(),
+            life: life.json(),
+            numbers: Some(NodeNumbers {
+                hz: per_second(sum.n, span),
+                lifecycle: None,
+            }),
+            columns: None,
         }
     });
     RawWindow {
@@ -273,31 +313,12 @@ fn window(
         messages: Some(sums.topics.values().map(|sum| sum.n).sum()),
         nodes: nodes.collect(),
         topics: topics.collect(),
-        publishes: edges,
+        publishes: edges.collect(),
         subscribes: Vec::new(),
     }
 }
 
-fn types(lives: &WindowLives, topic: &str) -> Vec<String> {
+fn types(lives: &WindowLives, topic: &str) -> Vec<Text<'static>> {
     let types = lives.types.get(topic).into_iter().flatten();
-    types.map(ToString::to_string).collect()
-}
-
-fn state(life: &WindowLife, sum: CountSum, window: Span) -> RawState {
-    let state = if sum.n > 0 {
-        State::Active
-    } else {
-        State::Silent
-    };
-    RawState {
-        state: Some(state.word().to_owned()),
-        degree: Some("measured".to_owned()),
-        evidence: vec!["connection".to_owned()],
-        first_ns: life.first.map(|at| at.0),
-        last_ns: life.last.map(|at| at.0),
-        runs: Vec::new(),
-        count: Some(sum.n),
-        hz: per_second(sum.n, window),
-        ..RawState::default()
-    }
+    types.map(|name| name.to_string().into()).collect()
 }

@@ -1,11 +1,6 @@
 //! Columns of values in which equal neighbours are joined.
 
-use std::fmt;
-use std::marker::PhantomData;
-
-use serde::de::{SeqAccess, Visitor};
-use serde::ser::{Serialize, SerializeSeq as _, Serializer};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::graph::{Number, Row};
 
@@ -46,96 +41,58 @@ impl<T> JsonColumn<T> {
     }
 }
 
-impl<T: Serialize> Serialize for JsonColumn<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut seq = serializer.serialize_seq(Some(self.0.len()))?;
-        for (value, times) in &self.0 {
-            match times {
-                1 => seq.serialize_element(value)?,
-                _ => seq.serialize_element(&(value, times))?,
-            }
-        }
-        seq.end()
-    }
+/// One value with the number of its repetitions, or one alone.
+#[derive(Deserialize, Serialize)]
+#[serde(untagged)]
+enum JsonCell<T> {
+    Repeated(T, u32),
+    One(T),
 }
 
-/// One value, or one with the number of its repetitions.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum RawCell<T> {
-    Repeated((T, u32)),
-    One(T),
+impl<T: Serialize> Serialize for JsonColumn<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|(value, times)| match times {
+            1 => JsonCell::One(value),
+            _ => JsonCell::Repeated(value, *times),
+        }))
+    }
 }
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for JsonColumn<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(Cells(PhantomData))
+        let cells = Vec::<JsonCell<T>>::deserialize(deserializer)?;
+        let cells = cells.into_iter().map(|cell| match cell {
+            JsonCell::Repeated(value, times) => (value, times),
+            JsonCell::One(value) => (value, 1),
+        });
+        Ok(Self(cells.collect()))
     }
 }
 
-struct Cells<T>(PhantomData<T>);
-
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Cells<T> {
-    type Value = JsonColumn<T>;
-
-    fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        to.write_str("a list of values and of `[value, times]`")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<JsonColumn<T>, A::Error> {
-        let mut column = JsonColumn::default();
-        while let Some(cell) = list.next_element::<RawCell<T>>()? {
-            column.0.push(match cell {
-                RawCell::Repeated(both) => both,
-                RawCell::One(value) => (value, 1),
-            });
-        }
-        Ok(column)
-    }
-}
-
-/// A rate: computed from the count, or another.
-#[derive(Clone, Debug, PartialEq)]
+/// A rate: computed from the count, which is written as `=`, or another.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
+#[serde(untagged)]
 pub(crate) enum JsonRate {
-    /// The rate that follows from the count.
-    Counted,
     Other(Option<f64>),
+    Counted(char),
+}
+
+impl Default for JsonRate {
+    fn default() -> Self {
+        Self::Counted('=')
+    }
 }
 
 impl JsonRate {
     pub(crate) fn of(row: &Row) -> Self {
         row.rate
-            .map_or(Self::Counted, |rate| Self::Other(rate.value()))
+            .map_or_else(Self::default, |rate| Self::Other(rate.value()))
     }
 
     pub(crate) fn number(&self) -> Option<Number> {
         match self {
-            Self::Counted => None,
+            Self::Counted(_) => None,
             Self::Other(hz) => Some(Number::of(*hz)),
         }
-    }
-}
-
-impl Serialize for JsonRate {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Counted => serializer.serialize_str("="),
-            Self::Other(hz) => hz.serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for JsonRate {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Raw {
-            Hz(Option<f64>),
-            Counted(serde::de::IgnoredAny),
-        }
-        Ok(match Raw::deserialize(deserializer)? {
-            Raw::Hz(hz) => Self::Other(hz),
-            Raw::Counted(_) => Self::Counted,
-        })
     }
 }

@@ -1,0 +1,286 @@
+//! Nodes, topics and edges in JSON: in one window, or over the whole mission with their windows as columns. Each is one
+//! struct for writing and for reading; what is read may lack all but names.
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use super::runs::JsonColumns;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::{Degree, Evidence};
+use crate::graph::{
+    Edge, EdgeState, Elements, Measures, Node, NodeState, State, Topic, TopicState,
+};
+
+/// A text that is borrowed where it is written.
+pub(crate) type Text<'a> = Cow<'a, str>;
+
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct NodeJson<'a> {
+    pub(crate) name: Text<'a>,
+    pub(crate) role: Option<Text<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) state: Option<Text<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) degree: Option<Text<'a>>,
+    #[serde(default)]
+    pub(crate) evidence: Vec<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) life: LifeJson,
+    #[serde(flatten)]
+    pub(crate) numbers: Option<NodeNumbers<'a>>,
+    #[serde(rename = "in", skip_serializing_if = "Option::is_none")]
+    pub(crate) columns: Option<Box<JsonColumns<'a>>>,
+}
+
+/// The times of an element, and the intervals in which it exists, in nanoseconds.
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct LifeJson {
+    pub(crate) first_ns: Option<i64>,
+    pub(crate) last_ns: Option<i64>,
+    #[serde(default)]
+    pub(crate) runs: Vec<[i64; 2]>,
+}
+
+/// The numbers of a node in one window.
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct NodeNumbers<'a> {
+    pub(crate) hz: Option<f64>,
+    pub(crate) lifecycle: Option<Text<'a>>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct TopicJson<'a> {
+    pub(crate) name: Text<'a>,
+    #[serde(default)]
+    pub(crate) types: Vec<Text<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) state: Option<Text<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) degree: Option<Text<'a>>,
+    #[serde(default)]
+    pub(crate) evidence: Vec<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) numbers: Option<TopicNumbers>,
+    pub(crate) qos: Option<Text<'a>>,
+    pub(crate) unknown_publishers: Option<u32>,
+    #[serde(flatten)]
+    pub(crate) life: LifeJson,
+    #[serde(rename = "in", skip_serializing_if = "Option::is_none")]
+    pub(crate) columns: Option<Box<JsonColumns<'a>>>,
+}
+
+/// The numbers of a topic in one window.
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct TopicNumbers {
+    pub(crate) count: Option<u64>,
+    pub(crate) bytes: Option<u64>,
+    pub(crate) hz: Option<f64>,
+    pub(crate) median_period_s: Option<f64>,
+    pub(crate) max_gap_s: Option<f64>,
+    #[serde(flatten)]
+    pub(crate) measures: Measures,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct PublishJson<'a> {
+    pub(crate) node: Text<'a>,
+    pub(crate) topic: Text<'a>,
+    #[serde(flatten)]
+    pub(crate) edge: EdgeJson<'a>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct SubscribeJson<'a> {
+    pub(crate) topic: Text<'a>,
+    pub(crate) node: Text<'a>,
+    #[serde(flatten)]
+    pub(crate) edge: EdgeJson<'a>,
+}
+
+/// An edge without the names of its ends.
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct EdgeJson<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) state: Option<Text<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) degree: Option<Text<'a>>,
+    #[serde(default)]
+    pub(crate) evidence: Vec<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) numbers: Option<EdgeNumbers>,
+    #[serde(flatten)]
+    pub(crate) life: LifeJson,
+    #[serde(rename = "in", skip_serializing_if = "Option::is_none")]
+    pub(crate) columns: Option<Box<JsonColumns<'a>>>,
+}
+
+/// The numbers of an edge in one window.
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct EdgeNumbers {
+    pub(crate) count: Option<u64>,
+    pub(crate) hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) bytes: Option<u64>,
+    #[serde(flatten)]
+    pub(crate) measures: Measures,
+}
+
+impl<'a> NodeJson<'a> {
+    /// A node, in the window that it has this state in.
+    pub(crate) fn new(node: &'a Node, seen: Option<&'a NodeState>) -> Self {
+        Self {
+            name: node.name.as_str().into(),
+            role: Some((&*node.role).into()),
+            state: seen.map(|s| s.state.word().into()),
+            degree: seen.map(|s| s.degree.word().into()),
+            evidence: words(node.evidence),
+            life: LifeJson::new(node.first, node.last, &node.runs),
+            numbers: seen.map(|s| NodeNumbers {
+                hz: s.hz,
+                lifecycle: s.lifecycle.as_deref().map(Text::from),
+            }),
+            columns: None,
+        }
+    }
+
+    pub(crate) fn state(&self, id: u32) -> NodeState {
+        let numbers = self.numbers.as_ref();
+        let lifecycle = numbers.and_then(|n| n.lifecycle.as_deref());
+        NodeState {
+            id,
+            state: state_of(self.state.as_deref()),
+            degree: degree_of(self.degree.as_deref()),
+            hz: numbers.and_then(|n| n.hz),
+            lifecycle: lifecycle.map(Into::into),
+        }
+    }
+}
+
+impl<'a> TopicJson<'a> {
+    /// A topic, in the window that it has this state in.
+    pub(crate) fn new(topic: &'a Topic, seen: Option<&TopicState>) -> Self {
+        Self {
+            name: topic.name.as_str().into(),
+            types: topic.types.iter().map(|t| Text::from(&**t)).collect(),
+            state: seen.map(|s| s.state.word().into()),
+            degree: seen.map(|s| s.degree.word().into()),
+            evidence: words(topic.evidence),
+            numbers: seen.map(|s| TopicNumbers {
+                count: Some(s.count),
+                bytes: s.bytes,
+                hz: s.hz,
+                median_period_s: s.median_period_s,
+                max_gap_s: s.max_gap_s,
+                measures: s.measures,
+            }),
+            qos: topic.qos.as_deref().map(Text::from),
+            unknown_publishers: topic.unknown_publishers,
+            life: LifeJson::new(topic.first, topic.last, &topic.runs),
+            columns: None,
+        }
+    }
+
+    pub(crate) fn state(&self, id: u32) -> TopicState {
+        let none = TopicNumbers::default();
+        let numbers = self.numbers.as_ref().unwrap_or(&none);
+        TopicState {
+            id,
+            state: state_of(self.state.as_deref()),
+            degree: degree_of(self.degree.as_deref()),
+            count: numbers.count.unwrap_or(0),
+            bytes: numbers.bytes,
+            hz: numbers.hz,
+            median_period_s: numbers.median_period_s,
+            max_gap_s: numbers.max_gap_s,
+            measures: numbers.measures,
+        }
+    }
+}
+
+impl<'a> PublishJson<'a> {
+    /// A publication, in the window that it has this state in.
+    pub(crate) fn new(edge: &'a Edge, elements: &'a Elements, seen: Option<&EdgeState>) -> Self {
+        Self {
+            node: elements.nodes[edge.node as usize].name.as_str().into(),
+            topic: elements.topics[edge.topic as usize].name.as_str().into(),
+            edge: EdgeJson {
+                state: seen.map(|s| s.state.word().into()),
+                degree: seen.map(|s| s.degree.word().into()),
+                evidence: words(edge.evidence),
+                numbers: seen.map(|s| EdgeNumbers {
+                    count: s.count,
+                    hz: s.hz,
+                    bytes: s.bytes,
+                    measures: s.measures,
+                }),
+                life: LifeJson::new(edge.first, edge.last, &edge.runs),
+                columns: None,
+            },
+        }
+    }
+}
+
+impl<'a> From<PublishJson<'a>> for SubscribeJson<'a> {
+    fn from(PublishJson { node, topic, edge }: PublishJson<'a>) -> Self {
+        Self { topic, node, edge }
+    }
+}
+
+impl EdgeJson<'_> {
+    pub(crate) fn state(&self, id: u32) -> EdgeState {
+        let none = EdgeNumbers::default();
+        let numbers = self.numbers.as_ref().unwrap_or(&none);
+        EdgeState {
+            id,
+            state: state_of(self.state.as_deref()),
+            degree: degree_of(self.degree.as_deref()),
+            count: numbers.count,
+            hz: numbers.hz,
+            bytes: numbers.bytes,
+            measures: numbers.measures,
+        }
+    }
+}
+
+impl LifeJson {
+    fn new(first: Option<Stamp>, last: Option<Stamp>, runs: &[Span]) -> Self {
+        Self {
+            first_ns: first.map(|at| at.0),
+            last_ns: last.map(|at| at.0),
+            runs: pairs(runs),
+        }
+    }
+}
+
+pub(crate) fn words<'a>(evidence: Evidence) -> Vec<Text<'a>> {
+    evidence.words().map(Text::from).collect()
+}
+
+pub(crate) fn evidence(words: &[Text<'_>]) -> Evidence {
+    let all = words.iter().map(|word| Evidence::of(word));
+    all.fold(Evidence::NONE, Evidence::and)
+}
+
+/// Intervals as pairs of nanoseconds.
+pub(crate) fn pairs(spans: &[Span]) -> Vec<[i64; 2]> {
+    let pair = |span: &Span| [span.start.0, span.end.0];
+    spans.iter().map(pair).collect()
+}
+
+pub(crate) fn spans(pairs: &[[i64; 2]]) -> Vec<Span> {
+    let span = |[start, end]: &[i64; 2]| Span::new(Stamp(*start), Stamp(*end.max(start)));
+    pairs.iter().map(span).collect()
+}
+
+/// The state of this word; active for another, or none.
+pub(crate) fn state_of(word: Option<&str>) -> State {
+    let known = State::ALL.into_iter().find(|s| word == Some(s.word()));
+    known.unwrap_or(State::Active)
+}
+
+/// The degree of this word; stated for another, or none.
+pub(crate) fn degree_of(word: Option<&str>) -> Degree {
+    let known = Degree::ALL.into_iter().find(|d| word == Some(d.word()));
+    known.unwrap_or(Degree::Stated)
+}
