@@ -12,7 +12,7 @@ mod gif;
 mod graphml;
 pub(crate) mod html;
 mod json;
-mod mcap;
+pub(crate) mod mcap;
 pub(crate) mod mermaid;
 pub mod options;
 pub(crate) mod palette;

@@ -18,6 +18,8 @@ pub(crate) mod follow;
 #[cfg(feature = "cli")]
 pub(crate) mod gate;
 mod inputs;
+#[cfg(feature = "cli")]
+pub(crate) mod live;
 mod phases;
 mod probe;
 #[cfg(feature = "render")]

@@ -79,7 +79,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["figure", "fit", "probe", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["fleet", "follow", "gate"],
+        &["fleet", "follow", "gate", "live"],
     ]),
     ("cli", &[
         &["args", "stop"],
@@ -110,6 +110,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "mission/events",
             "mission/info",
             "mission/json",
+            "pipeline/live/bridge",
         ],
     ),
     // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
@@ -124,6 +125,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ),
     // Bags are read with it, and the graph is written.
     ("mcap", &["bag/mcap", "export/mcap"]),
+    // Launch files, and the answers of a ROS master.
+    ("roxmltree", &["evidence/topology", "pipeline/live/master"]),
     // Names are filtered as in `rqt_graph`; missions are named by a part of a path.
     ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Times are read and spelled.

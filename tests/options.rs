@@ -254,6 +254,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("baseline", "old.json", "--period 9", "hint: give the bag itself"),
     ("check", "r.bag --source ws --expect all.yaml", "--infer source", "never checked"),
     ("check", "r.bag --expect all.yaml", "--link a=https://b.c", "hint: it applies to Markdown"),
+    ("follow", "r.bag", "--rates /chat", "hint: leave it out"),
     ("follow", "r.bag", "--bind", "--serve <ADDRESS:PORT>"),
     ("follow", "r.bag", "--serve 0.0.0.0:0", "hint: serve at 127.0.0.1"),
     ("check", "old.json --expect all.yaml", "--end 9", "hint: give the bag itself"),

@@ -30,6 +30,7 @@ mod hostile;
 mod info;
 mod layout;
 mod lines;
+mod live;
 mod marks;
 mod options;
 mod pages;

@@ -17,6 +17,7 @@ use crate::graph::window::Length;
 use crate::mission::events::LogFormat;
 use crate::pipeline::Render;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
+use crate::pipeline::live::Live;
 
 /// The most messages that events are found in, the newest: a tenth of a second of work.
 const MOST: u64 = 1_000_000;
@@ -56,6 +57,7 @@ impl Pace {
 struct Follower<'a> {
     args: &'a FollowArgs,
     follow: Follow,
+    live: Option<Live>,
     format: LogFormat,
     feed: Feed,
     findings: FindingFeed,
@@ -68,8 +70,10 @@ struct Follower<'a> {
 
 /// Follows a recording to its end.
 pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
+    let live = Live::start(&args.what, &args.rates)?;
+    let what = live.as_ref().map_or(args.what.as_path(), Live::path);
     let inputs = Inputs {
-        bags: vec![args.what.clone()],
+        bags: vec![what.to_owned()],
         verify: false,
     };
     let time = TimeArgs {
@@ -93,6 +97,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         args,
         expectation: args.expect.as_deref().map(expectation).transpose()?,
         follow: Follow::new(reading, args.keep)?,
+        live,
         format: match args.format {
             FollowFormat::Text => LogFormat::Text,
             FollowFormat::Ndjson => LogFormat::Ndjson,
@@ -131,6 +136,8 @@ impl Follower<'_> {
         let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
         loop {
             let growth = self.follow.poll()?;
+            let news = self.live.iter().flat_map(Live::news);
+            news.for_each(|text| terminal.say(&text));
             let now = terminal.seconds();
             if growth == Growth::More {
                 (grew, is_behind, is_page_behind) = (now, true, true);
@@ -205,7 +212,8 @@ impl Follower<'_> {
     }
 
     /// Judges and writes the recording as it lies there now.
-    fn end(self, terminal: &mut Terminal) -> Result<u8> {
+    fn end(mut self, terminal: &mut Terminal) -> Result<u8> {
+        self.live.iter_mut().for_each(Live::finish);
         let job = Render {
             reading: self.follow.closed(),
             ..self.job

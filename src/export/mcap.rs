@@ -6,17 +6,15 @@
 
 mod cdr;
 mod definitions;
+mod graph_file;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{Cursor, Write as _};
+use std::io::{self, Cursor, Write as _};
 
-use mcap::WriteOptions;
-use mcap::records::MessageHeader;
-
-use self::cdr::CdrWriter;
+pub(crate) use self::graph_file::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
 use super::{Encoder, Sequence, Written};
 use crate::base::error::{Error, Result};
-use crate::base::name::{OWN_NODE, UNKNOWN_NODE};
+use crate::base::name::UNKNOWN_NODE;
 use crate::base::time::Stamp;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
@@ -47,12 +45,7 @@ pub(crate) fn start<'a>(
 impl Encoder for McapEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut sink = OutputSink::create(&self.target, None)?;
-        let failed = |error: mcap::McapError| Error::Io {
-            path: self.target.path().to_owned(),
-            doing: "write",
-            source: std::io::Error::other(error),
-        };
-        let bytes = written(self.mission).map_err(failed)?;
+        let bytes = written(self.mission).map_err(Error::io("write", self.target.path()))?;
         sink.write_all(&bytes).map_err(sink.error())?;
         let mut written = Written::to(&self.target);
         written.add(sink.commit()?);
@@ -61,68 +54,28 @@ impl Encoder for McapEncoder<'_> {
 }
 
 /// The whole file.
-fn written(mission: &Mission) -> mcap::McapResult<Vec<u8>> {
-    let mut to = WriteOptions::new()
-        .profile("ros2")
-        .library("bagreel")
-        .compression(Some(mcap::Compression::Zstd))
-        .create(Cursor::new(Vec::new()))?;
-    let mut channels = [0; 2];
-    for (channel, (topic, kind, definition)) in channels.iter_mut().zip(definitions::CHANNELS) {
-        let schema = to.add_schema(kind, "ros2msg", definition().as_bytes())?;
-        // The node tells our own reader that these topics are not the robot's.
-        let metadata = BTreeMap::from([("callerid".to_owned(), OWN_NODE.to_owned())]);
-        *channel = to.add_channel(schema, topic, "cdr", &metadata)?;
-    }
-    let mut all: Vec<(Stamp, usize, Vec<u8>)> = Vec::new();
+fn written(mission: &Mission) -> io::Result<Vec<u8>> {
+    let mut to = GraphFile::new(Cursor::new(Vec::new()), true)?;
     let ends = Ends::new(mission);
-    for at in ends.turns(mission) {
-        all.push((at, 0, ends.graph(mission, at)));
-    }
+    let turns = ends.turns(mission);
+    let graphs = turns
+        .into_iter()
+        .map(|at| (at, GRAPH, ends.graph(mission, at)));
+    let mut all: Vec<(Stamp, usize, Vec<u8>)> = graphs.collect();
+    let last = mission.span.end.plus(-1);
     for (id, entry) in (0..).zip(&mission.ledger.entries) {
         if entry.is_headline() {
-            let at = entry
-                .time
-                .max(mission.span.start)
-                .min(mission.span.end.plus(-1));
-            all.push((
-                at,
-                1,
-                log(
-                    entry.time,
-                    &sentence(mission, id, entry),
-                    entry.kind.is_remark(),
-                ),
-            ));
+            let at = entry.time.max(mission.span.start).min(last);
+            let says = sentence(mission, id, entry);
+            all.push((at, LOG, log(entry.time, &says, entry.kind.is_remark())));
         }
     }
-    let last = mission.span.end.plus(-1);
-    all.push((last, 1, log(last, "the recording ends", false)));
+    all.push((last, LOG, log(last, "the recording ends", false)));
     all.sort_by_key(|(at, channel, _)| (*at, *channel));
-    for (sequence, (at, channel, payload)) in (0..).zip(&all) {
-        let time = u64::try_from(at.0).unwrap_or(0);
-        let header = MessageHeader {
-            channel_id: channels[*channel],
-            sequence,
-            log_time: time,
-            publish_time: time,
-        };
-        to.write_to_known_channel(&header, payload)?;
+    for (at, channel, payload) in &all {
+        to.write(*channel, *at, payload)?;
     }
-    to.finish()?;
-    Ok(to.into_inner().into_inner())
-}
-
-/// A record of the event log: information, or a warning.
-fn log(time: Stamp, text: &str, warns: bool) -> Vec<u8> {
-    let mut cdr = CdrWriter::new();
-    cdr.time(time);
-    cdr.u8(if warns { 3 } else { 2 });
-    cdr.text(text);
-    cdr.text("bagreel");
-    cdr.text("");
-    cdr.u32(0);
-    cdr.done()
+    Ok(to.finish()?.into_inner())
 }
 
 /// The ends of every node: the elements that are written.
@@ -176,116 +129,42 @@ impl<'a> Ends<'a> {
     fn graph(&self, mission: &Mission, at: Stamp) -> Vec<u8> {
         let elements = &mission.elements;
         let is_there = |what: Element| elements.runs(what).iter().any(|run| run.contains(at));
-        let nodes: Vec<_> = self
+        let nodes = self
             .of
             .iter()
-            .filter(|(id, _)| is_there(Element::Node(**id)))
-            .collect();
-        let mut alone: BTreeSet<u32> = BTreeSet::new();
-        for (what, _) in &self.topics {
-            if let (Element::Topic(id), true) = (*what, is_there(*what)) {
-                alone.insert(id);
-            }
-        }
-        let mut there: Vec<(&str, [Vec<&Topic>; 2])> = Vec::new();
+            .filter(|(id, _)| is_there(Element::Node(**id)));
+        let topics = (0..elements.topics.len() as u32).filter(|id| is_there(Element::Topic(*id)));
+        let mut alone: BTreeSet<u32> = topics.collect();
+        let topic = |id: u32| elements.topics.get(id as usize);
+        let mut there = Vec::new();
         for (id, ends) in nodes {
-            let topics = [0, 1].map(|side| {
-                let ends = ends[side].iter().filter(|(what, _)| is_there(*what));
-                let ids = ends.map(|(_, edge)| edge.topic);
-                ids.collect::<Vec<u32>>()
-            });
-            for id in topics.iter().flatten() {
-                alone.remove(id);
-            }
-            let topics = topics.map(|ids| {
-                let of = ids
-                    .iter()
-                    .filter_map(|id| elements.topics.get(*id as usize));
-                of.collect()
-            });
-            let name = elements
-                .nodes
-                .get(*id as usize)
-                .map_or("", |node| node.name.as_str());
-            there.push((name, topics));
-        }
-        let alone = alone
-            .iter()
-            .filter_map(|id| elements.topics.get(*id as usize));
-        let alone: Vec<&Topic> = alone.collect();
-        if !alone.is_empty() {
-            there.push((UNKNOWN_NODE, [alone, Vec::new()]));
-        }
-        let mut cdr = CdrWriter::new();
-        cdr.count(there.len());
-        for (name, topics) in &there {
-            node(&mut cdr, name, topics);
-        }
-        cdr.done()
-    }
-}
-
-/// A node, without parameters, and with its actions as their topics.
-fn node(cdr: &mut CdrWriter, name: &str, topics: &[Vec<&Topic>; 2]) {
-    cdr.text(name);
-    cdr.count(0);
-    cdr.count(0);
-    for services in [false, true] {
-        for (side, own) in topics.iter().enumerate() {
-            let own: Vec<_> = own
-                .iter()
-                .filter(|topic| topic.is_service() == services)
-                .collect();
-            cdr.count(own.len());
-            for topic in own {
-                cdr.text(topic.name.as_str());
-                let offered = topic.qos.as_deref().filter(|_| side == 0);
-                for _ in 0..=usize::from(services) {
-                    interface(cdr, topic.types.first().map_or("", |kind| kind));
-                    quality(cdr, offered);
+            let name = elements.nodes.get(*id as usize);
+            let mut node = GraphNode::new(name.map_or("", |node| node.name.as_str()));
+            for (side, ends) in ends.iter().enumerate() {
+                for (_, edge) in ends.iter().filter(|(what, _)| is_there(*what)) {
+                    alone.remove(&edge.topic);
+                    if let Some(topic) = topic(edge.topic) {
+                        node.ends[side + 2 * usize::from(topic.is_service())].push(end(topic));
+                    }
                 }
             }
+            there.push(node);
         }
+        if !alone.is_empty() {
+            let mut node = GraphNode::new(UNKNOWN_NODE);
+            for topic in alone.into_iter().filter_map(topic) {
+                node.ends[2 * usize::from(topic.is_service())].push(end(topic));
+            }
+            there.push(node);
+        }
+        graph(&there)
     }
-    cdr.count(0);
-    cdr.count(0);
 }
 
-/// A type, without the hash of its definition.
-fn interface(cdr: &mut CdrWriter, kind: &str) {
-    cdr.text(kind);
-    cdr.u8(1);
-    cdr.bytes(&[0; 32]);
-}
-
-/// A quality of service as far as its words say; the rest is unknown.
-fn quality(cdr: &mut CdrWriter, words: Option<&str>) {
-    let words: Vec<&str> = words.unwrap_or_default().split([' ', ',']).collect();
-    let place = |known: [&str; 2]| {
-        words
-            .iter()
-            .find_map(|word| known.iter().position(|k| k == word))
-    };
-    // 1 and 2 are the two words of each policy, 3 is unknown.
-    let policy = |known| {
-        place(known)
-            .and_then(|at| u8::try_from(at + 1).ok())
-            .unwrap_or(3)
-    };
-    let depth = words.iter().position(|word| *word == "depth");
-    let depth = depth.and_then(|at| words.get(at + 1)?.parse::<u32>().ok());
-    cdr.u32(depth.unwrap_or(0));
-    for _ in 0..4 {
-        cdr.u32(0);
+fn end(topic: &Topic) -> GraphEnd<'_> {
+    GraphEnd {
+        name: topic.name.as_str(),
+        kind: topic.types.first().map_or("", |kind| kind),
+        qos: topic.qos.as_deref(),
     }
-    cdr.u8(if depth.is_some() {
-        1
-    } else {
-        policy(["keep_last", "keep_all"])
-    });
-    cdr.u8(policy(["reliable", "best_effort"]));
-    cdr.u8(policy(["transient_local", "volatile"]));
-    cdr.u8(4);
-    cdr.u32(0);
-    cdr.u32(0);
 }

@@ -12,8 +12,8 @@ use crate::graph::window::Length;
 
 #[derive(Debug, Args)]
 pub(crate) struct FollowArgs {
-    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, or a folder whose newest recording is
-    /// followed.
+    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, a folder whose newest recording is
+    /// followed, or a live system: `ros1://HOST:11311` (a ROS 1 master), `ws://HOST:8765` (`foxglove_bridge`).
     #[arg(value_name = "WHAT")]
     pub(crate) what: PathBuf,
     /// How to print events.
@@ -35,6 +35,10 @@ pub(crate) struct FollowArgs {
     /// How much of the recording is kept in mind for events, findings and the page; outputs hold all of it.
     #[arg(long, value_name = "TIME", default_value = "1h", value_parser = period)]
     pub(crate) keep: Period,
+    /// Topics of a live system (`ws://`) whose messages are recorded, so that their rates are known, separated by
+    /// commas. [default: none, the graph only]
+    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',')]
+    pub(crate) rates: Vec<String>,
     /// Show the mission as a page at this address, which grows with the recording: `127.0.0.1:8723`.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) serve: Option<SocketAddr>,

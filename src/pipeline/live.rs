@@ -1,0 +1,272 @@
+//! A live system, recorded to a temporary MCAP file that is followed like any other recording: its graph whenever it
+//! changes, a sign of life each second, and the messages of topics that were asked for.
+//!
+//! Nothing is published, set or called that changes the system. While it cannot be reached nothing is recorded, so that
+//! what is not seen is not taken for stopped.
+
+#[cfg(feature = "live")]
+mod bridge;
+mod master;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{JoinHandle, sleep, spawn};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use crate::bag::source::Temporary;
+use crate::base::error::{Error, Result};
+use crate::base::time::Stamp;
+use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
+
+/// The time between two signs of life.
+const BEAT: Duration = Duration::from_secs(1);
+/// The time for which an answer is waited for.
+const WAIT: Duration = Duration::from_secs(5);
+/// The longest wait before the system is looked for again.
+const MOST_WAIT: Duration = Duration::from_secs(16);
+/// The most names of nodes, topics and services at a time, each end counted once.
+const MOST_NAMES: usize = 200_000;
+
+/// The ways to reach a live system, by the beginnings of their addresses; `None` for those left out of this build.
+const WAYS: [(&str, Option<Watch>); 2] = [("ros1://", Some(master::watch)), ("ws://", BRIDGE)];
+#[cfg(feature = "live")]
+const BRIDGE: Option<Watch> = Some(bridge::watch);
+#[cfg(not(feature = "live"))]
+const BRIDGE: Option<Watch> = None;
+
+/// Watches the system at an address (`host:port`) until the connection fails, or [`Watched::is_over`].
+type Watch = fn(&str, &mut Watched) -> io::Result<()>;
+
+/// A recording of a live system, which goes on until it is dropped or finished.
+pub(crate) struct Live {
+    path: PathBuf,
+    is_over: Arc<AtomicBool>,
+    news: Receiver<String>,
+    recorder: Option<JoinHandle<()>>,
+    _folder: Temporary,
+}
+
+impl Live {
+    /// Begins to record the system at `address`, with the messages of `topics`; `None` if this is no address of one.
+    ///
+    /// # Errors
+    /// Where the file cannot be made.
+    pub(crate) fn start(address: &Path, topics: &[String]) -> Result<Option<Self>> {
+        let text = address.to_string_lossy();
+        let mut ways = WAYS.into_iter();
+        let found = ways.find_map(|(scheme, way)| Some((text.strip_prefix(scheme)?, way)));
+        if !topics.is_empty() && !text.starts_with("ws://") {
+            let what = "`--rates` asks for messages that only a bridge (`ws://`) sends";
+            return Err(Error::usage(what, "leave it out"));
+        }
+        let Some((place, way)) = found else {
+            return Ok(None);
+        };
+        let watch = way.ok_or_else(|| Error::Unsupported {
+            path: address.to_owned(),
+            what: "this build of bagreel has no WebSockets".to_owned(),
+            hint: "build with the feature `live`: `cargo install bagreel --features live`"
+                .to_owned(),
+        })?;
+        let folder = Temporary::new()?;
+        let path = folder.path().join("live.mcap");
+        let file = File::create(&path).map_err(Error::io("write", &path))?;
+        let file = GraphFile::new(BufWriter::new(file), false);
+        let flushed = file.and_then(|mut file| file.flush().map(|()| file));
+        let file = flushed.map_err(Error::io("write", &path))?;
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (told, news) = channel();
+        let watched = Watched {
+            file,
+            topics: topics.iter().cloned().collect(),
+            graph: LiveGraph::default(),
+            written: None,
+            is_over: is_over.clone(),
+        };
+        let (name, place) = (text.to_string(), place.trim_end_matches('/').to_owned());
+        let recorder = spawn(move || record(watch, &name, &place, watched, &told));
+        Ok(Some(Self {
+            path,
+            is_over,
+            news,
+            recorder: Some(recorder),
+            _folder: folder,
+        }))
+    }
+
+    /// The file that grows.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What became of the connection since the last time.
+    pub(crate) fn news(&self) -> impl Iterator<Item = String> + '_ {
+        self.news.try_iter()
+    }
+
+    /// Ends the recording; the file has its summary then.
+    pub(crate) fn finish(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        if let Some(recorder) = self.recorder.take() {
+            // What a thread of ours says when it panics was printed already.
+            let _ = recorder.join();
+        }
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+/// Watches the system, again and again if the connection fails.
+fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Sender<String>) {
+    let mut wait = BEAT;
+    while !watched.is_over() {
+        watched.written = None;
+        let failed = watch(place, &mut watched);
+        if watched.is_over() {
+            break;
+        }
+        if watched.written.is_some() {
+            wait = BEAT;
+        }
+        let why = failed
+            .err()
+            .map_or_else(|| "it was closed".to_owned(), |e| e.to_string());
+        let text = format!(
+            "no connection to {name}: {why}; trying again in {} s",
+            wait.as_secs()
+        );
+        if told.send(text).is_err() {
+            break;
+        }
+        let until = SystemTime::now() + wait;
+        while !watched.is_over() && SystemTime::now() < until {
+            sleep(BEAT / 10);
+        }
+        wait = (wait * 2).min(MOST_WAIT);
+    }
+    if let Err(error) = watched.file.finish() {
+        let _ = told.send(format!(
+            "the recording of {name} could not be ended: {error}"
+        ));
+    }
+}
+
+/// A live system that is watched, and its recording.
+struct Watched {
+    file: GraphFile<BufWriter<File>>,
+    /// The topics whose messages are recorded.
+    topics: BTreeSet<String>,
+    graph: LiveGraph,
+    /// The last graph that was written since the connection stands.
+    written: Option<Vec<u8>>,
+    is_over: Arc<AtomicBool>,
+}
+
+impl Watched {
+    fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
+    /// Records that the system is there, and its graph if that has changed.
+    fn beat(&mut self) -> io::Result<()> {
+        let now = now();
+        let payload = self.graph.payload();
+        if self.written.as_ref() != Some(&payload) {
+            self.file.write(GRAPH, now, &payload)?;
+            self.written = Some(payload);
+        }
+        self.file.write(LOG, now, &log(now, "connected", false))?;
+        self.file.flush()
+    }
+}
+
+/// Connects to a server; what it does not answer in time fails.
+fn connect(place: &str) -> io::Result<TcpStream> {
+    let mut failed = io::Error::other("the name has no address");
+    for at in place.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&at, WAIT) {
+            Ok(stream) => {
+                stream.set_read_timeout(Some(WAIT))?;
+                stream.set_write_timeout(Some(WAIT))?;
+                return Ok(stream);
+            }
+            Err(error) => failed = error,
+        }
+    }
+    Err(failed)
+}
+
+/// The time of this machine.
+fn now() -> Stamp {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Stamp(since.map_or(0, |since| {
+        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    }))
+}
+
+/// Who sends and receives what: for each of publishers, subscribers, clients and servers the names of nodes by topic or
+/// service.
+#[derive(Default)]
+struct LiveGraph {
+    ends: [BTreeMap<String, BTreeSet<String>>; 4],
+    /// The types of topics.
+    types: BTreeMap<String, String>,
+}
+
+/// The places in [`LiveGraph::ends`].
+const PUBLISHERS: usize = 0;
+const SUBSCRIBERS: usize = 1;
+const SERVERS: usize = 3;
+
+impl LiveGraph {
+    /// Says which nodes are at a topic or service; none of them if it is gone.
+    fn set(&mut self, side: usize, name: &str, nodes: BTreeSet<String>) {
+        if nodes.is_empty() {
+            self.ends[side].remove(name);
+        } else {
+            self.ends[side].insert(name.to_owned(), nodes);
+        }
+    }
+
+    /// # Errors
+    /// Where there are more names than a robot has.
+    fn check(&self) -> io::Result<()> {
+        let ends = self
+            .ends
+            .iter()
+            .flat_map(BTreeMap::values)
+            .map(BTreeSet::len);
+        if ends.sum::<usize>() + self.types.len() > MOST_NAMES {
+            return Err(io::Error::other(format!("more than {MOST_NAMES} names")));
+        }
+        Ok(())
+    }
+
+    fn payload(&self) -> Vec<u8> {
+        let mut nodes: BTreeMap<&str, GraphNode<'_>> = BTreeMap::new();
+        for (side, ends) in self.ends.iter().enumerate() {
+            for (name, at) in ends {
+                let kind = self.types.get(name).map_or("", String::as_str);
+                for node in at {
+                    let node = nodes.entry(node).or_insert_with(|| GraphNode::new(node));
+                    node.ends[side].push(GraphEnd {
+                        name,
+                        kind,
+                        qos: None,
+                    });
+                }
+            }
+        }
+        graph(&nodes.into_values().collect::<Vec<_>>())
+    }
+}

@@ -1,0 +1,217 @@
+//! Live systems: a master of ROS 1 and a server of Foxglove's protocol that play a script on this machine.
+
+use std::collections::BTreeSet;
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Command, Output};
+use std::thread::spawn;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Follows a system until it has said nothing for two seconds.
+fn follow(folder: &Path, more: &[&str]) -> Output {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    run.current_dir(folder).arg("follow").args(more);
+    run.args(["--idle", "2s", "-o", "f.json"]).output().unwrap()
+}
+
+/// What was written at the end: names of nodes, and the ends of edges, of all windows.
+fn graph(folder: &Path) -> (BTreeSet<String>, BTreeSet<String>) {
+    let text = std::fs::read_to_string(folder.join("f.json")).unwrap();
+    let json: Value = serde_json::from_str(&text).unwrap();
+    let text = |value: &Value, key: &str| value[key].as_str().unwrap().to_owned();
+    let (mut nodes, mut edges) = (BTreeSet::new(), BTreeSet::new());
+    for window in json["windows"].as_array().unwrap() {
+        let list = |key: &str| window[key].as_array().unwrap().iter();
+        nodes.extend(list("nodes").map(|node| text(node, "name")));
+        for (key, arrow) in [("publishes", "→"), ("subscribes", "←")] {
+            let edge = |e: &Value| format!("{} {arrow} {}", text(e, "node"), text(e, "topic"));
+            edges.extend(list(key).map(edge));
+        }
+    }
+    (nodes, edges)
+}
+
+/// An array of XML-RPC.
+fn array(of: &[String]) -> String {
+    format!("<value><array><data>{}</data></array></value>", of.concat())
+}
+
+fn string(text: &str) -> String {
+    format!("<value><string>{text}</string></value>")
+}
+
+/// Answers as `rosmaster` does: `/talker` and `/listener` share `/chat`, and the talker is gone after `there`.
+fn answer(stream: &mut TcpStream, there: bool) {
+    let mut asked = [0; 4096];
+    let mut got = 0;
+    while !String::from_utf8_lossy(&asked[..got]).contains("</methodCall>") {
+        got += stream.read(&mut asked[got..]).unwrap();
+    }
+    let asked = String::from_utf8_lossy(&asked[..got]).into_owned();
+    let at = |topic: &str, node: &str| array(&[string(topic), array(&[string(node)])]);
+    let what = if asked.contains("getSystemState") {
+        let talker = there.then(|| at("/chat", "/talker"));
+        let publishers = array(talker.as_slice());
+        let services = array(&[at("/listener/get_loggers", "/listener")]);
+        array(&[publishers, array(&[at("/chat", "/listener")]), services])
+    } else {
+        assert!(asked.contains("getTopicTypes"), "{asked}");
+        array(&[array(&[string("/chat"), string("std_msgs/String")])])
+    };
+    let all = array(&["<value><int>1</int></value>".to_owned(), string("ok"), what]);
+    let body = format!(
+        "<?xml version='1.0'?>\n<methodResponse>\n<params>\n<param>\n{all}\n</param>\n</params>\n</methodResponse>"
+    );
+    let length = body.len();
+    write!(
+        stream,
+        "HTTP/1.0 200 OK\r\nContent-length: {length}\r\n\r\n{body}"
+    )
+    .unwrap();
+}
+
+#[test]
+fn a_ros_1_master_is_watched() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("ros1://{}", listener.local_addr().unwrap());
+    spawn(move || {
+        let begun = Instant::now();
+        for stream in listener.incoming() {
+            let passed = begun.elapsed();
+            if passed > Duration::from_secs(5) {
+                break;
+            }
+            answer(&mut stream.unwrap(), passed < Duration::from_millis(2500));
+        }
+    });
+    let folder = TempDir::new().unwrap();
+    let done = follow(folder.path(), &[&address]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(0), "{said}");
+    assert!(said.contains("no connection to ros1://127.0.0.1"), "{said}");
+    let printed = String::from_utf8_lossy(&done.stdout);
+    assert!(printed.contains("/talker stopped"), "{printed}");
+    let (nodes, edges) = graph(folder.path());
+    assert!(nodes.iter().eq(["/listener", "/talker"]), "{nodes:?}");
+    assert!(edges.contains("/talker → /chat"), "{edges:?}");
+    assert!(edges.contains("/listener ← /chat"), "{edges:?}");
+}
+
+#[test]
+fn what_is_no_master_is_said() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("ros1://{}", listener.local_addr().unwrap());
+    spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            let _ = stream.read(&mut [0; 4096]);
+            let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\n\r\n");
+        }
+    });
+    let folder = TempDir::new().unwrap();
+    let done = follow(folder.path(), &[&address]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("not that of a ROS master"), "{said}");
+    assert_eq!(done.status.code(), Some(1), "{said}");
+}
+
+#[test]
+fn rates_are_refused_where_no_messages_come() {
+    let folder = TempDir::new().unwrap();
+    let done = follow(folder.path(), &["ros1://localhost:1", "--rates", "/scan"]);
+    assert_eq!(done.status.code(), Some(2));
+}
+
+#[cfg(feature = "live")]
+mod bridge {
+    use std::net::{TcpListener, TcpStream};
+    use std::thread::{sleep, spawn};
+    use std::time::Duration;
+
+    use serde_json::{Value, json};
+    use tempfile::TempDir;
+    use tungstenite::handshake::server::{Request, Response};
+    use tungstenite::{Message, WebSocket, accept_hdr};
+
+    use super::{follow, graph};
+
+    /// Says something to the client.
+    fn say(to: &mut WebSocket<TcpStream>, message: &Value) {
+        to.send(Message::text(message.to_string())).unwrap();
+    }
+
+    /// The next message of the client's.
+    fn hear(from: &mut WebSocket<TcpStream>) -> Value {
+        serde_json::from_str(from.read().unwrap().to_text().unwrap()).unwrap()
+    }
+
+    fn update(publisher: &[&str]) -> Value {
+        json!({
+            "op": "connectionGraphUpdate",
+            "publishedTopics": [{"name": "/scan", "publisherIds": publisher}],
+            "subscribedTopics": [{"name": "/scan", "subscriberIds": ["/slam"]}],
+            "advertisedServices": [], "removedTopics": [], "removedServices": [],
+        })
+    }
+
+    /// As `foxglove_bridge`: the graph comes when a subscription follows the one to the graph.
+    fn serve(stream: TcpStream) {
+        let protocol = |_: &Request, mut response: Response| {
+            let own = "foxglove.websocket.v1".parse().unwrap();
+            response.headers_mut().insert("Sec-WebSocket-Protocol", own);
+            Ok(response)
+        };
+        let mut client = accept_hdr(stream, protocol).unwrap();
+        say(
+            &mut client,
+            &json!({"op": "serverInfo", "name": "robot", "capabilities": ["connectionGraph"]}),
+        );
+        assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
+        say(
+            &mut client,
+            &json!({"op": "advertise", "channels": [{
+                "id": 7, "topic": "/scan", "encoding": "cdr", "schemaName": "std_msgs/msg/Empty", "schema": "",
+            }]}),
+        );
+        let asked = hear(&mut client);
+        assert_eq!(asked["subscriptions"][0]["channelId"], 7, "{asked}");
+        let subscription = asked["subscriptions"][0]["id"].as_u64().unwrap() as u32;
+        say(&mut client, &update(&["/lidar"]));
+        for time in 0..60_u64 {
+            let mut message = vec![1];
+            message.extend(subscription.to_le_bytes());
+            message.extend((time * 50_000_000).to_le_bytes());
+            message.extend([0, 1, 0, 0, 0]);
+            client.send(Message::binary(message)).unwrap();
+            sleep(Duration::from_millis(50));
+        }
+        say(&mut client, &update(&[]));
+        sleep(Duration::from_millis(1500));
+    }
+
+    #[test]
+    fn a_bridge_tells_its_graph_and_the_rates_asked_for() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("ws://{}", listener.local_addr().unwrap());
+        let server = spawn(move || serve(listener.accept().unwrap().0));
+        let folder = TempDir::new().unwrap();
+        let done = follow(folder.path(), &[&address, "--rates", "/scan"]);
+        server.join().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(0), "{said}");
+        let (nodes, edges) = graph(folder.path());
+        assert!(nodes.iter().eq(["/lidar", "/slam"]), "{nodes:?}");
+        assert!(edges.contains("/lidar → /scan"), "{edges:?}");
+        let log = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(folder.path())
+            .args(["info", "f.json", "--format", "json"])
+            .output()
+            .unwrap();
+        let log = String::from_utf8_lossy(&log.stdout);
+        assert!(log.contains("\"received\": 60"), "{log}");
+    }
+}
