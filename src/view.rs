@@ -1,8 +1,10 @@
 //! The view of a mission: the full graph filtered, grouped and collapsed; the full graph stays as it is.
 
+mod apart;
 mod audience;
 mod bundles;
 mod caption;
+mod cards;
 mod cluster;
 mod collapse;
 mod counts;
@@ -14,7 +16,6 @@ mod group;
 mod hidden;
 mod home;
 mod homes;
-mod hubs;
 mod items;
 mod lasting;
 mod lives;
@@ -40,6 +41,7 @@ use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::EntryId;
 
+pub use cards::CardRow;
 pub(crate) use collapse::{Collapsible, headlines};
 pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
@@ -69,32 +71,48 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
 }
 
 fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
-    let (mut list, mut shown) = (frames.list, (frames.items, frames.arrows));
-    let mut items = viewed.items;
-    let in_words = items.split_off(items.len() - viewed.in_words);
-    let shown_in_words = shown.0.split_off(items.len().min(shown.0.len()));
+    let mut list = frames.list;
+    let mut drawn = cards::Drawn {
+        items: viewed.items,
+        arrows: viewed.arrows,
+        items_shown: frames.items,
+        arrows_shown: frames.arrows,
+    };
+    let boxes = drawn.items.len() - viewed.in_words;
+    let in_words = drawn.items.split_off(boxes);
+    let shown_in_words = drawn
+        .items_shown
+        .split_off(boxes.min(drawn.items_shown.len()));
+    let rows = if options.is_picture {
+        let rows = drawn.fold_leaves(options.hide.quiet);
+        drawn.join_twins();
+        rows
+    } else {
+        Vec::new()
+    };
     let fleets = viewed.fleets.all.iter().map(|fleet| &*fleet.name).collect();
-    let mut namespaces = cluster::clusters(&mut items, options.group.namespaces, &fleets);
-    let mut drawn = Vec::new();
+    let mut namespaces = cluster::clusters(&mut drawn.items, options.group.namespaces, &fleets);
+    let mut equal = Vec::new();
     for namespace in &mut namespaces {
         let fleets = viewed.fleets.all.iter().zip(0_usize..);
         if let Some((fleet, at)) = fleets.into_iter().find(|(f, _)| f.name == namespace.name) {
             namespace.replicas = fleet.indices();
-            drawn.push(at);
+            equal.push(at);
         }
     }
     for frame in &mut list {
         let roll = |at: &usize| frame.rolls.get(*at).cloned().unwrap_or_default();
-        frame.rolls = drawn.iter().map(roll).collect();
+        frame.rolls = equal.iter().map(roll).collect();
     }
     View {
         also: bundles::also_here(in_words, shown_in_words, &namespaces),
-        items,
-        arrows: viewed.arrows,
+        rows,
+        items: drawn.items,
+        arrows: drawn.arrows,
         namespaces,
         frames: list,
-        items_shown: shown.0,
-        arrows_shown: shown.1,
+        items_shown: drawn.items_shown,
+        arrows_shown: drawn.arrows_shown,
         compares: false,
     }
 }
@@ -137,8 +155,6 @@ pub struct Item {
     pub is_replica: bool,
     /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
-    /// For a hub, which has a box in each namespace that uses it, the first of its boxes: a place in [`View::items`].
-    pub hub: Option<u32>,
 }
 
 /// A namespace drawn as a box around its members.
@@ -152,12 +168,12 @@ pub struct Namespace {
     pub replicas: Vec<Arc<str>>,
 }
 
-/// Nodes that stand as words in a namespace, because no line leads to them.
+/// Nodes and topics that stand as words in a namespace, because no line leads to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AlsoHere {
     /// The innermost namespace with a box around them: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
-    /// The nodes, sorted by name.
+    /// The nodes, then the topics, each sorted by name.
     pub items: Vec<Item>,
     /// The looks of each, window by window.
     pub shown: Vec<Showing>,
@@ -490,7 +506,9 @@ pub struct View {
     pub arrows: Vec<Arrow>,
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
-    /// The nodes that stand as words, by namespace.
+    /// The topics that stand as rows in boxes.
+    pub rows: Vec<CardRow>,
+    /// The nodes and topics that stand as words, by namespace.
     pub also: Vec<AlsoHere>,
     /// The windows.
     pub frames: Vec<Frame>,
@@ -537,42 +555,12 @@ impl View {
         }
     }
 
-    /// The same view with `seen` in its windows, one entry per window, in place of what it showed.
-    #[must_use]
-    pub fn showing(self, seen: &[SeenWindow]) -> Self {
-        let shown = |count: usize, list: fn(&SeenWindow) -> &[Shown]| {
-            let find =
-                |all: &'_ SeenWindow, id: usize| list(all).iter().position(|s| s.id as usize == id);
-            let one = |id| {
-                Showing::of(
-                    seen.iter()
-                        .map(|all| find(all, id).map(|at| &list(all)[at])),
-                )
-            };
-            (0..count).map(one).collect()
-        };
-        let mut also = self.also;
-        for showing in also.iter_mut().flat_map(|also| &mut also.shown) {
-            // They are there as they were last.
-            let last = showing.looks().last().map(|look| Shown {
-                mark: None,
-                ..look.clone()
-            });
-            *showing = Showing::of(seen.iter().map(|_| last.as_ref()));
-        }
-        Self {
-            also,
-            items_shown: shown(self.items.len(), |s| &s.items),
-            arrows_shown: shown(self.arrows.len(), |s| &s.arrows),
-            ..self
-        }
-    }
-
     /// Every look of any item or arrow, in no particular order.
     pub fn looks(&self) -> impl Iterator<Item = &Shown> {
         let all = self.items_shown.iter().chain(&self.arrows_shown);
         let also = self.also.iter().flat_map(|also| &also.shown);
-        all.chain(also).flat_map(Showing::looks)
+        let rows = self.rows.iter().map(|row| &row.shown);
+        all.chain(also).chain(rows).flat_map(Showing::looks)
     }
 
     /// The place of the window with most headlines, the first of several; [`View::busiest`] where there are none.
@@ -598,7 +586,13 @@ impl View {
         let is_there = |s: &Shown| s.mark != Some(Mark::Removed);
         // By how many more are there than in the window before.
         let mut more = vec![0_i64; self.frames.len()];
-        for showing in self.items_shown.iter().chain(&self.arrows_shown) {
+        let rows = self.rows.iter().map(|row| &row.shown);
+        for showing in self
+            .items_shown
+            .iter()
+            .chain(&self.arrows_shown)
+            .chain(rows)
+        {
             let mut was = false;
             for (window, shown) in showing.runs() {
                 let is = shown.is_some_and(is_there);

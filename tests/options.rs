@@ -48,7 +48,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -p all -o out/x.png", "--size 300x200"),
     ("render", "r.bag -p all -o out/x.svg", "--width 88mm"),
     ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--fit none"),
-    ("render", "r.bag -p all -o out/x.svg", "--orientation LR"),
+    ("render", "r.bag -p all -o out/x.html", "--orientation TB"),
     ("render", "r.bag -p all -o out/x.svg", "--layout layout-rs"),
     ("render", "r.bag -p all -o out/x.svg", "--layout-from wide.json"),
     ("render", "r.bag -p all -o out/x.svg", "--title Hello"),

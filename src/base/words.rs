@@ -48,12 +48,14 @@ pub fn count_range(from: Option<f64>, to: Option<f64>) -> String {
 }
 
 /// The rate of `count` messages in `seconds`, with no more digits than so few messages can tell: `1 msg` for a single
-/// one, one significant digit below 10, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n.
+/// one, one significant digit below 10, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n. In less
+/// than a millisecond there is no rate, only the number.
 pub fn rate_of(count: u64, seconds: f64) -> String {
     let hz = count as f64 / seconds;
     match count {
         0 => rate(0.0),
         1 => "1 msg".to_owned(),
+        n if seconds < 0.001 => format!("{n} msg"),
         2..=9 => rate(significant(hz, 1)),
         10..=999 => rate(significant(hz, 2)),
         _ => rate(hz),
@@ -333,6 +335,7 @@ mod tests {
             (rate_of(0, 10.0), "0 Hz"),
             (rate_of(1, 300.0), "1 msg"),
             (rate_of(3, 10.0), "0.3 Hz"),
+            (rate_of(3, 1e-6), "3 msg"),
             (rate_of(299, 10.0), "30 Hz"),
             (rate_of(1249, 100.0), "12.5 Hz"),
             (count(0, "node"), "0 nodes"),

@@ -240,7 +240,6 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         is_sized: args.look.size.is_some(),
         purpose: None,
         is_fitted: args.look.fit == "auto",
-        splits_hubs: true,
         engine: crate::layout::engine(&args.look.layout)?,
         kept: look::kept(args.look.layout_from.as_deref())?,
     };

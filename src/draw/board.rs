@@ -23,6 +23,8 @@ use crate::view::{Frame, View};
 /// The least and the largest number of pixels per millimetre of the drawing: for small text of at least 9 pixels, and
 /// for text not larger than titles.
 const SCALE: (f64, f64) = (4.26, 5.6);
+/// The width of a page that the user did not choose: its text can be read in a column of a web page.
+const NARROW: f64 = 960.0;
 /// The largest page that a board grows to where the user chose none.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The widths of types and of rates, in millimetres, and the room between columns.
@@ -78,6 +80,9 @@ impl<'a> Board<'a> {
         is_sized: bool,
     ) -> Self {
         let sizes = Sizes::of_names(7.0);
+        if !is_sized {
+            options.size.w = options.size.w.min(NARROW);
+        }
         let mut lives = LivesFigure::new(source, true).opened();
         if !is_sized && most_rows(&lives, style, &options, fonts) < lives.rows.len() {
             options.size = LARGEST;

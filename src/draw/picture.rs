@@ -4,9 +4,11 @@ mod also;
 mod arrows;
 mod badge;
 mod boxes;
+mod card;
 mod chips;
 pub(crate) use chips::chips;
 mod course;
+mod ids;
 mod legend;
 pub(crate) use legend::{LegendSign, signs};
 mod measured;
@@ -20,25 +22,22 @@ mod topics;
 mod tween;
 mod union;
 
-use std::collections::BTreeSet;
-use std::fmt::Write as _;
-
 use self::arrows::{ArrowPath, Arrows};
 use self::boxes::{Boxes, ItemBox};
+pub use self::ids::unshown;
+use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
 use self::page::{GraphFit, PageFrame};
 use self::timeline::Timeline;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::{Point, Size};
-use crate::base::notice::{Notice, NoticeKind};
-use crate::base::words;
 pub use crate::draw::figure::course::Course;
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{Arrow, ArrowKind, Frame, Item, SeenWindow, View};
+use crate::view::{ArrowKind, Frame, SeenWindow, View};
 
 /// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,7 +143,7 @@ impl<'a> Measured<'a> {
         if graph.rated.contains(&true) || !graph.footers.is_empty() {
             smallest = smallest.min(style.edge.size);
         }
-        if graph.labels.iter().any(|l| l.second) {
+        if graph.labels.iter().any(|l| l.second) || !self.view.rows.is_empty() {
             smallest = smallest.min(style.node.small).min(style.topic.small);
         }
         smallest * self.page.fit(layout.size).scale
@@ -373,6 +372,7 @@ impl<'a> Picture<'a> {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
                 groups.push(boxes.item(item, card, shown));
+                groups.extend(boxes.card_rows(card, view, k));
             }
         }
     }
@@ -418,13 +418,14 @@ fn places(
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
     let tells = measured::tells(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
-    let labels = measured.graph.labels.iter().zip(tells);
+    let labels = measured.graph.labels.iter().zip(&measured.graph.cards);
     items
-        .zip(labels)
-        .map(|((item, place), (label, tells))| ItemBox {
+        .zip(labels.zip(tells))
+        .map(|((item, place), ((label, card), tells))| ItemBox {
             id: item_id(item),
             label: label.clone(),
             tells,
+            card: Some(card).filter(|card| card.head > 0.0).cloned(),
             place: fit.rect(*place),
             badge: Point::default(),
         })
@@ -449,49 +450,6 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
             path
         })
         .collect()
-}
-
-/// The notice about names with characters that no font has; `None` if there are none.
-pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
-    let names = view.items.iter().map(|item| &*item.name);
-    let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
-    let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
-    let some = words::some_of(&spelled.collect::<Vec<_>>(), 3);
-    let text = format!(
-        "names contain characters that the font lacks, drawn as {some}; add a font with `--font FILE`"
-    );
-    (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
-}
-
-fn item_id(item: &Item) -> String {
-    let prefix = if item.kind.word() == "node" { "n" } else { "t" };
-    format!("{prefix}{}", encoded(&item.name))
-}
-
-fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
-    let [from, to] = ends.each_ref().map(|name| encoded(name));
-    match &arrow.kind {
-        ArrowKind::Publish => format!("p{from}..{to}"),
-        ArrowKind::Subscribe => format!("s{from}..{to}"),
-        ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
-        ArrowKind::Bundle => format!("b{from}..{to}"),
-    }
-}
-
-/// A name as part of an XML id, different for different names: `/` becomes `-`, anything but letters, digits and `_`
-/// becomes `.` with its number in six hexadecimal digits.
-fn encoded(name: &str) -> String {
-    let mut out = String::with_capacity(name.len());
-    for c in name.chars() {
-        match c {
-            '/' => out.push('-'),
-            '_' | 'a'..='z' | 'A'..='Z' | '0'..='9' => out.push(c),
-            _ => {
-                let _ = write!(out, ".{:06x}", u32::from(c));
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]

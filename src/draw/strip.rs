@@ -388,7 +388,7 @@ mod tests {
     use crate::evidence::Degree;
     use crate::graph::{Element, Elements, State};
     use crate::layout;
-    use crate::view::{Headline, Item, ItemKind, Mark, Phrase, SeenWindow, Shown};
+    use crate::view::{Headline, Item, ItemKind, Mark, Phrase, Showing, Shown};
 
     /// Four minutes in which a node is there and another comes and goes.
     fn two_nodes() -> (Mission, View) {
@@ -416,7 +416,6 @@ mod tests {
             members: vec![Element::Node(id)],
             is_replica: false,
             cluster: None,
-            hub: None,
         };
         let shown = |id, mark| Shown {
             mark,
@@ -436,19 +435,17 @@ mod tests {
             ..Frame::empty(index, Span::new(minute(index), minute(index + 1)))
         };
         let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
-        let seen = |mark: &Option<Mark>| SeenWindow {
-            items: std::iter::once(shown(0, None))
-                .chain(mark.map(|m| shown(1, Some(m))))
-                .collect(),
-            arrows: Vec::new(),
-        };
-        let seen: Vec<SeenWindow> = marks.iter().map(seen).collect();
+        let driver = shown(0, None);
+        let planner = marks.map(|mark| mark.map(|m| shown(1, Some(m))));
         let view = View {
             items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
+            items_shown: vec![
+                Showing::of(marks.iter().map(|_| Some(&driver))),
+                Showing::of(planner.iter().map(Option::as_ref)),
+            ],
             frames: marks.into_iter().enumerate().map(frame).collect(),
             ..View::default()
         };
-        let view = view.showing(&seen);
         (mission, view)
     }
 

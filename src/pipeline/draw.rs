@@ -56,8 +56,6 @@ pub struct Drawing {
     pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
-    /// Whether hubs, topics that half the system is connected to, have a box in each namespace that uses them.
-    pub(crate) splits_hubs: bool,
     /// The layout engine.
     pub engine: &'static (dyn Engine + Sync),
     /// Places of an earlier drawing, which are kept; new elements are placed beside them.
@@ -79,7 +77,6 @@ impl Drawing {
             is_sized: false,
             purpose: None,
             is_fitted: true,
-            splits_hubs: true,
             engine: crate::layout::ENGINES[0].1,
             kept: None,
         })

@@ -23,7 +23,7 @@ use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, outline, unmatched};
+use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, unmatched};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -121,20 +121,18 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     let still = still(job, &mut mission);
     let job = still.as_ref().unwrap_or(job);
     let is_figure = job.sequence.figure.is_some();
-    let is_whole: Vec<bool> = job.outputs.iter().map(has_whole_hubs).collect();
+    let is_whole: Vec<bool> = job.outputs.iter().map(has_all_topics).collect();
     let is_mixed = is_whole.contains(&true)
         && job
             .outputs
             .iter()
-            .any(|o| o.format.is_drawn && !has_whole_hubs(o));
-    let options = &job.drawing.view;
-    let is_other = || options.mode == Mode::Nodes || outline(&mission, options).has_hubs();
-    if is_figure || !is_mixed || !is_other() {
+            .any(|o| o.format.is_drawn && !has_all_topics(o));
+    if is_figure || !is_mixed {
         return show_alike(job, mission, watch);
     }
     // Two drawings of one mission: the same picture as if either kind of output had been asked for alone.
     let some = |is: bool| {
-        let outputs = job.outputs.iter().filter(|o| has_whole_hubs(o) == is);
+        let outputs = job.outputs.iter().filter(|o| has_all_topics(o) == is);
         Render {
             outputs: outputs.cloned().collect(),
             ..job.clone()
@@ -178,9 +176,9 @@ fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
     })
 }
 
-/// Whether an output has each topic once: a page that opens boxes, and a graph that is written down. Pictures may show
-/// a hub in each namespace that uses it.
-fn has_whole_hubs(output: &Output) -> bool {
+/// Whether an output has each topic as an element of its own: a page that opens boxes, and a graph that is written down.
+/// Pictures may show it as a row of a box.
+fn has_all_topics(output: &Output) -> bool {
     let format = output.format;
     format.is_unfolded || format.is_viewed && !format.is_drawn
 }
@@ -188,8 +186,8 @@ fn has_whole_hubs(output: &Output) -> bool {
 /// Draws and writes a mission where all outputs show the same drawing.
 fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
-    let is_picture = !job.outputs.iter().any(has_whole_hubs);
-    drawing.splits_hubs &= is_picture;
+    let is_picture = !job.outputs.iter().any(has_all_topics);
+    drawing.view.is_picture = is_picture;
     if is_picture && drawing.view.mode == Mode::Nodes {
         drawing.view.mode = Mode::Bundles;
     }

@@ -434,11 +434,6 @@ impl Attempt {
     ) -> Self {
         // The widest labels depend on rates, so that the windows are needed too.
         let (view, notices) = view(mission, options);
-        let view = if drawing.splits_hubs {
-            view.with_hubs_split()
-        } else {
-            view
-        };
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
         let (plan, page) = (measured.plan(), measured.layout_options());
         let mut placed = |page: &LayoutOptions| {

@@ -117,10 +117,7 @@ fn changing_nodes(
 ) -> (Vec<bool>, Vec<bool>) {
     let mut changes = vec![false; mission.elements.nodes.len()];
     let mut changes_itself = changes.clone();
-    let entries = mission.ledger.entries.iter();
-    let first = mission.windows.first().map(|window| window.span.end);
-    let is_first = |e: &Entry| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
-    for entry in entries.filter(|entry| entry.is_headline() && !is_first(entry)) {
+    for entry in news(mission) {
         let nodes = match mission.elements.ends(entry.what) {
             (Some(node), _) => {
                 changes_itself[node as usize] = true;
@@ -134,6 +131,15 @@ fn changing_nodes(
         }
     }
     (changes, changes_itself)
+}
+
+/// The headlines but for the starts in the first window.
+pub(crate) fn news(mission: &Mission) -> impl Iterator<Item = &Entry> {
+    let first = mission.windows.first().map(|window| window.span.end);
+    let is_first =
+        move |e: &Entry| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
+    let entries = mission.ledger.entries.iter();
+    entries.filter(move |entry| entry.is_headline() && !is_first(entry))
 }
 
 /// These nodes with their looks, by the innermost namespace with a box.

@@ -118,7 +118,6 @@ mod tests {
             members: Vec::new(),
             is_replica: false,
             cluster: None,
-            hub: None,
         };
         let mut items: Vec<Item> = names.iter().map(item).collect();
         let spaces = clusters(&mut items, depth, &BTreeSet::new());

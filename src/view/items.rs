@@ -55,11 +55,11 @@ pub(crate) struct Viewed {
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
     /// Per topic, whether bundles draw it.
-    drawn: Vec<bool>,
-    /// The number of items at the end of the list that bundles name in words, because no line leads to them.
+    pub(super) drawn: Vec<bool>,
+    /// The number of items at the end of the list that stand in words, because no line leads to them.
     pub(crate) in_words: usize,
-    /// Whether each node is in one of these.
-    is_in_words: Vec<bool>,
+    /// Whether each node is in one of these, and whether each topic is.
+    pub(super) is_in_words: [Vec<bool>; 2],
     /// The number of arrows from node to node that were left out because they were too many.
     pub(crate) dropped: usize,
 }
@@ -76,7 +76,7 @@ fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
     Fleets::new(elements, options)
 }
 
-type ArrowEnds = (u32, u32, ArrowKind);
+pub(super) type ArrowEnds = (u32, u32, ArrowKind);
 
 impl Viewed {
     pub(crate) fn new(mission: &Mission, options: &ViewOptions) -> Self {
@@ -105,19 +105,22 @@ impl Viewed {
         };
         if options.mode == Mode::Bundles {
             viewed.drawn = bundles::drawn(mission, options);
-            viewed.is_in_words = bundles::nodes_in_words(
+            viewed.is_in_words[0] = bundles::nodes_in_words(
                 mission,
                 (&viewed.selection, &viewed.drawn),
                 options.are_leaves_in_words,
             );
         } else {
             viewed.drawn = vec![true; elements.topics.len()];
-            viewed.is_in_words = vec![false; elements.nodes.len()];
+            viewed.is_in_words[0] = vec![false; elements.nodes.len()];
         }
-        viewed.set_items(elements, options, &groups);
+        viewed.set_items(mission, options, &groups);
         if options.mode.is_direct() {
             viewed.bundled = bundles::names(elements, &groups);
             viewed.set_direct(elements, options);
+            if options.mode == Mode::Bundles {
+                viewed.set_leaves(elements);
+            }
         } else {
             viewed.set_arrows(elements);
         }
@@ -125,7 +128,8 @@ impl Viewed {
         viewed
     }
 
-    fn set_items(&mut self, elements: &Elements, options: &ViewOptions, groups: &Groups) {
+    fn set_items(&mut self, mission: &Mission, options: &ViewOptions, groups: &Groups) {
+        let elements = &mission.elements;
         let mut collapse = Collapse::new(options);
         let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
         let mut names: Vec<Arc<str>> = if options.exact_names {
@@ -177,6 +181,10 @@ impl Viewed {
                 swallow(elements, (&collapse, &names), &nodes, &mut topics);
             }
         }
+        self.is_in_words[1] = vec![false; topics.len()];
+        if options.is_picture {
+            self.set_apart(mission, options, (&nodes, &mut topics));
+        }
         let mut members: BTreeMap<&ItemKey, Vec<Element>> = BTreeMap::new();
         for (key, id) in nodes.iter().zip(0..) {
             if let Some(key) = key {
@@ -188,9 +196,14 @@ impl Viewed {
                 members.entry(key).or_default().push(Element::Topic(id));
             }
         }
+        let [node_words, topic_words] = &self.is_in_words;
         let is_in_words = |key: &ItemKey, members: &[Element]| {
-            let is = |what: &Element| matches!(what, Element::Node(id) if self.is_in_words[*id as usize]);
-            key.0 == ItemKind::Node && members.iter().all(is)
+            let is = |what: &Element| match what {
+                Element::Node(id) => node_words[*id as usize],
+                Element::Topic(id) => topic_words[*id as usize],
+                Element::Publish(_) | Element::Subscribe(_) => false,
+            };
+            key.0 != ItemKind::Namespace && members.iter().all(is)
         };
         let (mut members, in_words): (Vec<_>, Vec<_>) = members
             .into_iter()
@@ -211,7 +224,6 @@ impl Viewed {
                 members,
                 is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
                 cluster: None,
-                hub: None,
             })
             .collect();
         if !options.exact_names {
@@ -259,7 +271,7 @@ impl Viewed {
     }
 
     /// The items of an edge's node and topic.
-    fn ends(&self, edge: &Edge) -> Option<(u32, u32)> {
+    pub(super) fn ends(&self, edge: &Edge) -> Option<(u32, u32)> {
         Some((
             self.item_of_node(edge.node)?,
             *self.topic.get(edge.topic as usize)?.as_ref()?,
@@ -360,7 +372,7 @@ impl Viewed {
     }
 
     /// Whether an item has a box.
-    fn is_drawn(&self, item: u32) -> bool {
+    pub(super) fn is_drawn(&self, item: u32) -> bool {
         (item as usize) < self.items.len() - self.in_words
     }
 
@@ -436,7 +448,7 @@ impl Viewed {
     }
 }
 
-fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
+pub(super) fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
     Arrow {
         from,
         to,

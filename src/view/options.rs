@@ -212,6 +212,9 @@ pub struct ViewOptions {
     pub expand: Vec<Arc<str>>,
     /// Whether to show the recorder and the player.
     pub show_recorder: bool,
+    /// Whether it is only looked at: topics with one known end, and those that half the system is connected to, are rows in
+    /// boxes, and topics without a known end are words.
+    pub(crate) is_picture: bool,
     /// Whether bundles name nodes that never change in words too if one line leads to them.
     pub(crate) are_leaves_in_words: bool,
     /// Whether anonymous nodes are drawn under their full names, each run a box of its own.

@@ -169,6 +169,7 @@ impl ViewOptions {
     pub(crate) fn opened(&self, elements: &Elements) -> Self {
         let mut options = Self {
             collapse: Vec::new(),
+            is_picture: false,
             ..self.clone()
         };
         // Those that differed from the largest fleet may be one among themselves.

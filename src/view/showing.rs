@@ -40,6 +40,13 @@ impl Showing {
         self.runs.iter().map(move |run| (run.0, look(run.1)))
     }
 
+    /// Gives all its looks another id.
+    pub(super) fn renumber(&mut self, id: u32) {
+        for look in &mut self.looks {
+            look.id = id;
+        }
+    }
+
     /// The windows from which its looks hold, with the place of each look or [`AWAY`].
     pub(super) fn places(&self) -> &[(u32, u32)] {
         &self.runs

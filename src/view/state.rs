@@ -287,9 +287,9 @@ impl<'a> Now<'a> {
     /// The look of an arrow, whether or not its ends are there.
     pub(crate) fn arrow(&self, id: u32) -> Option<Shown> {
         let arrow = self.viewed.arrows.get(id as usize)?;
-        let slot = match self.options.mode {
-            Mode::Nodes | Mode::Bundles => self.direct(id, arrow),
-            _ => self.edges(id, arrow),
+        let slot = match arrow.kind {
+            ArrowKind::Direct(_) | ArrowKind::Bundle => self.direct(id, arrow),
+            ArrowKind::Publish | ArrowKind::Subscribe => self.edges(id, arrow),
         };
         slot.map(|shown| Shown { each: 0, ..shown })
     }

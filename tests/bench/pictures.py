@@ -91,7 +91,9 @@ def frame(root, sums):
     pairs = collections.Counter(frozenset(line["ends"]) for line in lines.values())
     sums["lines"] += len(lines)
     sums["twins"] += sum(pairs[frozenset(line["ends"])] > 1 for line in lines.values())
-    new = [line for line in lines.values() if "added" in line["words"] and {"direct", "bundle"} & set(line["words"])]
+    # The box of a topic names the lines to it.
+    topics = {group.get("data-name") for group in root.iter(SVG + "g") if group.get("class", "").startswith("topic ")}
+    new = [line for line in lines.values() if "added" in line["words"] and not topics & set(line["ends"])]
     sums["new"] += len(new)
     sums["nameless"] += sum(not line["label"] for line in new)
     sums["labels"] += len(labels)

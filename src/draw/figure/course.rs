@@ -183,7 +183,7 @@ fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
         let mut names = match name.split_once(": ").filter(|_| !source.is_named) {
             Some((count, those)) => {
                 let sign: String = count.chars().take(1).collect();
-                vec![format!("{sign} {those}")]
+                shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
             }
             // The same nodes as before: its number says as much.
             None if !source.is_named && name.starts_with("same ") => Vec::new(),
@@ -202,6 +202,22 @@ fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
         }
     };
     source.phases.iter().enumerate().map(phase).collect()
+}
+
+/// What began or ended, in words that get shorter: all that the phase names, then two and one of them.
+fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
+    let mut names = vec![format!("{sign} {those}")];
+    let each: Vec<&str> = those
+        .split(", ")
+        .flat_map(|part| part.split(" and "))
+        .collect();
+    for most in [2, 1] {
+        let rest = (all as usize).saturating_sub(most);
+        if each.len() > most && rest > 0 {
+            names.push(format!("{sign} {}, +{rest}", each[..most].join(", ")));
+        }
+    }
+    names
 }
 
 /// The lives behind both the course and the life lines: of nodes; of topics where publishers are unknown.

@@ -66,7 +66,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     if talks.between(&each, sheet.source.span(), false).is_empty() {
         return Err(Error::usage(
             "no topic has both a known publisher and a known subscriber, so there is nothing to map",
-            "`--figure lives` shows what there is; `--topology FILE` adds connections",
+            "`--kind lives` shows what there is; `--topology FILE` adds connections",
         ));
     }
     let asked = sheet.options.rows;

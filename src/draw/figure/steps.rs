@@ -127,7 +127,7 @@ impl<'s> StepSource<'s> {
         if all.is_empty() {
             return Err(Error::usage(
                 "no node starts, stops or hands over a topic in these steps, so there is nothing to show",
-                "`--figure lives` shows what there is",
+                "`--kind lives` shows what there is",
             ));
         }
         if !asked.is_empty() {

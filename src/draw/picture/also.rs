@@ -1,15 +1,17 @@
-//! The nodes that stand as words in their namespace: `also here: camera_tf, imu_driver`.
+//! The nodes and topics that stand as words in their namespace: `also here: camera_tf, imu_driver, scan 4 Hz`.
 
 use std::collections::BTreeSet;
 
 use super::boxes::Boxes;
+use super::chips;
 use super::measured::LINE;
 use super::options;
 use crate::base::geometry::{Point, Rect, Size};
+use crate::base::words::rate_change;
 use crate::draw::scene::{Anchor, Group, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{AlsoHere, Mark, Shown, View};
+use crate::view::{AlsoHere, Item, Mark, Shown, View};
 
 /// The width at which the words are broken where their namespace is no wider, in the height of their text.
 const WIDTH: f64 = 22.0;
@@ -41,7 +43,12 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
         };
         let names: Vec<String> = also.items.iter().map(|item| short(&item.label)).collect();
         let size = style.edge.size;
-        let words: Vec<String> = words(names.iter().map(|name| format!("− {name}")));
+        let all = names.iter().zip(&also.items).zip(&also.shown);
+        let words = words(all.map(|((name, item), shown)| {
+            let texts = shown.looks().iter().map(|look| said(item, look, name));
+            let long = |text: &String| text.chars().count();
+            texts.max_by_key(long).unwrap_or_else(|| name.clone())
+        }));
         let places = broken(&words, fonts, size, WIDTH * size);
         let ends = places.iter().zip(&words);
         let ends = ends.map(|(at, word)| at.x + fonts.width(word, size, Weight::SemiBold));
@@ -53,6 +60,22 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
         }
     };
     view.also.iter().map(footer).collect()
+}
+
+/// A name with what is to be told of it: the rate of a topic, and the sign of a change.
+fn said(item: &Item, shown: &Shown, name: &str) -> String {
+    let rate = match shown.rates {
+        _ if item.kind.word() == "node" || shown.mark == Some(Mark::Removed) => None,
+        Some((before, now)) => Some(rate_change(before, now)),
+        None => chips::rate_in(shown),
+    };
+    let name = rate.map_or_else(|| name.to_owned(), |rate| format!("{name} {rate}"));
+    match shown.mark {
+        Some(Mark::Added) => format!("+ {name}"),
+        Some(Mark::Removed) => format!("− {name}"),
+        Some(Mark::Away) => format!("{name} (away)"),
+        _ => name,
+    }
 }
 
 /// Names as they follow each other, each with its comma, after the words before them.
@@ -93,13 +116,10 @@ impl Boxes<'_> {
         let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
         let seen = seen.filter_map(|((item, shown), name)| Some((item, shown.at(k)?, name)));
         let seen: Vec<_> = seen.collect();
-        let name = |shown: &Shown, name: &str| match shown.mark {
-            Some(Mark::Added) => format!("+ {name}"),
-            Some(Mark::Removed) => format!("− {name}"),
-            Some(Mark::Away) => format!("{name} (away)"),
-            _ => name.to_owned(),
-        };
-        let words = words(seen.iter().map(|(_, shown, short)| name(shown, short)));
+        let words = words(
+            seen.iter()
+                .map(|(item, shown, short)| said(item, shown, short)),
+        );
         let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
         let places = broken(&words, self.fonts, style.size, most);
         let place = self.fit.rect(place);

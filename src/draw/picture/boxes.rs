@@ -1,5 +1,6 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
+use super::card::Card;
 use super::measured::{LINE, Label, Space, Tells, pendant, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
@@ -27,6 +28,8 @@ pub(crate) struct ItemBox {
     pub(crate) id: String,
     pub(crate) label: Label,
     pub(crate) tells: Tells,
+    /// Its rows, if it has any.
+    pub(crate) card: Option<Card>,
     /// Its box on the page.
     pub(crate) place: Rect,
     /// The middle of its badge.
@@ -127,7 +130,10 @@ impl Boxes<'_> {
             title: title(item, shown),
             ..Group::default()
         };
-        let inner = self.outline(&mut group, item.kind, body, place, &look);
+        let inner = match &card.card {
+            Some(rows) => self.card(&mut group, rows, place, &look),
+            None => self.outline(&mut group, item.kind, body, place, &look),
+        };
         if shown.state == State::Latched
             && item.kind != ItemKind::Node
             && shown.mark != Some(Mark::Removed)
@@ -189,15 +195,7 @@ impl Boxes<'_> {
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
         };
-        if look.glow != Color::NONE {
-            let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
-            let stroke = Stroke::solid(look.glow, width);
-            group.shape(Shape {
-                form: form.clone(),
-                fill: look.glow,
-                stroke,
-            });
-        }
+        self.glow(group, &form, &stroke, look);
         group.shape(Shape {
             form,
             fill: look.fill,
@@ -214,6 +212,18 @@ impl Boxes<'_> {
             stroke,
         });
         front
+    }
+
+    /// The soft light around a box that changed.
+    pub(crate) fn glow(&self, group: &mut Group, form: &Form, stroke: &Stroke, look: &BoxLook) {
+        if look.glow != Color::NONE {
+            let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
+            group.shape(Shape {
+                form: form.clone(),
+                fill: look.glow,
+                stroke: Stroke::solid(look.glow, width),
+            });
+        }
     }
 
     fn front(&self, place: Rect) -> Rect {
@@ -290,7 +300,7 @@ pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
 }
 
 /// The attributes of a box.
-fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
+pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
     let mut data = vec![
         ("name", item.name.to_string()),
         ("state", shown.state.word().to_owned()),
@@ -328,13 +338,12 @@ pub(crate) fn class(what: &str, shown: &Shown) -> String {
     words.join(" ")
 }
 
-fn title(item: &Item, shown: &Shown) -> String {
+pub(crate) fn title(item: &Item, shown: &Shown) -> String {
     let what = match item.kind {
         ItemKind::Node => "node",
         ItemKind::Topic => "topic",
         ItemKind::Group => "topics",
         ItemKind::Namespace => "namespace",
     };
-    let name = item.hub.map_or(&item.name, |_| &item.label);
-    format!("{name}\n{what}: {}", chips::facts(shown))
+    format!("{}\n{what}: {}", item.name, chips::facts(shown))
 }

@@ -220,8 +220,8 @@ impl CourseStrip<'_> {
     }
 
     fn name(&self, group: &mut Group, (k, row): (usize, &CourseRow), color: Color, weight: Weight) {
-        let (size, left) = (self.sizes.text, self.style.page.margin * self.unit);
-        let room = self.plot.x - GAP - left;
+        let size = self.sizes.text;
+        let room = self.plot.x - GAP - self.style.page.margin * self.unit + 0.1;
         let wide = |text: &str| self.fonts.width(text, size, Weight::SemiBold);
         let text = label(row, |text| wide(&self.fonts.shown(text)) <= room);
         let text = self.fonts.shown(&text);

@@ -20,7 +20,7 @@ pub(crate) enum LegendSign {
     Topic,
     Group,
     Namespace,
-    Hub,
+    Row,
     Change(Mark),
     Box(State),
     Line(Degree),
@@ -30,10 +30,13 @@ pub(crate) enum LegendSign {
 /// The signs that occur in the view, with their words.
 pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
-    let is_hub = view.items.iter().any(|i| i.hub.is_some());
     let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
-    let state = |state| any(&|s| s.state == state && s.mark.is_none());
+    let state = |state| {
+        let boxes = view.items_shown.iter().chain(&view.arrows_shown);
+        let mut looks = boxes.flat_map(Showing::looks);
+        looks.any(|s| s.state == state && s.mark.is_none())
+    };
     let degree = |degree| {
         let mut looks = view.arrows_shown.iter().flat_map(Showing::looks);
         looks.any(|s| s.degree == degree)
@@ -48,7 +51,11 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
             LegendSign::Namespace,
             "namespace",
         ),
-        (is_hub, LegendSign::Hub, "goes on elsewhere"),
+        (
+            !view.rows.is_empty(),
+            LegendSign::Row,
+            "topic whose other end is unknown",
+        ),
         (
             mark(&[Mark::Added]),
             LegendSign::Change(Mark::Added),
@@ -233,12 +240,18 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
                 });
             }
         }
-        LegendSign::Hub => {
-            card(group, style, place, false, State::Active, unit);
-            let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, None);
-            let inside = place.grown(-4.0 * unit);
-            arrow(group, inside, stroke, style.edge.arrow * unit);
-        }
+        LegendSign::Row => group.text(Text {
+            at: Point::new(
+                place.centre().x,
+                place.centre().y + style.legend.size * unit * 0.36,
+            ),
+            anchor: Anchor::Middle,
+            size: style.legend.size * unit,
+            weight: Weight::SemiBold,
+            color: style.page.text,
+            halo: None,
+            text: "→".to_owned(),
+        }),
         LegendSign::Change(mark) => {
             let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));
             group.shape(Shape::line(across(place), stroke));

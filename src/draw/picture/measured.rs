@@ -1,6 +1,7 @@
 //! The plan to lay out: every label at its widest, every namespace that gets a box.
 
 use super::also::{self, Footer};
+use super::card::{self, Card};
 use super::{chips, replicas, topics};
 use crate::base::geometry::Size;
 use crate::base::words;
@@ -76,7 +77,9 @@ pub(crate) struct MeasuredGraph {
     pub(crate) topics: Vec<Vec<String>>,
     /// The window in which something is first there, by namespace.
     pub(crate) first_seen: Vec<usize>,
-    /// The words for nodes that have no box. Those outside of all namespaces have the plan's last vertex.
+    /// The rows of each box.
+    pub(crate) cards: Vec<Card>,
+    /// The words for nodes and topics that have no box. Those outside of all namespaces have the plan's last vertex.
     pub(crate) footers: Vec<Footer>,
 }
 
@@ -87,15 +90,24 @@ impl MeasuredGraph {
         let seconds = drafter.second_lines();
         let mut labels = Vec::new();
         let mut vertices = Vec::new();
+        let mut cards = card::cards(view, style, fonts);
         for (at, item) in view.items.iter().enumerate() {
             let inside = item
                 .cluster
                 .and_then(|c| spaces.get(c))
                 .map_or("", |space| space.name.as_str());
             let label = drafter.label(item, inside, seconds[at].is_some());
+            let has_rows = cards[at].room.h > 0.0;
+            let mut size = drafter.size(item, &label, seconds[at].unwrap_or(0.0), has_rows);
+            if has_rows {
+                let room = cards[at].room;
+                cards[at].head = size.h;
+                size = Size::new(size.w.max(room.w), size.h + room.h);
+            }
             vertices.push(Vertex {
-                size: drafter.size(item, &label, seconds[at].unwrap_or(0.0)),
+                size,
                 outline: match item.kind {
+                    _ if has_rows => Outline::Box,
                     ItemKind::Node if style.node.is_pill() => Outline::Pill,
                     ItemKind::Node => Outline::Ellipse,
                     _ => Outline::Box,
@@ -143,7 +155,8 @@ impl MeasuredGraph {
             vertices,
             links: links.collect(),
             clusters,
-            is_labelled: view.arrows.iter().any(|a| a.kind == ArrowKind::Bundle),
+            is_labelled: (view.arrows.iter().zip(&rooms))
+                .any(|(arrow, room)| arrow.kind == ArrowKind::Bundle && room.is_some()),
         };
         let rated = rooms.iter().map(Option::is_some).collect();
         Self {
@@ -152,6 +165,7 @@ impl MeasuredGraph {
             spaces,
             rated,
             topics,
+            cards,
             footers,
             first_seen: first_seen(view),
         }
@@ -203,7 +217,6 @@ impl Measurer<'_> {
     fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
         let body = self.body(item);
         let whole = short_name(&item.label, inside);
-        let ways = item.hub.map(|_| self.ways(item)).unwrap_or_default();
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         if item.kind == ItemKind::Namespace {
@@ -214,35 +227,23 @@ impl Measurer<'_> {
                 name + "/…"
             };
         }
-        let name = self.fonts.fit(&name, body.size, body.weight(), WIDEST);
         Label {
-            name: format!("{}{name}{}", ways[0], ways[1]),
+            name: (self.fonts.fit(&name, body.size, body.weight(), WIDEST)).into_owned(),
             second,
             unshown,
         }
     }
 
-    /// The signs before and behind the name of a hub's box: that messages leave from here, and that they come here, by
-    /// its other boxes.
-    fn ways(&self, item: &Item) -> [&'static str; 2] {
-        let is = |at: u32| {
-            let other = self.view.items.get(at as usize);
-            other.is_some_and(|other| other.name == item.name && other.kind == item.kind)
-        };
-        let mut arrows = self.view.arrows.iter();
-        let sent = arrows.clone().any(|arrow| is(arrow.to));
-        let heard = arrows.any(|arrow| is(arrow.from));
-        [if sent { "→ " } else { "" }, if heard { " →" } else { "" }]
-    }
-
-    /// The size of a box with this label, whose changing smaller lines are at most `second` wide.
-    fn size(&self, item: &Item, label: &Label, second: f64) -> Size {
+    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; of one with rows, that of
+    /// the part above them.
+    fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
         let body = self.body(item);
         let width = self.fonts.width(&label.name, body.size, body.weight());
         let width = width.max(second);
         let small = if label.second { body.small * LINE } else { 0.0 };
         let height = body.size * LINE + small;
         let depth = match item.kind {
+            ItemKind::Node if has_rows => 0.0,
             ItemKind::Node if body.is_pill() => {
                 let high = height + 2.0 * body.pad_y * FLAT;
                 return Size::new((width + 1.7 * body.pad_x).max(high), high);
@@ -293,6 +294,16 @@ impl Measurer<'_> {
             .zip(topics);
         let rooms = all.map(|(((arrow, showing), is_told), names)| {
             let mut widest = None;
+            let item = |at: u32| {
+                self.view
+                    .items
+                    .get(at as usize)
+                    .map(|item| item.kind.word())
+            };
+            if arrow.kind == ArrowKind::Bundle && item(arrow.to) == Some("topic") {
+                // The box of the topic has its name and its rate.
+                return None;
+            }
             if arrow.kind == ArrowKind::Bundle {
                 let rooms = showing.looks().iter();
                 let rooms =
@@ -345,14 +356,8 @@ pub(crate) enum Tells {
 pub(crate) fn tells(view: &View) -> Vec<Tells> {
     let mut senders = vec![0_usize; view.items.len()];
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        let hub = view.items.get(arrow.to as usize).and_then(|item| item.hub);
-        if let Some(senders) = senders.get_mut(hub.unwrap_or(arrow.to) as usize) {
+        if let Some(senders) = senders.get_mut(arrow.to as usize) {
             *senders += 1;
-        }
-    }
-    for (at, item) in view.items.iter().enumerate() {
-        if let Some(whole) = item.hub.and_then(|hub| senders.get(hub as usize)) {
-            senders[at] = *whole;
         }
     }
     let tells = |(item, senders): (&Item, usize)| match item.kind {
@@ -446,7 +451,7 @@ fn ellipse(width: f64, height: f64, body: &Body) -> Size {
 }
 
 /// The part of a name inside the namespace whose box it stands in.
-fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
+pub(crate) fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
     let rest = name
         .strip_prefix(inside)
         .and_then(|rest| rest.strip_prefix('/'));

@@ -123,6 +123,7 @@ mod tests {
             id: String::new(),
             label: Label::default(),
             tells: Tells::Nothing,
+            card: None,
             place,
             badge: Point::default(),
         }

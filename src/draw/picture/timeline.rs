@@ -73,7 +73,7 @@ impl<'a> Timeline<'a> {
         let margin = style.page.margin * unit;
         let names = match course.rows.len() {
             0 => 0.0,
-            _ => names_width(&course, sizes, fonts, strip.w),
+            _ => names_width(&course, sizes, fonts, strip.w - margin),
         };
         let top = strip.y + AROUND * unit + sizes.band(&course);
         let height = match course.rows.len() {

@@ -108,7 +108,6 @@ fn picture(sign: &LegendSign) -> String {
             "<rect x=\"3\" y=\"3\" width=\"30\" height=\"14\" rx=\"7\"/>",
         ),
         LegendSign::Topic => group("topic", BOX),
-        LegendSign::Hub => group("topic", &format!("{BOX}{LINE}")),
         LegendSign::Group => group("topic", &format!("{BOX}{front}")),
         LegendSign::Namespace => group("node", &format!("{BOX}{front}")),
         LegendSign::Change(mark) => {
@@ -125,6 +124,8 @@ fn picture(sign: &LegendSign) -> String {
         }
         LegendSign::Box(state) => group(&format!("topic {}", state.word()), BOX),
         LegendSign::Line(degree) => group(&format!("edge active {}", degree.word()), LINE),
+        // Pages draw every topic as a box.
+        LegendSign::Row => String::new(),
         LegendSign::Width => group("edge active w5", LINE),
     }
 }

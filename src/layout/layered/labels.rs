@@ -1,4 +1,4 @@
-//! The place of each edge's label: on the edge or beside it, on no box, no title and no other label.
+//! The place of each edge's label: on the edge or beside it, on no box, no title, no other edge and no other label.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -18,8 +18,7 @@ const EFFORT: u64 = 20_000_000;
 const CELLS: usize = 2_000_000;
 /// The room between a label and its edge, if it stands beside.
 const ASIDE: f64 = 2.0;
-/// The cost of a label on another edge, and of one that hides most of its own edge.
-const ON_EDGE: f64 = 2.0;
+/// The cost of a label that hides most of its own edge.
 const HIDING: f64 = 4.0;
 
 /// Places the labels of all routes; one that has no room anywhere gets none. Short edges choose first.
@@ -73,7 +72,7 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         else {
             continue;
         };
-        layout.routes[i].label = lines[i].spot((size, plan.is_labelled), i, &taken, &edges);
+        layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
         if let Some(spot) = layout.routes[i].label {
             taken.insert(Rect::around(spot, size).grown(0.5), 0);
         }
@@ -145,13 +144,7 @@ impl Segments {
     }
 
     /// The best middle for a label of this size, if any is free; a strict one is on no other edge.
-    fn spot(
-        &self,
-        (size, is_strict): (Size, bool),
-        own: usize,
-        taken: &Obstacles,
-        edges: &Obstacles,
-    ) -> Option<Point> {
+    fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
             let Some((point, sideways)) = self.station(part) else {
@@ -164,18 +157,11 @@ impl Segments {
                 {
                     continue;
                 }
-                let mut met: Vec<usize> = edges
+                // On another edge it would be read as that one's.
+                let is_free = !edges
                     .hits(&Rect::around(spot, size))
-                    .filter(|&edge| edge != own)
-                    .collect();
-                // Beside its own edge and on another, it would be read as the other's.
-                if (spot != point || is_strict) && !met.is_empty() {
-                    continue;
-                }
-                met.sort_unstable();
-                met.dedup();
-                let cost = cost + ON_EDGE * met.len() as f64;
-                if best.is_none_or(|(least, _)| cost < least) {
+                    .any(|edge| edge != own);
+                if is_free {
                     best = Some((cost, spot));
                 }
             }
@@ -363,13 +349,13 @@ mod tests {
     }
 
     #[test]
-    fn a_label_beside_its_edge_is_on_no_other() {
+    fn a_label_is_on_no_other_edge() {
         let crowded = plan(vec![labelled(40.0, 13.0), link(0, 1), link(0, 1)]);
         let upright = |x: f64| straight(Point::new(x, 30.0), Point::new(x, 160.0));
         let routes = [40.0, 30.0, 50.0].map(upright).to_vec();
         let mut layout = layout(Orientation::TopBottom, Point::new(0.0, 160.0), routes);
         place(&crowded, &mut layout);
-        assert_eq!(layout.routes[0].label.map(|at| at.x), Some(40.0));
+        assert_eq!(layout.routes[0].label, None);
         // Without its neighbours it stands beside the line, and the whole grows where that needs room.
         let alone = plan(vec![labelled(70.0, 50.0)]);
         layout.routes.truncate(1);

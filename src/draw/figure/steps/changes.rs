@@ -40,7 +40,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     }
     Err(Error::usage(
         format!("these phases are higher than {MOST_HEIGHT} mm at the same places"),
-        "`--steps 3,5` draws fewer of them, `--figure steps` each at its own places, `--ns-filter` leaves nodes out",
+        "`--steps 3,5` draws fewer of them, `--kind steps` each at its own places, `--ns-filter` leaves nodes out",
     ))
 }
 

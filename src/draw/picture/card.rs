@@ -1,0 +1,251 @@
+//! Cards: boxes of nodes with a row for each topic that nobody else is known to send or to receive.
+
+use super::badge;
+use super::boxes::{Boxes, ItemBox, class, data, title};
+use super::item_id;
+use super::measured::{Tells, second_line, short_name};
+use super::options::{self, BoxLook};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Text};
+use crate::draw::style::Style;
+use crate::draw::text::{Fonts, Weight};
+use crate::graph::State;
+use crate::view::{CardRow, Mark, Shown, View};
+
+/// The height of a row over the size of its text.
+const STEP: f64 = 1.5;
+/// The room before and behind the words of a row, and between a name and its rate, over the size of the text.
+const PAD: f64 = 1.1;
+/// The most names in a row of topics without messages.
+const MOST_SILENT: usize = 3;
+/// The size of a badge in a row, as a part of that on a box.
+const BADGE: f64 = 0.7;
+
+/// The rows of a box.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Card {
+    lines: Vec<Line>,
+    /// The room below the name of the node.
+    pub(crate) room: Size,
+    /// The height of the part with the name of the node.
+    pub(crate) head: f64,
+}
+
+/// One row: a topic, or several that never carry a message or are of the plumbing.
+#[derive(Clone, Debug, PartialEq)]
+struct Line {
+    sign: &'static str,
+    /// The places of the topics in the view's rows, with their names as they are drawn.
+    topics: Vec<(usize, String)>,
+}
+
+/// The cards of all boxes; one without rows where a box has none.
+pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
+    let mut cards = vec![Card::default(); view.items.len()];
+    for (at, row) in view.rows.iter().enumerate() {
+        let card = &mut cards[row.owner as usize];
+        let name = (at, name(view, row, fonts, style.topic.size));
+        let sign = match row.ways {
+            [true, true] => "↔",
+            [true, false] => "→",
+            _ => "←",
+        };
+        let same = card.lines.iter_mut().find(|line| {
+            let first = &view.rows[line.topics[0].0];
+            let is_alike = is_quiet(row) && is_quiet(first) && row.is_plumbing == first.is_plumbing;
+            is_alike && line.sign == sign
+        });
+        match same {
+            Some(line) => line.topics.push(name),
+            None => card.lines.push(Line {
+                sign,
+                topics: vec![name],
+            }),
+        }
+    }
+    for card in cards.iter_mut().filter(|card| !card.lines.is_empty()) {
+        let wide = card.lines.iter().map(|line| line.width(view, style, fonts));
+        card.room = Size::new(
+            wide.fold(0.0, f64::max),
+            style.topic.size * (STEP * card.lines.len() as f64 + 0.4),
+        );
+    }
+    cards
+}
+
+/// Whether nothing is ever reported of a topic, and either it never carries a message or it is of the plumbing.
+fn is_quiet(row: &CardRow) -> bool {
+    row.shown.looks().iter().all(|look| {
+        let is_silent = look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
+        look.mark.is_none() && (is_silent || row.is_plumbing)
+    })
+}
+
+/// The name of a topic as it is drawn: relative to the frame that the node stands in.
+fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
+    let space = view.items[row.owner as usize].cluster;
+    let inside = space.map_or("", |at| &*view.namespaces[at].name);
+    super::topics::fitted(short_name(&row.item.label, inside), fonts, size)
+}
+
+impl Line {
+    /// The width of its words with the widest rate.
+    fn width(&self, view: &View, style: &Style, fonts: &Fonts) -> f64 {
+        let size = style.topic.size;
+        let words = fonts.width(&self.words(|_| true), size, Weight::SemiBold);
+        let looks = self
+            .topics
+            .iter()
+            .flat_map(|(at, _)| view.rows[*at].shown.looks());
+        let rates = looks.filter(|_| self.topics.len() == 1).filter_map(rate);
+        let rates = rates.map(|text| fonts.width(&text, style.topic.small, Weight::SemiBold));
+        words + rates.fold(0.0, f64::max) + 3.0 * PAD * size
+    }
+
+    /// The sign and the names of those of its topics that are there.
+    fn words(&self, is_there: impl Fn(usize) -> bool) -> String {
+        let names = self.topics.iter().filter(|(at, _)| is_there(*at));
+        let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
+        let (named, rest) = names.split_at(names.len().min(MOST_SILENT));
+        let rest = match rest.len() {
+            0 => String::new(),
+            more => format!(", +{more}"),
+        };
+        format!("{} {}{rest}", self.sign, named.join(", "))
+    }
+}
+
+/// The rate of a topic as its row has it.
+fn rate(shown: &Shown) -> Option<String> {
+    let latched = || (shown.state == State::Latched).then(|| "latched".to_owned());
+    second_line(shown, Tells::Rates).or_else(latched)
+}
+
+impl Boxes<'_> {
+    /// The outline of a card with its head, which is the part that it returns.
+    pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
+        let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
+        let radius = self.style.node.radius.max(self.style.topic.radius) * scale * 0.7;
+        self.glow(group, &Form::Rect(place, radius), &stroke, look);
+        group.shape(Shape {
+            form: Form::Rect(place, radius),
+            fill: self.style.page.background,
+            stroke: stroke.clone(),
+        });
+        let head = Rect::new(place.x, place.y, place.w, card.head * scale);
+        group.shape(Shape {
+            form: round_top(head, radius),
+            fill: look.fill,
+            stroke,
+        });
+        head
+    }
+
+    /// The rows of a card that are there in window `k`.
+    pub(crate) fn card_rows(&self, card: &ItemBox, view: &View, k: usize) -> Vec<Group> {
+        let (size, place) = (self.style.topic.size * self.fit.scale, card.place);
+        let Some(rows) = &card.card else {
+            return Vec::new();
+        };
+        let top = place.y + rows.head * self.fit.scale + size * 0.2;
+        let lines = rows.lines.iter().zip(0_u32..);
+        let row = |(line, at): (&Line, u32)| {
+            let y = top + size * STEP * f64::from(at);
+            let place = Rect::new(place.x, y, place.w, size * STEP);
+            self.row(line, &card.id, (place, view, k))
+        };
+        lines.filter_map(row).collect()
+    }
+
+    fn row(
+        &self,
+        line: &Line,
+        owner: &str,
+        (place, view, k): (Rect, &View, usize),
+    ) -> Option<Group> {
+        let seen = line.topics.iter().filter_map(|(at, _)| {
+            let row = &view.rows[*at];
+            Some((row, row.shown.at(k)?))
+        });
+        let seen: Vec<(&CardRow, &Shown)> = seen.collect();
+        let (row, shown) = *seen.first()?;
+        let mut group = Group {
+            id: format!("{owner}..{}", item_id(&row.item)),
+            class: class("topic", shown),
+            data: data(&row.item, shown),
+            title: title(&row.item, shown),
+            ..Group::default()
+        };
+        if seen.len() > 1 {
+            let names: Vec<&str> = seen.iter().map(|(row, _)| &*row.item.name).collect();
+            group.data = vec![("names", names.join(" "))];
+            group.title = names.join("\n");
+        }
+        let (style, size) = (self.style, self.style.topic.size * self.fit.scale);
+        let look = options::of_box(style, &style.topic, shown);
+        let middle = place.centre().y;
+        if let Some(mark) = shown.mark {
+            let inset = style.added.width / 2.0 * self.fit.pen;
+            let inside = Rect::new(place.x + inset, place.y, place.w - 2.0 * inset, place.h);
+            group.shape(Shape::filled(
+                Form::Rect(inside, 0.0),
+                options::change(style, mark).fill,
+            ));
+            let at = Point::new(place.x, middle);
+            badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
+        }
+        let (weight, quiet) = look.small;
+        let is_there = |at: usize| view.rows[at].shown.at(k).is_some();
+        let words = |x: f64, anchor: Anchor, (size, color): (f64, _), text: String| Text {
+            at: Point::new(x, middle + size * 0.36),
+            anchor,
+            size,
+            weight,
+            color,
+            halo: None,
+            text,
+        };
+        let left = place.x + PAD * size;
+        group.text(words(
+            left,
+            Anchor::Start,
+            (size, look.text),
+            line.words(is_there),
+        ));
+        let rate = rate(shown).filter(|_| seen.len() == 1 && shown.mark != Some(Mark::Removed));
+        let small = style.topic.small * self.fit.scale;
+        let right = place.right() - PAD * size;
+        group.text(words(
+            right,
+            Anchor::End,
+            (small, quiet),
+            rate.unwrap_or_default(),
+        ));
+        Some(group)
+    }
+}
+
+/// A rectangle with round corners at its top.
+fn round_top(place: Rect, radius: f64) -> Form {
+    let (left, right, top, low) = (place.x, place.right(), place.y, place.bottom());
+    // The part of a radius at which the controls of a quarter of a circle stand.
+    let near = radius * 0.45;
+    let at = Point::new;
+    Form::Path(vec![
+        Step::Move(at(left, low)),
+        Step::Line(at(left, top + radius)),
+        Step::Curve([
+            at(left, top + near),
+            at(left + near, top),
+            at(left + radius, top),
+        ]),
+        Step::Line(at(right - radius, top)),
+        Step::Curve([
+            at(right - near, top),
+            at(right, top + near),
+            at(right, top + radius),
+        ]),
+        Step::Line(at(right, low)),
+        Step::Close,
+    ])
+}

@@ -1,0 +1,56 @@
+//! The ids of groups in SVG, and the names that the font cannot show.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::words;
+use crate::draw::text::Fonts;
+use crate::view::{Arrow, ArrowKind, Item, View};
+
+/// The notice about names with characters that no font has; `None` if there are none.
+pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
+    let items = view
+        .items
+        .iter()
+        .chain(view.rows.iter().map(|row| &row.item));
+    let names = items.map(|item| &*item.name);
+    let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
+    let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
+    let some = words::some_of(&spelled.collect::<Vec<_>>(), 3);
+    let text = format!(
+        "names contain characters that the font lacks, drawn as {some}; add a font with `--font FILE`"
+    );
+    (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
+}
+
+pub(super) fn item_id(item: &Item) -> String {
+    let prefix = if item.kind.word() == "node" { "n" } else { "t" };
+    format!("{prefix}{}", encoded(&item.name))
+}
+
+pub(super) fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
+    let [from, to] = ends.each_ref().map(|name| encoded(name));
+    match &arrow.kind {
+        ArrowKind::Publish => format!("p{from}..{to}"),
+        ArrowKind::Subscribe => format!("s{from}..{to}"),
+        ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
+        ArrowKind::Bundle => format!("b{from}..{to}"),
+    }
+}
+
+/// A name as part of an XML id, different for different names: `/` becomes `-`, anything but letters, digits and `_`
+/// becomes `.` with its number in six hexadecimal digits.
+pub(super) fn encoded(name: &str) -> String {
+    let mut out = String::with_capacity(name.len());
+    for c in name.chars() {
+        match c {
+            '/' => out.push('-'),
+            '_' | 'a'..='z' | 'A'..='Z' | '0'..='9' => out.push(c),
+            _ => {
+                let _ = write!(out, ".{:06x}", u32::from(c));
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,402 @@
+//! Cards: a topic that only one box is connected to is a row of that box, so that no leaves stand around it; the plumbing
+//! is a row in every box that is connected to it, so that no lines lead there from everywhere.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::names::is_plumbing;
+use super::showing::{Showing, ShowingWriter};
+use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
+use crate::base::name::namespace;
+
+/// A topic that is a row in a box: of which no other end is known, or one of the plumbing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CardRow {
+    /// The box that it is a row of: a place in [`View::items`](super::View::items).
+    pub owner: u32,
+    /// Whether that box sends it, and whether it receives it.
+    pub ways: [bool; 2],
+    /// Whether it is a topic that half the system is connected to, and a row in each box there.
+    pub is_plumbing: bool,
+    /// The topic, or the group of topics.
+    pub item: Item,
+    /// The looks of the topic, window by window.
+    pub shown: Showing,
+}
+
+/// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that they stand
+/// in. Fewer lines can be followed.
+const FEWEST_ENDS: usize = 6;
+const FEWEST_HOMES: usize = 2;
+
+/// The boxes and arrows of a view, and the looks of each.
+pub(super) struct Drawn {
+    pub(super) items: Vec<Item>,
+    pub(super) arrows: Vec<Arrow>,
+    pub(super) items_shown: Vec<Showing>,
+    pub(super) arrows_shown: Vec<Showing>,
+}
+
+impl Drawn {
+    /// Makes topics with one known end rows of the box there, and, if `hides_plumbing`, the plumbing rows of all boxes that
+    /// are connected to it. Topics that are there without a connection in some window stay boxes. The rows are sorted by
+    /// their boxes; what is sent comes before what is received.
+    pub(super) fn fold_leaves(&mut self, hides_plumbing: bool) -> Vec<CardRow> {
+        let mut lines: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (at, arrow) in self.arrows.iter().enumerate() {
+            if let Some((topic, _)) = self.topic_of(arrow) {
+                lines.entry(topic).or_default().push(at);
+            }
+        }
+        let mut rows = Vec::new();
+        let mut gone = BTreeSet::new();
+        for (topic, lines) in lines {
+            let mut owners: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+            for at in &lines {
+                let end = self.topic_of(&self.arrows[*at]).map(|(_, owner)| owner);
+                owners.entry(end.unwrap_or(topic)).or_default().push(*at);
+            }
+            let is_plumbing = hides_plumbing && is_plumbing(&self.items[topic as usize].name)
+                || self.is_hub(owners.keys());
+            if (owners.len() == 1 || is_plumbing) && self.is_always_connected(topic, &lines) {
+                let own = owners.into_iter();
+                rows.extend(
+                    own.map(|(owner, lines)| self.row((topic, owner), &lines, is_plumbing)),
+                );
+                gone.extend(lines);
+            }
+        }
+        keep(&mut self.arrows, |at| !gone.contains(&at));
+        keep(&mut self.arrows_shown, |at| !gone.contains(&at));
+        self.drop_items(&mut rows);
+        rows.sort_by(|a, b| {
+            let key = |row: &CardRow| (row.owner, [!row.ways[0], !row.ways[1]], row.is_plumbing);
+            key(a)
+                .cmp(&key(b))
+                .then_with(|| a.item.name.cmp(&b.item.name))
+        });
+        rows
+    }
+
+    /// Whether a topic connected to these boxes is a hub: many, in several outermost namespaces.
+    fn is_hub<'a>(&self, owners: impl Iterator<Item = &'a u32>) -> bool {
+        let names = owners.map(|at| &*self.items[*at as usize].name);
+        let homes: Vec<&str> = names
+            .map(|name| namespace(name).split('/').nth(1).unwrap_or_default())
+            .collect();
+        let different: BTreeSet<&&str> = homes.iter().collect();
+        homes.len() >= FEWEST_ENDS && different.len() >= FEWEST_HOMES
+    }
+
+    /// The topic of an arrow with the box at its other end.
+    fn topic_of(&self, arrow: &Arrow) -> Option<(u32, u32)> {
+        let is_topic = |at: u32| {
+            self.items
+                .get(at as usize)
+                .is_some_and(|i| i.kind.word() == "topic")
+        };
+        match (is_topic(arrow.from), is_topic(arrow.to)) {
+            (true, false) => Some((arrow.from, arrow.to)),
+            (false, true) => Some((arrow.to, arrow.from)),
+            _ => None,
+        }
+    }
+
+    /// Whether one of these arrows of a topic is there whenever the topic is.
+    fn is_always_connected(&self, topic: u32, lines: &[usize]) -> bool {
+        let Some(looks) = self.items_shown.get(topic as usize) else {
+            return true;
+        };
+        let mut windows = self.turns(topic, lines).into_iter();
+        windows.all(|k| looks.at(k as usize).is_none() || self.line(lines, k).is_some())
+    }
+
+    /// The windows in which a topic or one of its arrows gets another look.
+    fn turns(&self, topic: u32, lines: &[usize]) -> BTreeSet<u32> {
+        let own = self.items_shown.get(topic as usize).into_iter();
+        let lines = lines.iter().filter_map(|at| self.arrows_shown.get(*at));
+        own.chain(lines)
+            .flat_map(Showing::runs)
+            .map(|run| run.0)
+            .collect()
+    }
+
+    /// The look of the first of these arrows that is there in a window, one with a mark before others.
+    fn line(&self, lines: &[usize], window: u32) -> Option<&Shown> {
+        let lines = lines
+            .iter()
+            .filter_map(|at| self.arrows_shown.get(*at)?.at(window as usize));
+        let lines: Vec<&Shown> = lines.collect();
+        lines
+            .iter()
+            .find(|line| line.mark.is_some())
+            .or(lines.first())
+            .copied()
+    }
+
+    /// The row of a topic in a box; that of plumbing has the rate of the box alone.
+    fn row(&self, (topic, owner): (u32, u32), lines: &[usize], is_plumbing: bool) -> CardRow {
+        let sends = |at: &usize| self.arrows[*at].to == topic;
+        let receives = |at: &usize| self.arrows[*at].from == topic;
+        let mut writer = ShowingWriter::default();
+        for window in self.turns(topic, lines) {
+            let line = self.line(lines, window);
+            let look = self.items_shown[topic as usize].at(window as usize);
+            let look = look.zip(line).map(|(look, line)| {
+                // A connection that came or went is the change of the row, too.
+                let told = if look.mark.is_some() { look } else { line };
+                let entries = look.entries.iter().chain(&line.entries);
+                let entries: BTreeSet<_> = entries.copied().collect();
+                Shown {
+                    mark: told.mark,
+                    rates: told.rates,
+                    entries: entries.into_iter().collect(),
+                    ..(if is_plumbing { line } else { look }).clone()
+                }
+            });
+            writer.show(window, look);
+        }
+        CardRow {
+            owner,
+            ways: [lines.iter().any(sends), lines.iter().any(receives)],
+            is_plumbing,
+            item: self.items[topic as usize].clone(),
+            shown: writer.finish(),
+        }
+    }
+
+    /// Makes the two arrows of a box that both sends and receives a topic one line, with a head at each end that is used.
+    pub(super) fn join_twins(&mut self) {
+        let place = |arrows: &[Arrow], from: u32, to: u32| {
+            arrows
+                .iter()
+                .position(|arrow| (arrow.from, arrow.to) == (from, to))
+        };
+        let mut gone = BTreeSet::new();
+        for there in 0..self.arrows.len() {
+            let (from, to) = (self.arrows[there].from, self.arrows[there].to);
+            let is_publish = self.arrows[there].kind == ArrowKind::Publish;
+            let Some(back) = place(&self.arrows, to, from).filter(|_| is_publish && from != to)
+            else {
+                continue;
+            };
+            gone.insert(back);
+            let members = self.arrows[back].members.clone();
+            let topic = Arc::clone(&self.items[to as usize].name);
+            let arrow = &mut self.arrows[there];
+            arrow.kind = ArrowKind::Bundle;
+            arrow.topics = vec![topic];
+            arrow.members.extend(members);
+            arrow.members.sort_unstable();
+            if !self.arrows_shown.is_empty() {
+                self.arrows_shown[there] =
+                    both_ways([there, back].map(|at| &self.arrows_shown[at]));
+            }
+        }
+        keep(&mut self.arrows, |at| !gone.contains(&at));
+        keep(&mut self.arrows_shown, |at| !gone.contains(&at));
+        for (showing, id) in self.arrows_shown.iter_mut().zip(0..) {
+            showing.renumber(id);
+        }
+    }
+
+    /// Takes the topics of these rows out of the boxes, and numbers everything anew.
+    fn drop_items(&mut self, rows: &mut [CardRow]) {
+        let gone: BTreeSet<_> = rows
+            .iter()
+            .map(|row| (row.item.kind, row.item.name.clone()))
+            .collect();
+        let stays: Vec<bool> = (self.items.iter())
+            .map(|item| !gone.contains(&(item.kind, item.name.clone())))
+            .collect();
+        let mut next = 0;
+        let place = |stays: &bool| {
+            next += u32::from(*stays);
+            next - u32::from(*stays)
+        };
+        let places: Vec<u32> = stays.iter().map(place).collect();
+        keep(&mut self.items, |at| stays[at]);
+        keep(&mut self.items_shown, |at| stays[at]);
+        for arrow in &mut self.arrows {
+            arrow.from = places[arrow.from as usize];
+            arrow.to = places[arrow.to as usize];
+        }
+        for row in rows {
+            row.owner = places[row.owner as usize];
+        }
+        for shown in [&mut self.items_shown, &mut self.arrows_shown] {
+            for (showing, id) in shown.iter_mut().zip(0..) {
+                showing.renumber(id);
+            }
+        }
+    }
+}
+
+/// The looks of one line for both ways between a node and a topic.
+fn both_ways(ways: [&Showing; 2]) -> Showing {
+    let mut writer = ShowingWriter::default();
+    let windows: BTreeSet<u32> = ways
+        .iter()
+        .flat_map(|way| way.runs())
+        .map(|run| run.0)
+        .collect();
+    for window in windows {
+        let looks = ways.map(|way| way.at(window as usize));
+        let is_told = |look: &&&Shown| look.mark.is_some();
+        let look = looks
+            .iter()
+            .flatten()
+            .find(is_told)
+            .or(looks.iter().flatten().next());
+        let entries = looks.iter().flatten().flat_map(|look| &look.entries);
+        let entries: BTreeSet<_> = entries.copied().collect();
+        let shown = look.map(|look| Shown {
+            entries: entries.into_iter().collect(),
+            topics: vec![TopicRow {
+                topic: 0,
+                ways: looks.map(|look| look.is_some()),
+                state: look.state,
+                hz: look.hz,
+                count: look.count,
+                mark: None,
+                rates: None,
+            }],
+            ..(*look).clone()
+        });
+        writer.show(window, shown);
+    }
+    writer.finish()
+}
+
+/// Keeps the elements at these places.
+fn keep<T>(all: &mut Vec<T>, stays: impl Fn(usize) -> bool) {
+    let mut at = 0;
+    all.retain(|_| {
+        at += 1;
+        stays(at - 1)
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::mission;
+    use crate::view::{Mark, Mode, ViewOptions, view};
+
+    /// The boxes and the rows of a picture: `/a → /t`, with the windows in which each row is there.
+    fn drawn(windows: &[&str], mode: Mode) -> (Vec<String>, Vec<String>) {
+        let options = ViewOptions {
+            mode,
+            is_picture: true,
+            ..ViewOptions::default()
+        };
+        let (view, _) = view(&mission(windows), &options);
+        let name = |item: &Item| item.name.to_string();
+        let row = |row: &CardRow| {
+            let sign = match row.ways {
+                [true, true] => "↔",
+                [true, false] => "→",
+                _ => "←",
+            };
+            let owner = name(&view.items[row.owner as usize]);
+            let marks = (0..windows.len()).map(|k| match row.shown.at(k).map(|s| s.mark) {
+                None => ' ',
+                Some(None) => '.',
+                Some(Some(Mark::Added)) => '+',
+                Some(Some(Mark::Removed)) => '-',
+                Some(Some(_)) => '!',
+            });
+            format!(
+                "{owner} {sign} {} {}",
+                row.item.name,
+                marks.collect::<String>()
+            )
+        };
+        (
+            view.items.iter().map(name).collect(),
+            view.rows.iter().map(row).collect(),
+        )
+    }
+
+    #[test]
+    fn a_topic_with_one_known_end_is_a_row_of_its_node() {
+        let (boxes, rows) = drawn(&["/a>/t /a>/u /b</u /b</v /a>/w /a</w"], Mode::All);
+        assert_eq!(boxes, ["/a", "/b", "/u"]);
+        assert_eq!(rows, ["/a ↔ /w .", "/a → /t .", "/b ← /v ."]);
+    }
+
+    #[test]
+    fn the_plumbing_is_a_row_of_every_node() {
+        let (boxes, rows) = drawn(&["/a>/tf /b>/tf /c</tf /a>/t /c</t"], Mode::All);
+        assert_eq!(boxes, ["/a", "/b", "/c", "/t"]);
+        assert_eq!(rows, ["/a → /tf .", "/b → /tf .", "/c ← /tf ."]);
+    }
+
+    #[test]
+    fn a_hub_of_several_namespaces_is_a_row_of_every_node() {
+        let five = "/n/a>/t /n/b</t /n/c</t /n/d</t /n/e</t";
+        assert_eq!(drawn(&[&format!("{five} /n/f</t")], Mode::All).1.len(), 0);
+        let (boxes, rows) = drawn(&[&format!("{five} /m/f</t")], Mode::All);
+        assert_eq!((boxes.len(), rows.len()), (6, 6));
+    }
+
+    #[test]
+    fn a_topic_that_two_nodes_send_stays_a_box() {
+        let (boxes, rows) = drawn(&["/a>/t /b>/t"], Mode::All);
+        assert_eq!(
+            (boxes, rows.len()),
+            (vec!["/a".into(), "/b".into(), "/t".into()], 0)
+        );
+    }
+
+    #[test]
+    fn rows_come_and_go_with_their_marks() {
+        let (_, rows) = drawn(&["/a", "/a>/t@9", "/a>/t@40", "/a"], Mode::All);
+        assert_eq!(rows, ["/a → /t  +!-"]);
+    }
+
+    #[test]
+    fn lines_between_nodes_leave_rows_to_topics_that_change() {
+        let windows = ["/a>/t /b</t /a>/quiet", "/a>/t /b</t /a>/quiet /a>/new"];
+        let (boxes, rows) = drawn(&windows, Mode::Bundles);
+        assert_eq!(boxes, ["/a", "/b"]);
+        assert_eq!(rows, ["/a → /new  +"]);
+    }
+
+    #[test]
+    fn a_node_that_sends_and_receives_a_topic_has_one_line_to_it() {
+        let options = ViewOptions {
+            is_picture: true,
+            ..ViewOptions::default()
+        };
+        let (view, _) = view(&mission(&["/a>/t /b</t", "/a>/t /b</t /a</t"]), &options);
+        let heads = |at: usize, k: usize| view.arrows_shown[at].at(k).map(|s| s.topics[0].ways);
+        assert_eq!(view.arrows.len(), 2);
+        assert_eq!(
+            [heads(0, 0), heads(0, 1)],
+            [Some([true, false]), Some([true, true])]
+        );
+    }
+
+    #[test]
+    fn a_topic_without_any_known_end_stands_in_words() {
+        for mode in [Mode::All, Mode::Bundles] {
+            let options = ViewOptions {
+                mode,
+                is_picture: true,
+                ..ViewOptions::default()
+            };
+            let windows = ["/a>/t /b</t", "/a>/t /b</t =/x@5"];
+            let (view, _) = view(&mission(&windows), &options);
+            let words: Vec<&str> = view
+                .also
+                .iter()
+                .flat_map(|a| &a.items)
+                .map(|i| &*i.name)
+                .collect();
+            assert_eq!(words, ["/x"], "{mode:?}");
+            let mark = view.also[0].shown[0].at(1).unwrap().mark;
+            assert_eq!(mark, Some(Mark::Added));
+        }
+    }
+}
