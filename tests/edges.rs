@@ -747,3 +747,38 @@ fn who_sends_nothing_in_the_time_that_is_read_is_declared() {
     let evidence = joints.unwrap()["evidence"].as_array().unwrap();
     assert!(evidence.contains(&"contract".into()), "{evidence:?}");
 }
+
+#[test]
+fn the_log_that_is_passed_on_is_read_only_where_there_is_no_other() {
+    let mut bag = Recording::default();
+    let beat = bag.publisher("/base", "/beat", "std_msgs/Empty");
+    bag.send(beat, (0, 30_000), 100, &[]);
+    let log = bag.publisher("/boss", "/rosout", "rosgraph_msgs/Log");
+    let again = bag.publisher("/rosout", "/rosout_agg", "rosgraph_msgs/Log");
+    let list = |topics| log1("/boss", "up", "boss.py", topics);
+    bag.at(log, 50, list(&["/rosout"]));
+    bag.at(again, 20_000, list(&["/rosout", "/beat"]));
+    let subscribes =
+        |bag: &Recording| edges(bag, "rosout").contains(&"/beat > /boss stated".to_owned());
+    assert!(!subscribes(&bag));
+    bag.messages.retain(|m| m.0 != log);
+    bag.publishers[log].topic = "/other".to_owned();
+    assert!(subscribes(&bag));
+}
+
+#[test]
+fn a_client_makes_rosbridge_subscribe() {
+    let mut bag = Recording::default();
+    let odom = bag.topic2("/odom", "nav_msgs/msg/Odometry");
+    bag.send(odom, (0, 30_000), 100, &[0, 1, 0, 0]);
+    let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+    let says = |text| log2("bridge", text, "protocol.py");
+    bag.at(log, 50, says("[Client 0] Subscribed to /odom"));
+    bag.at(log, 9000, says("[Client 0] Unsubscribed from /odom"));
+    assert_eq!(edges(&bag, "log_text"), ["/odom > /bridge stated"]);
+    let (built, _) = concluded(&bag, CollectOptions::default());
+    let end = built.lives.of(graph::Element::Subscribe(0)).unwrap()[0]
+        .span
+        .end;
+    assert_eq!(end, Stamp(ORIGIN + 9 * SECOND + 1));
+}

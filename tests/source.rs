@@ -652,11 +652,8 @@ fn events_do_not_tell_what_only_the_code_says() {
         &["events", "run.mcap", "--source", "ws", "-p", "1"],
     );
     let text = String::from_utf8_lossy(&events.stdout).into_owned();
-    assert!(text.contains("/talker_late"), "{text}");
-    assert!(
-        !text.contains("publishes") && !text.contains("subscribes"),
-        "{text}"
-    );
+    // Nothing shows that the node was absent before its log record either.
+    assert_eq!(text, "");
 }
 
 #[test]

@@ -173,7 +173,7 @@ impl Sink for Watched<'_> {
     }
 }
 
-/// A place where a recorder's clock was set back, on the time axis without overlaps.
+/// A place where a recorder's clock was set back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ClockFall {
     /// The last time of the run before.
@@ -208,15 +208,13 @@ fn shifts(seams: &[Seam]) -> Vec<i64> {
     shifts
 }
 
-/// The places of seams on the time axis without overlaps.
-pub(crate) fn falls(seams: &[Seam]) -> impl Iterator<Item = ClockFall> + '_ {
-    seams
-        .iter()
-        .zip(shifts(seams))
-        .map(|(seam, shift)| ClockFall {
-            time: seam.before.plus(shift),
-            length: seam.before.since(seam.after),
-        })
+/// The places of seams on the time axis: without overlaps, if the runs were moved.
+pub(crate) fn falls(seams: &[Seam], is_moved: bool) -> impl Iterator<Item = ClockFall> + '_ {
+    let fall = move |(seam, shift): (&Seam, i64)| ClockFall {
+        time: seam.before.plus(if is_moved { shift } else { 0 }),
+        length: seam.before.since(seam.after),
+    };
+    seams.iter().zip(shifts(seams)).map(fall)
 }
 
 impl<'a> Straightened<'a> {
@@ -325,7 +323,7 @@ mod tests {
             &[(1, vec![58]), (0, (40..90).collect()), (2, vec![45])],
         ];
         let found = seams(parts);
-        let told: Vec<_> = falls(&found)
+        let told: Vec<_> = falls(&found, true)
             .map(|f| (f.time.0 / SECOND, f.length / SECOND))
             .collect();
         assert_eq!(told, [(59, 19)]);

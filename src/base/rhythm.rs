@@ -25,6 +25,14 @@ pub(crate) const LONGER: i64 = 2;
 /// earlier rate.
 pub(crate) const RECENT: usize = 20;
 
+/// The number of messages without a gap, and the time that they take, which show a rhythm even if they are not even: a
+/// person who presses keys pauses earlier.
+pub(crate) const STEADY: u64 = 50;
+pub(crate) const STEADY_NS: i64 = 10 * SECOND;
+/// The silence before the end of the recording that shows the end of a node with a single stream: a shorter one may be
+/// a late message.
+pub(crate) const GONE_NS: i64 = 5 * SECOND;
+
 /// The silence of a sender with this usual interval that is long: it ends the rhythm.
 pub(crate) fn broken_after(usual: i64) -> i64 {
     usual.saturating_mul(BREAK).max(BREAK_NS)
@@ -46,8 +54,10 @@ pub(crate) const RUN_FEWEST: u64 = 10;
 pub(crate) const PAUSE_SHARE: u64 = 80;
 pub(crate) const PAUSE_FEWEST: u64 = 3;
 
-// ---- Restarts.
+// ---- Starts and restarts.
 
+/// The largest number of a log record that shows a start: the first record of a process.
+pub(crate) const FIRST_RECORD: u32 = 1;
 /// The largest number in the header of the first message that a recorder gets of a publisher that has just begun: it
 /// connects within a second, and misses a few.
 pub(crate) const BEGUN_AGAIN: u32 = 5;
@@ -108,3 +118,14 @@ pub(crate) const TOGETHER_NS: i64 = 5 * SECOND;
 /// The longest time between headlines of one reconfiguration: a launch file starts its nodes one after the other, each
 /// within this time.
 pub(crate) const CLOSE_NS: i64 = 2 * SECOND;
+/// The longest time between events that are one: connections that a node makes together, silences that begin together, a
+/// silence that begins before its input's by the clock of the recorder.
+pub(crate) const CROWD_NS: i64 = SECOND;
+/// The fewest times for which an element comes and goes that are one entry.
+pub(crate) const FLAPS: usize = 3;
+/// The largest ratio of two steps of rates with one cause.
+pub(crate) const SAME_STEP: f64 = 1.2;
+/// The time within which nodes that stop and nodes that start are a switch to another mode.
+pub(crate) const SWITCH_NS: i64 = 4 * SECOND;
+/// The fewest nodes that stop, and that start, in such a switch, and the fewest of both together.
+pub(crate) const SWITCH: (usize, usize) = (2, 5);

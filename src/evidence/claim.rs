@@ -49,6 +49,8 @@ pub(crate) struct Name(pub(crate) u32);
 pub(crate) enum Claim {
     /// This node is alive.
     Node(Name),
+    /// This node has just begun.
+    Begins(Name),
     /// This node is gone.
     NodeGone(Name),
     /// This topic exists.
@@ -108,6 +110,7 @@ impl Claim {
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         match self {
             Self::Node(a)
+            | Self::Begins(a)
             | Self::NodeGone(a)
             | Self::Topic(a)
             | Self::Appears(a)
@@ -140,6 +143,7 @@ impl Claim {
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),
+            Self::Begins(a) => Self::Begins(to(a)),
             Self::NodeGone(a) => Self::NodeGone(to(a)),
             Self::Topic(a) => Self::Topic(to(a)),
             Self::Appears(a) => Self::Appears(to(a)),

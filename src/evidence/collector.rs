@@ -386,7 +386,21 @@ impl Sink for BagSink<'_> {
             trust: Reliability::Whole,
             times: all.messages.series(),
         };
-        let (readers, foreign) = source::readers(&stream);
+        let (mut readers, foreign) = source::readers(&stream);
+        // The records of `/rosout` again, up to half a minute later: lists of topics would run backwards.
+        let own = all.bags.get(self.bag).into_iter().flatten();
+        let of = |name: &str| {
+            let streams = own.clone().copied();
+            let of = streams.filter(|at| all.streams[*at].connection.topic.as_str() == name);
+            of.collect::<Vec<usize>>()
+        };
+        match connection.topic.as_str() {
+            "/rosout_agg" if !of("/rosout").is_empty() => readers.clear(),
+            "/rosout" => of("/rosout_agg")
+                .into_iter()
+                .for_each(|at| all.readers[at].clear()),
+            _ => {}
+        }
         if foreign {
             all.notices
                 .add(undecodable(&stream, "its definition is not the known one"));

@@ -313,13 +313,11 @@ fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Sta
     let last = |to: Option<i64>| to.map_or(mission.1, |ns| mission.0.plus(ns).plus(-1));
     let when = match (entry.from_ns, entry.to_ns) {
         (None, None) => Validity::Whole,
-        (from, to) => Validity::Signs {
-            signs: vec![at(from, mission.0), last(to).max(at(from, mission.0))],
-            ends: to
-                .map(|to| last(Some(to)).max(at(from, mission.0)))
-                .into_iter()
-                .collect(),
-        },
+        (from, to) => {
+            let signs = vec![at(from, mission.0), last(to).max(at(from, mission.0))];
+            let ends = to.map(|_| signs[1]).into_iter().collect();
+            Validity::Begins { signs, ends }
+        }
     };
     let (word, degree) = if entry.declared {
         ("launch", Degree::Declared)

@@ -43,6 +43,9 @@ pub(crate) struct Numbers {
     pub(crate) read: u64,
     last: Option<(Stamp, Number)>,
     kept: BTreeMap<Stamp, Number>,
+    /// The number of messages with a larger number than the one before, and the times of those with a smaller one.
+    grew: u64,
+    fell: Vec<Stamp>,
     /// The times on both sides of each place where numbers begin again after a gap.
     pub(crate) falls: Vec<(Stamp, Stamp)>,
 }
@@ -57,6 +60,10 @@ impl Numbers {
         match self.last.replace((time, number)) {
             None => self.keep(time, number),
             Some((since, before)) => {
+                self.grew += u64::from(number.number > before.number);
+                if number.number < before.number && self.fell.len() < MOST {
+                    self.fell.push(time);
+                }
                 if number.begins_after(before) && time.since(since) >= GAP_NS {
                     self.keep(since, before);
                     self.keep(time, number);
@@ -73,6 +80,12 @@ impl Numbers {
         if self.kept.len() < MOST {
             self.kept.insert(time, number);
         }
+    }
+
+    /// Whether the numbers went on to grow from the last message before `from` to the first after `to`.
+    pub(crate) fn count_on(&self, from: Stamp, to: Stamp) -> bool {
+        let is_counter = self.grew * 2 >= self.read;
+        is_counter && !self.fell.iter().any(|at| from < *at && *at <= to)
     }
 
     /// The number of the message at this time, if it was kept.
@@ -98,6 +111,20 @@ mod tests {
 
     fn payload(number: u32, stamp: u64) -> Vec<u8> {
         [&number.to_le_bytes()[..], &stamp.to_le_bytes()].concat()
+    }
+
+    #[test]
+    fn a_process_counts_on_until_its_numbers_fall() {
+        let told = |numbers: &[u32]| {
+            let mut all = Numbers::default();
+            for (at, number) in (0..).zip(numbers) {
+                all.add(Stamp(at), &payload(*number, 5));
+            }
+            [(1, 2), (2, 3)].map(|(from, to)| all.count_on(Stamp(from), Stamp(to)))
+        };
+        assert_eq!(told(&[7, 8, 9, 12]), [true, true]);
+        assert_eq!(told(&[7, 8, 3, 4]), [false, true]);
+        assert_eq!(told(&[0, 0, 0, 0]), [false, false]);
     }
 
     #[test]

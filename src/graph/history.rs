@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 
 use super::{EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
-use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, broken_after};
+use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
 use crate::base::time::{Span, Stamp};
 
 /// A moment with its uncertainty.
@@ -195,6 +195,19 @@ fn stretches_of_windows(counts: &[u64], spans: &[Span]) -> Vec<Stretch> {
         before = *count;
     }
     all
+}
+
+/// Whether a sender begins with a rhythm, so that there were no messages before: even ones, or many without a gap.
+pub(crate) fn begins_steadily(stretches: &[Stretch]) -> bool {
+    let Some((first, rest)) = stretches.split_first() else {
+        return false;
+    };
+    let joined = rest.iter().take_while(|s| s.is_joined);
+    let (count, last) = joined.fold((first.count, first.last), |(count, _), s| {
+        (count + s.count, s.last)
+    });
+    first.is_even && first.count >= FEWEST
+        || count >= STEADY && last.since(first.first) >= STEADY_NS
 }
 
 /// A transition of a node to a lifecycle state.

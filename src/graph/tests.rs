@@ -102,6 +102,93 @@ fn no_evidence_is_not_absence() {
 }
 
 #[test]
+fn a_node_starts_only_where_something_shows_that_it_was_absent() {
+    let steady: Vec<i64> = (30..100).collect();
+    let talks: &[Talk<'_>] = &[
+        ("/keys", Some("/teleop"), false, &[31, 32, 39, 41, 66]),
+        ("/scan", Some("/lidar"), false, &steady),
+        ("/map", Some("/server"), true, &[32]),
+        ("/b", Some("/y"), false, &[0, 99]),
+    ];
+    let all = graphs(talks, 10);
+    let first = |node| states(&all, node).iter().position(|s| *s != "-");
+    assert_eq!(
+        ["/teleop", "/lidar", "/server"].map(first),
+        [Some(0), Some(3), Some(3)]
+    );
+    // Its edge was advertised with it, so it is as old.
+    let edge = all
+        .elements
+        .publishes
+        .iter()
+        .position(|e| all.elements.topics[e.topic as usize].name.as_str() == "/keys");
+    let edge = u32::try_from(edge.unwrap()).unwrap();
+    let life = all.lives.of(Element::Publish(edge)).unwrap()[0];
+    assert_eq!((life.span.start, life.began), (Stamp(0), None));
+}
+
+#[test]
+fn the_first_record_of_a_process_shows_that_it_starts() {
+    let all: Vec<i64> = (0..99).collect();
+    let talks: &[Talk<'_>] = &[("/base", Some("/host"), false, &all)];
+    let logs = |many| -> Vec<Log<'static>> {
+        (0..many)
+            .map(|n| (40 + n, "/late", "hello", &[][..]))
+            .collect()
+    };
+    let built = logged(talks, &logs(1), "late.py");
+    assert_eq!(there(&built, "/late")[0], 4);
+    // Where all records have the same number, it shows nothing.
+    let built = logged(talks, &logs(5), "late.py");
+    assert_eq!(there(&built, "/late")[0], 0);
+}
+
+#[test]
+fn one_stream_that_ends_just_before_the_end_does_not_end_its_node() {
+    let until = |end: i64| (0..end).map(|n| n / 2).collect::<Vec<i64>>();
+    let (all, short) = (until(200), until(192));
+    let talks: &[Talk<'_>] = &[
+        ("/a", Some("/one"), false, &short),
+        ("/b", Some("/two"), false, &short),
+        ("/c", Some("/two"), false, &short),
+        ("/d", Some("/y"), false, &all),
+    ];
+    let built = graphs(talks, 10);
+    let ended = |node: &str| {
+        let id = built
+            .elements
+            .nodes
+            .iter()
+            .position(|n| n.name.as_str() == node);
+        let id = u32::try_from(id.unwrap()).unwrap();
+        built.lives.of(Element::Node(id)).unwrap()[0]
+            .ended
+            .is_some()
+    };
+    assert_eq!(["/one", "/two", "/y"].map(ended), [false, true, false]);
+}
+
+#[test]
+fn a_topic_with_an_uneven_rhythm_does_not_vanish() {
+    let all: Vec<i64> = (0..100).collect();
+    let keys = [1, 2, 3, 6, 7, 11, 12, 17, 18, 19];
+    let talks: &[Talk<'_>] = &[
+        ("/keys", None, false, &keys),
+        ("/b", Some("/y"), false, &all),
+    ];
+    let built = graphs(talks, 10);
+    let id = built
+        .elements
+        .topics
+        .iter()
+        .position(|t| t.name.as_str() == "/keys");
+    let lives = built
+        .lives
+        .of(Element::Topic(u32::try_from(id.unwrap()).unwrap()));
+    assert_eq!(lives.unwrap()[0].ended, None);
+}
+
+#[test]
 fn a_latched_message_holds_its_node_to_the_end() {
     let built = graphs(
         &[

@@ -14,7 +14,9 @@ use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::graph::Element;
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase};
+use crate::mission::ledger::{
+    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase, Switch,
+};
 
 /// The format of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,6 +47,7 @@ pub struct LogOptions {
 enum LogRow<'a> {
     Phase(usize, &'a Phase),
     Interruption(&'a Interruption),
+    Switch(Switch),
     Entry(EntryId, &'a Entry),
     Part(EntryId, &'a Entry),
 }
@@ -63,7 +66,7 @@ pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String 
         LogFormat::Text => String::new(),
         LogFormat::Csv => csv(mission, &rows),
         LogFormat::Ndjson => ndjson(mission, &rows),
-        LogFormat::Markdown => markdown(mission, &rows),
+        LogFormat::Markdown => markdown(mission, &with_switches(mission, rows)),
     }
 }
 
@@ -77,6 +80,20 @@ pub(crate) fn line(mission: &Mission, id: EntryId, entry: &Entry, format: LogFor
         at(mission, entry),
         sentence(mission, id, entry)
     )
+}
+
+/// The rows with a row before each switch to another mode, which is no event of its own.
+fn with_switches<'a>(mission: &Mission, rows: Vec<LogRow<'a>>) -> Vec<LogRow<'a>> {
+    let mut switches = mission.ledger.switches().into_iter().peekable();
+    let mut all = Vec::with_capacity(rows.len());
+    for row in rows {
+        if let LogRow::Entry(_, entry) = &row {
+            let next = switches.next_if(|switch| switch.time <= entry.time);
+            all.extend(next.map(LogRow::Switch));
+        }
+        all.push(row);
+    }
+    all
 }
 
 fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
@@ -155,7 +172,7 @@ impl LogLine {
 
 /// The log as lines for people, sorted by the time that each shows.
 pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
-    let rows = chosen(mission, options);
+    let rows = with_switches(mission, chosen(mission, options));
     let shown = sorted(&rows).into_iter().map(|row| {
         let (kind, when, words) = match row {
             LogRow::Phase(at, phase) => {
@@ -165,6 +182,10 @@ pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
             LogRow::Interruption(one) => {
                 let when = words::offset_tenths(mission.offset(one.time));
                 (None, when, sentence::interrupted(one))
+            }
+            LogRow::Switch(one) => {
+                let when = words::offset_tenths(mission.offset(one.time));
+                (None, when, sentence::switched(one))
             }
             LogRow::Entry(id, entry) | LogRow::Part(id, entry) => (
                 Some(entry.kind),
@@ -193,6 +214,7 @@ fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
         time = match row {
             LogRow::Phase(_, phase) => phase.span.start,
             LogRow::Interruption(one) => one.time,
+            LogRow::Switch(one) => one.time,
             LogRow::Entry(_, entry) => shown(entry),
             LogRow::Part(..) => time,
         };
@@ -223,6 +245,10 @@ fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
             LogRow::Interruption(one) => {
                 let when = words::offset_tenths(mission.offset(one.time));
                 (when, sentence::interrupted(one))
+            }
+            LogRow::Switch(one) => {
+                let when = words::offset_tenths(mission.offset(one.time));
+                (when, sentence::switched(one))
             }
             LogRow::Entry(id, entry) => {
                 let words = sentence(mission, *id, entry);
@@ -278,6 +304,7 @@ fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
         rows.iter().map(|row| match row {
             LogRow::Phase(at, phase) => phase_cells(*at, phase),
             LogRow::Interruption(one) => interruption_cells(one),
+            LogRow::Switch(_) => Vec::new(),
             LogRow::Entry(id, entry) | LogRow::Part(id, entry) => cells(mission, *id, entry),
         }),
     )
@@ -368,6 +395,7 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
                     "{{\"kind\":\"{kind}\",\"time_ns\":{time},\"until_ns\":{until}}}"
                 );
             }
+            LogRow::Switch(_) => continue,
             LogRow::Entry(id, _) | LogRow::Part(id, _) => {
                 all.push_str(entries.get(*id as usize).map_or("{}", String::as_str));
             }

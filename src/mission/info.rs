@@ -161,9 +161,9 @@ pub struct NodeInfo {
     pub degree: &'static str,
     /// The kinds of evidence for it.
     pub evidence: Vec<&'static str>,
-    /// The time of the first sign of life, ns since 1970.
+    /// The time from which it is known to exist, as in the log; ns since 1970.
     pub first_ns: Option<i64>,
-    /// The time of the last sign of life, ns since 1970.
+    /// The last time at which it is known to exist, as in the log; ns since 1970.
     pub last_ns: Option<i64>,
     /// The number of topics that it publishes.
     pub publishes: usize,
@@ -189,8 +189,8 @@ pub fn info(mission: &Mission) -> Info {
             name: node.name.to_string(),
             degree: best.nodes[id].word(),
             evidence: node.evidence.words().collect(),
-            first_ns: node.first.map(|t| t.0),
-            last_ns: node.last.map(|t| t.0),
+            first_ns: node.runs.first().map(|run| run.start.0),
+            last_ns: node.runs.last().map(|run| run.end.0 - 1),
             publishes: own.publishes,
             subscribes: own.subscribes,
             sent: own.sent,

@@ -3,6 +3,7 @@
 //! It does not depend on windows. All outputs that show a change (chips, captions, marks, tables, pages, the log) read
 //! this.
 
+mod causes;
 mod changes;
 mod from_changes;
 mod hands;
@@ -15,7 +16,7 @@ mod silence;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::base::rhythm::CLOSE_NS;
+use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Element, Elements, NodeId};
@@ -242,6 +243,15 @@ impl InterruptionKind {
     }
 }
 
+/// A switch of the robot to another mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Switch {
+    /// The time of its first event.
+    pub(crate) time: Stamp,
+    pub(crate) stopped: usize,
+    pub(crate) started: usize,
+}
+
 /// A stretch of the mission that one graph describes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -303,6 +313,30 @@ impl Ledger {
             last = Some(entry.time);
         }
         turns
+    }
+
+    /// The switches of the robot to another mode: nodes that stop and others that start within a few seconds.
+    pub(crate) fn switches(&self) -> Vec<Switch> {
+        let turns = self.entries.iter().filter(|e| e.is_headline());
+        let turns = turns.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
+        let turns: Vec<&Entry> = turns.collect();
+        let mut found: Vec<Switch> = Vec::new();
+        let mut at = 0;
+        while let Some(first) = turns.get(at) {
+            let inside = turns[at..].iter();
+            let inside = inside.take_while(|e| e.time.since(first.time) <= SWITCH_NS);
+            let many = inside.clone().count();
+            let stopped = inside.filter(|e| e.kind == Kind::Stopped).count();
+            let (each, all) = SWITCH;
+            let is_switch = stopped.min(many - stopped) >= each && many >= all;
+            found.extend(is_switch.then_some(Switch {
+                time: first.time,
+                stopped,
+                started: many - stopped,
+            }));
+            at += if is_switch { many } else { 1 };
+        }
+        found
     }
 
     /// The places of the parts of all entries, in order, by the places of those entries.

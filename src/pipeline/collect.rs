@@ -53,7 +53,8 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         before += std::mem::take(&mut size);
     }
     let is_straight = seams.iter().all(Vec::is_empty);
-    if !is_straight && !inputs.iter().any(Input::is_pipe) {
+    let is_pipe = inputs.iter().any(Input::is_pipe);
+    if !is_straight && !is_pipe {
         collector = Collector::new(affordable(reading));
         for (reader, seams) in readers.iter_mut().zip(&seams) {
             let mut progress = |done, total| watch.progress(done, total);
@@ -65,12 +66,17 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     recorded.notices.extend(twice);
     recorded.falls = seams
         .iter()
-        .flat_map(|seams| straight::falls(seams))
+        .flat_map(|seams| straight::falls(seams, !is_pipe))
         .collect();
     recorded.falls.sort_unstable();
     for fall in &recorded.falls {
         let length = words::duration(fall.length);
-        let text = format!("{SET_BACK} {length}; the two runs are shown one after the other");
+        let shown = if is_pipe {
+            "overlap, since a pipe cannot be read again: give the file"
+        } else {
+            "are shown one after the other"
+        };
+        let text = format!("{SET_BACK} {length}; the two runs {shown}");
         recorded.notices.add(Notice::new(NoticeKind::Note, text));
     }
     let Some(span) = recorded.span else {

@@ -45,7 +45,11 @@ fn parameter_events_name_their_node() {
             None,
             &message
         ),
-        ["Node /r1/nav", "Publish /r1/nav /parameter_events"]
+        [
+            "Begins /r1/nav",
+            "Node /r1/nav",
+            "Publish /r1/nav /parameter_events"
+        ]
     );
 }
 

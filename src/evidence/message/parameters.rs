@@ -39,6 +39,8 @@ pub(crate) struct ParameterEvent<'a> {
     pub(crate) node: &'a str,
     /// The new and the changed parameters.
     pub(crate) set: Vec<Parameter<'a>>,
+    /// Whether `use_sim_time` is new, which every node declares when it starts.
+    pub(crate) is_start: bool,
 }
 
 impl<'a> ParameterEvent<'a> {
@@ -50,15 +52,21 @@ impl<'a> ParameterEvent<'a> {
         payload.time()?;
         let node = payload.string()?;
         let mut set = Vec::new();
+        let mut is_start = false;
         for list in 0..3 {
             for _ in 0..payload.length(4)? {
                 let parameter = parameter(payload)?;
+                is_start |= list == 0 && parameter.name == "use_sim_time";
                 // The third list holds those deleted.
                 set.extend((list < 2).then_some(parameter));
             }
         }
         payload.finish()?;
-        Ok(Self { node, set })
+        Ok(Self {
+            node,
+            set,
+            is_start,
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Conclusions, ElementKey, Proof, Validity};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, ClaimRecord, SourceId};
+use crate::evidence::claim::{Claim, ClaimRecord, Name, SourceId};
 
 impl Conclusions<'_> {
     /// All claims of one source with their signs and ends, sorted.
@@ -27,9 +27,15 @@ impl Conclusions<'_> {
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let refusals = self.refusals();
+        let facts = self.facts.list.iter();
+        let records = facts.filter_map(|fact| match fact.claim {
+            Claim::Node(node) => Some(((fact.source, node), self.facts.times.count(fact.times))),
+            _ => None,
+        });
+        let records: BTreeMap<(SourceId, Name), u64> = records.collect();
         for fact in self.facts.list.clone() {
             let what = match fact.claim {
-                Claim::Node(node) => ElementKey::Node(node),
+                Claim::Node(node) | Claim::Begins(node) => ElementKey::Node(node),
                 Claim::Topic(topic) => ElementKey::Topic(topic),
                 Claim::Publish(node, topic) => ElementKey::Publish(node, topic),
                 Claim::Subscribe(node, topic)
@@ -44,12 +50,19 @@ impl Conclusions<'_> {
             if signs.is_empty() && matches!(fact.claim, Claim::Joins(..)) {
                 continue;
             }
+            // Where every record is the first one, nobody counts.
+            if let Claim::Begins(node) = fact.claim
+                && signs.len() > 1
+                && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))
+            {
+                continue;
+            }
             self.prove(Proof {
                 what,
                 source: fact.source,
                 degree: fact.degree,
                 when: match fact.claim {
-                    Claim::Joins(..) => Validity::Begins { signs, ends },
+                    Claim::Joins(..) | Claim::Begins(_) => Validity::Begins { signs, ends },
                     Claim::Refused(..) => Validity::Moments(signs),
                     _ => Validity::Signs { signs, ends },
                 },
@@ -94,9 +107,9 @@ impl Conclusions<'_> {
         let mut signs = self.times(fact);
         let ending = match fact.claim {
             Claim::Node(node) => Some(Claim::NodeGone(node)),
-            Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
-                Some(Claim::Unsubscribe(node, topic))
-            }
+            Claim::Subscribe(node, topic)
+            | Claim::Joins(node, topic)
+            | Claim::SaysSubscribe(node, topic) => Some(Claim::Unsubscribe(node, topic)),
             _ => None,
         };
         let mut ends = ending

@@ -21,7 +21,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             what: ElementKey::Node(node),
             source,
             degree: Degree::Stated,
-            when: Validity::Signs {
+            when: Validity::Begins {
                 signs: vec![start.max(first)],
                 ends: Vec::new(),
             },

@@ -16,7 +16,15 @@ pub(crate) fn read(
     if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
         return Ok(());
     }
-    if let Some((publishes, topic)) = named(record.text) {
+    if let Some((begins, topic)) = bridged(record.text) {
+        let (node, of) = (heard.name(&record.logger), heard.name(topic));
+        let claim = if begins {
+            Claim::SaysSubscribe(node, of)
+        } else {
+            Claim::Unsubscribe(node, of)
+        };
+        heard.claim(claim, Degree::Stated, String::new);
+    } else if let Some((publishes, topic)) = named(record.text) {
         let (node, of) = (heard.name(&record.logger), heard.name(topic));
         let claim = if publishes {
             Claim::SaysPublish(node, of)
@@ -93,6 +101,15 @@ fn named(text: &str) -> Option<(bool, &str)> {
     };
     let is_name = |c: char| c.is_ascii_alphanumeric() || "/_~".contains(c);
     (!topic.is_empty() && topic.chars().all(is_name)).then_some((*publishes, topic))
+}
+
+/// The topic that a client of rosbridge makes it subscribe to, or no longer: `[Client 0] Subscribed to /odom`.
+fn bridged(text: &str) -> Option<(bool, &str)> {
+    let (client, text) = text.strip_prefix("[Client ")?.split_once("] ")?;
+    let topic = |lead: &str| text.strip_prefix(lead).filter(|t| t.starts_with('/'));
+    let named = topic("Subscribed to ").map(|topic| (true, topic));
+    let named = named.or_else(|| topic("Unsubscribed from ").map(|topic| (false, topic)));
+    named.filter(|_| !client.is_empty())
 }
 
 /// Adds edges only for topics of the bag: a text may mean a device or a file.
@@ -182,10 +199,24 @@ mod tests {
             ),
             ("Publishing odom transforms between [odom] and [base]", None),
             ("Subscribed to topic '/map'", None),
+            ("[Client 0] Subscribed to /odom", None),
         ];
         for (text, expected) in texts {
             assert_eq!(named(text), expected, "{text}");
         }
+    }
+
+    #[test]
+    fn clients_of_rosbridge_subscribe_and_unsubscribe() {
+        let told = |text| bridged(text);
+        assert_eq!(
+            told("[Client 0] Subscribed to /odom"),
+            Some((true, "/odom"))
+        );
+        let gone = "[Client 3f-2] Unsubscribed from /odom";
+        assert_eq!(told(gone), Some((false, "/odom")));
+        assert_eq!(told("Subscribed to /odom"), None);
+        assert_eq!(told("[Client 0] Subscribed to nothing"), None);
     }
 
     #[test]

@@ -9,7 +9,14 @@ pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let name = ParameterEvent::read(payload)?.node;
+    let event = ParameterEvent::read(payload)?;
+    let name = event.node;
+    if event.is_start && !name.is_empty() {
+        let node = heard.name(name);
+        heard.claim(Claim::Begins(node), Degree::Stated, || {
+            format!("{name} declares `use_sim_time`, as it starts")
+        });
+    }
     if !name.is_empty() {
         let node = heard.name(name);
         heard.claim(Claim::Node(node), Degree::Stated, || {

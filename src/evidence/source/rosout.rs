@@ -1,11 +1,12 @@
 //! Log records of ROS 1: a node is alive, and the topics it names as its own.
 //!
-//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the `.py` of
-//! the file that logged.
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the file that
+//! logged.
 
 use std::collections::BTreeSet;
 
 use super::SourceContext;
+use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
@@ -16,7 +17,9 @@ pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    payload.header()?;
+    let number = payload.u32()?;
+    payload.time()?;
+    payload.skip_string()?;
     payload.u8()?;
     let name = payload.string()?;
     let message = payload.string()?;
@@ -37,6 +40,11 @@ pub(crate) fn read(
     });
     let log = heard.stream.topic;
     if heard.stream.connection.topic.as_str() == "/rosout" {
+        if number <= FIRST_RECORD {
+            heard.claim(Claim::Begins(node), Degree::Stated, || {
+                format!("{name} logs its first record: {message}")
+            });
+        }
         heard.claim(Claim::Publish(node, log), Degree::Stated, || {
             format!("{name} logs: {message}")
         });
@@ -44,12 +52,23 @@ pub(crate) fn read(
             heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
         }
     }
-    let claim = match file.rsplit('.').next() {
-        Some("py") => Claim::Lists,
-        _ => Claim::Publish,
+    let claim = if is_rospy(file) {
+        Claim::Lists
+    } else {
+        Claim::Publish
     };
     list(heard, (name, message), &topics, claim);
     Ok(())
+}
+
+/// Whether a record is of rospy, which names the file without its folder; a script need not end in `.py`.
+fn is_rospy(file: &str) -> bool {
+    const CPP: [&str; 7] = ["c", "cc", "cpp", "cxx", "h", "hh", "hpp"];
+    match file.rsplit_once('.') {
+        Some((_, "py")) => true,
+        Some((_, ending)) if CPP.contains(&ending) => false,
+        _ => !file.is_empty() && !file.contains(['/', '\\']),
+    }
 }
 
 /// Takes the list of topics in a log record of a node, with its text. It is whole: what is in an earlier one and not in
@@ -86,7 +105,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         };
         let own = known.publishers(topic).any(|p| p == node) || has_twin(known, node, topic);
-        let others = known.publishers(topic).any(|p| p != node);
+        // What a player sends, somebody published.
+        let mut streams = known.streams.iter().filter(|s| s.topic == topic);
+        let is_played = streams.any(|s| s.trust == Reliability::Player);
+        let others = is_played || known.publishers(topic).any(|p| p != node);
         if !own && is_broadcaster(known, node, topic) {
             continue;
         }
@@ -167,3 +189,18 @@ fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
 
 /// The time within which a recorder subscribes the topics that it was given by name, in nanoseconds.
 const LATE_NS: i64 = 5_000_000_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rospy_is_recognised_by_a_file_without_a_folder() {
+        for file in ["node.py", "lib/node.py", "follow_wall", "<stdin>"] {
+            assert!(is_rospy(file), "{file}");
+        }
+        for file in ["/src/node.cpp", "node.cpp", "/opt/ros/lib/node", ""] {
+            assert!(!is_rospy(file), "{file}");
+        }
+    }
+}

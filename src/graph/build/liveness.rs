@@ -2,8 +2,8 @@
 
 use super::restarts::Restart;
 use crate::base::rhythm::{
-    ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, REGISTRATION_NS, SHUTDOWN_NS,
-    UNUSUAL,
+    ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, GONE_NS, REGISTRATION_NS,
+    SHUTDOWN_NS, UNUSUAL,
 };
 use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
@@ -25,6 +25,8 @@ pub(crate) enum Extent {
 pub(crate) struct Lifetime {
     pub(crate) from: Stamp,
     pub(crate) to: Stamp,
+    /// The first sign of it.
+    pub(crate) sign: Stamp,
     pub(crate) began: Option<Bound>,
     pub(crate) ended: Option<Bound>,
 }
@@ -94,6 +96,8 @@ pub(crate) struct Liveness {
     pub(crate) stated: Vec<Stamp>,
     /// Proofs of an end.
     pub(crate) ends: Vec<Stamp>,
+    /// The times at which something that is proved by it began, such as a rhythm.
+    pub(crate) begins: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) heard: Option<Stamp>,
     /// The rhythms of its messages.
@@ -122,6 +126,7 @@ impl Default for Liveness {
             seen: Vec::new(),
             stated: Vec::new(),
             ends: Vec::new(),
+            begins: Vec::new(),
             heard: None,
             pulses: Vec::new(),
             recording: None,
@@ -159,6 +164,7 @@ impl Liveness {
         self.evidence = self.evidence.and(other.evidence);
         self.degree = self.degree.min(other.degree);
         self.signs.extend(&other.signs);
+        self.begins.extend(&other.begins);
         self.heard = self.heard.max(other.heard);
         self.pulses.extend(&other.pulses);
         self.reach(other.recording);
@@ -177,8 +183,10 @@ impl Liveness {
         }
     }
 
-    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence.
-    pub(crate) fn live(&mut self, mission: (Stamp, Stamp)) {
+    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence. For
+    /// the same reason a node without a proof of its beginning is there from the start; a topic with an uneven rhythm
+    /// does not end.
+    pub(crate) fn live(&mut self, mission: (Stamp, Stamp), is_node: bool) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
         self.ends.dedup();
@@ -188,7 +196,7 @@ impl Liveness {
         }
         self.lives = lives(&self.signs, &self.ends);
         let (start, recorded) = self.recording.unwrap_or(mission);
-        let end = self.end(recorded.min(mission.1));
+        let end = self.end(recorded.min(mission.1), is_node);
         if let Some(life) = self.lives.last_mut().filter(|life| life.ended.is_none()) {
             life.ended = end.filter(|end| end.time >= life.from);
             life.to = life.ended.map_or(mission.1, |end| end.time);
@@ -199,7 +207,13 @@ impl Liveness {
                 .iter()
                 .filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
             let period = rhythm.map(|p| p.period).min();
-            life.begin(mission.0, start.max(mission.0), period);
+            let is_absent = |began: Bound| began.earliest > Stamp::MIN;
+            let is_near = |begin: &Stamp| begin.since(life.sign).abs() <= ADVERTISED_NS;
+            let is_proved = !is_node
+                || !self.lasts
+                || life.began.is_some_and(is_absent)
+                || self.begins.iter().any(is_near);
+            life.begin(mission.0, start.max(mission.0), period, is_proved);
         }
     }
 
@@ -249,7 +263,7 @@ impl Liveness {
     }
 
     /// The time at which a rhythm broke off for good, if one did; of an element known by moments only, the last moment.
-    fn end(&self, mission: Stamp) -> Option<Bound> {
+    fn end(&self, mission: Stamp, is_node: bool) -> Option<Bound> {
         if !self.lasts && !self.unending {
             return self.signs.last().map(|last| Bound {
                 time: *last,
@@ -261,9 +275,11 @@ impl Liveness {
         let silence = mission.since(heard);
         let broken = self.pulses.iter().filter(|p| {
             // A rhythm that was over long before the last sign tells nothing of the silence after it.
-            heard.since(p.last) <= p.patience() && silence > p.patience()
+            let ends = heard.since(p.last) <= p.patience() && silence > p.patience();
+            ends && (is_node || p.is_even)
         });
-        let fastest = broken.min_by_key(|p| p.period)?;
+        let is_sure = !is_node || silence > GONE_NS || broken.clone().count() > 1;
+        let fastest = broken.min_by_key(|p| p.period).filter(|_| is_sure)?;
         Some(Bound {
             time: heard,
             earliest: fastest.last.min(heard),
@@ -300,7 +316,7 @@ impl Liveness {
                 first.begin_within(around, absent, stated);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
-                let end = self.end(around.to).filter(|_| !self.lasts);
+                let end = self.end(around.to, false).filter(|_| !self.lasts);
                 last.to = end.map_or(around.to, |end| end.time.max(last.to));
                 last.ended = end.or(around.ended);
             }
@@ -350,6 +366,7 @@ pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {
     Lifetime {
         from: mission.0,
         to: mission.1,
+        sign: mission.0,
         began: None,
         ended: None,
     }
@@ -360,6 +377,7 @@ impl Lifetime {
         Self {
             from: sign,
             to: sign,
+            sign,
             began: Some(Bound {
                 time: sign,
                 earliest: Stamp::MIN,
@@ -381,10 +399,10 @@ impl Lifetime {
     }
 
     /// Sets the beginning of a first life, after nothing: with a rhythm it began shortly before its first sign.
-    /// `recording` is the start of its own recording, one of several.
-    fn begin(&mut self, mission: Stamp, recording: Stamp, period: Option<i64>) {
+    /// `recording` is the start of its own recording, one of several; without a proof it began before.
+    fn begin(&mut self, mission: Stamp, recording: Stamp, period: Option<i64>, is_proved: bool) {
         let late = period.unwrap_or(0);
-        if self.from.since(recording) <= FOUND_NS.saturating_add(late) {
+        if !is_proved || self.from.since(recording) <= FOUND_NS.saturating_add(late) {
             (self.from, self.began) = (mission, None);
         } else if let Some(began) = &mut self.began {
             let sooner = DISCOVERY_NS.saturating_add(late);
@@ -405,7 +423,7 @@ impl Lifetime {
                     began.earliest = absent;
                 }
             }
-            None if stated || self.from.since(around.from) <= ADVERTISED_NS => {
+            None if stated || self.from.since(around.sign) <= ADVERTISED_NS => {
                 (self.from, self.began) = (around.from, around.began);
             }
             None => {

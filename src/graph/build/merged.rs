@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Reliability};
-use crate::graph::history::Stretch;
+use crate::graph::history::{Stretch, begins_steadily};
 
 /// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on proves
 /// nothing: another node may have taken the topic over.
@@ -26,10 +26,14 @@ pub(crate) fn fall_silent(
         };
         for (node, stretches) in turns(&nodes, sender, findings) {
             let end = sender.recording.1.min(findings.mission.1);
+            let Some(track) = tracks.get_mut(&ElementKey::Publish(node, topic)) else {
+                continue;
+            };
+            if begins_steadily(stretches) {
+                track.begins.push(stretches[0].first);
+            }
             let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
-            if let (Some(pulse), Some(track)) =
-                (pulse, tracks.get_mut(&ElementKey::Publish(node, topic)))
-            {
+            if let Some(pulse) = pulse {
                 track.signs.push(pulse.last());
                 track.heard = track.heard.max(Some(pulse.last()));
                 track.pulses.push(pulse);

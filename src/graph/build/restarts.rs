@@ -142,7 +142,13 @@ pub(crate) fn restarts(
         let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
-        let breaks = narrowed(breaks);
+        let mut breaks = narrowed(breaks);
+        for log in own
+            .iter()
+            .filter(|own| findings.text(own.topic).as_ref() == "/rosout")
+        {
+            breaks.retain(|gap| !counts_on(recorded, log, *gap));
+        }
         if breaks.is_empty() {
             continue;
         }
@@ -159,6 +165,18 @@ pub(crate) fn restarts(
         }
     }
     Ok(all)
+}
+
+/// Whether the log of a process goes on to count its records over a gap in its other messages: it did not end.
+fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
+    log.streams.iter().any(|at| {
+        let times = recorded.messages.times(recorded.streams[*at].times);
+        let around = times.ok().and_then(|times| around(&times, gap));
+        let numbers = recorded.numbers.get(at);
+        around
+            .zip(numbers)
+            .is_some_and(|((from, to), numbers)| numbers.count_on(from, to))
+    })
 }
 
 /// A gap after which the numbers of a stream began again.

@@ -53,7 +53,7 @@ pub(crate) fn settle(
     }
     for (what, track) in tracks.iter_mut() {
         if let ElementKey::Node(node) = what {
-            track.live(mission);
+            track.live(mission, true);
             for restart in restarts.get(node).into_iter().flatten() {
                 track.restart(restart);
             }
@@ -77,7 +77,7 @@ pub(crate) fn settle(
     for (what, track) in tracks.iter_mut() {
         if let ElementKey::Topic(topic) = what {
             let edges = of_topics.remove(topic).unwrap_or_default();
-            track.live(mission);
+            track.live(mission, false);
             track.live_with(edges);
         }
     }

@@ -6,11 +6,14 @@ use std::io;
 use super::liveness::{Extent, Liveness, Pulse};
 use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
+use crate::base::rhythm::broken_after;
 use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::{Degree, Evidence, SOURCES};
+use crate::graph::history::begins_steadily;
 
 /// The track of every element.
 pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
@@ -24,6 +27,7 @@ pub(crate) fn tracks(
 ) -> io::Result<Tracks> {
     let mut tracks = Tracks::new();
     let sent = sent(&findings.proofs);
+    let starved = starved(findings, traffic);
     for proof in &findings.proofs {
         let node = match proof.what {
             ElementKey::Node(node)
@@ -47,7 +51,8 @@ pub(crate) fn tracks(
                 let place = senders.streams.iter().position(|s| s == at).unwrap_or(0);
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
-                    beats: stream.connection.topic.as_str() != "/rosout",
+                    beats: stream.connection.topic.as_str() != "/rosout"
+                        && node.is_none_or(|node| !starved.contains(&(node, stream.topic))),
                     restarts: own,
                 };
                 follow(track, senders, place, &what);
@@ -76,6 +81,7 @@ pub(crate) fn tracks(
             Validity::Begins { signs, ends } => {
                 let ends = together(ends, &deaths);
                 track.bound_all(signs, &ends);
+                track.begins.extend(signs);
             }
             Validity::Moments(signs) => track.bound_all(signs, &deaths),
             Validity::Unending => track.unending = true,
@@ -92,6 +98,37 @@ pub(crate) fn tracks(
         }
     }
     Ok(tracks)
+}
+
+/// The publications, as node and topic, that pass on the messages of others and that end with these: their end shows
+/// nothing of the node.
+fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
+    let last = |topic: &Name, node: Option<Name>| {
+        let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
+        let own = senders.filter(|s| node.is_none() || s.node == node);
+        own.filter_map(|s| s.stretches.last().map(|s| (s.last, s.period)))
+            .max()
+    };
+    let kind = |topic: Name| {
+        let stream = findings.streams.iter().find(|s| s.topic == topic);
+        stream.map(|s| &s.connection.type_name)
+    };
+    let is_starved = |(node, topic): &&(Name, Name)| {
+        let inputs = findings.proofs.iter().filter_map(|proof| match proof.what {
+            ElementKey::Subscribe(input, of) if of == *node && input != *topic => Some(input),
+            _ => None,
+        });
+        let inputs: BTreeSet<Name> = inputs
+            .filter(|input| kind(*input) == kind(*topic))
+            .collect();
+        let own = last(topic, Some(*node));
+        let goes_on = |input: &Name| {
+            let sent = last(input, None).zip(own);
+            sent.is_some_and(|((input, _), (own, period))| input.since(own) > broken_after(period))
+        };
+        !inputs.is_empty() && !inputs.iter().any(goes_on)
+    };
+    findings.copies.iter().filter(is_starved).copied().collect()
 }
 
 /// The degree of a proof: a connection without a message, or with none in the time that is read, is only declared by
@@ -165,6 +202,10 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
         return;
     }
     track.signs.extend([first, last]);
+    // A recorder gets the last message of a latched topic as soon as it has found it, so it was sent just then.
+    if what.beats && (latched || begins_steadily(&sender.stretches)) {
+        track.begins.push(first);
+    }
     track.heard = track.heard.max(Some(last));
     track.reach(Some(sender.recording));
     let pulse = Pulse::of(&sender.stretches, what.restarts);

@@ -4,9 +4,12 @@ use std::collections::BTreeSet;
 
 use crate::base::name::is_quiet;
 use crate::base::words::{self, visible};
+use crate::graph::history::begins_steadily as begins_steadily_in;
 use crate::graph::{Element, Elements, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, EntryId, Interruption, InterruptionKind, Kind};
+use crate::mission::ledger::{
+    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Switch,
+};
 
 /// The most topics that are named; the rest is counted.
 const NAMED: usize = 6;
@@ -33,7 +36,10 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
         .until
         .map(|until| words::duration(until.since(entry.time).max(0)));
     match (&entry.detail, entry.kind) {
-        (Detail::Rates { from_hz, to_hz }, _) => words::rate_change(*from_hz, *to_hz),
+        (Detail::Rates { from_hz, to_hz }, _) => {
+            let change = words::rate_change(*from_hz, *to_hz);
+            format!("{change}{}", too(mission, parts, entry))
+        }
         (Detail::Senders { from, to }, _) => {
             let names = |nodes: &[u32]| {
                 let name =
@@ -41,6 +47,10 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
             format!("handed over: {} → {}", names(from), names(to))
+        }
+        (Detail::Count(many), Kind::Appeared) => {
+            let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
+            format!("comes and goes {many} times{over}")
         }
         (Detail::Count(many), _) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
@@ -66,19 +76,79 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             }
         }
         (Detail::None, Kind::Restarted) => match lasted {
-            Some(lasted) => format!("restarted, away for {lasted}"),
+            Some(lasted) => format!("restarted, away for {lasted}{}", too(mission, parts, entry)),
             None => "restarted".to_owned(),
         },
-        (Detail::None, Kind::Silent) => match lasted {
-            Some(lasted) => format!("silent for {lasted}"),
-            None => "silent to the end".to_owned(),
-        },
+        (Detail::None, Kind::Silent) => {
+            let lasted = lasted.map_or_else(|| "to the end".to_owned(), |t| format!("for {t}"));
+            format!("silent {lasted}{}", too(mission, parts, entry))
+        }
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
             let word = mission.ledger.word(kind);
-            format!("{word}{}", with(mission, parts, entry))
+            let (with, too) = (with(mission, parts, entry), too(mission, parts, entry));
+            format!("{word}{with}{too}")
         }
-        (Detail::None, kind) => mission.ledger.word(kind).to_owned(),
+        (Detail::None, kind) => {
+            let is_first = kind == Kind::Appeared
+                && !mission.ledger.compares
+                && !begins_steadily(mission, entry.what);
+            let word = if is_first {
+                "first message"
+            } else {
+                mission.ledger.word(kind)
+            };
+            format!("{word}{}", too(mission, parts, entry))
+        }
     }
+}
+
+/// Whether the first messages of a topic or a publication come in a rhythm, so that there were none before; of a
+/// subscription, which has no messages of its own, always.
+fn begins_steadily(mission: &Mission, what: Element) -> bool {
+    let (node, topic) = mission.elements.ends(what);
+    let of = topic.map_or(&[][..], |topic| mission.sending.of_topic(topic));
+    let mut own = of.iter().filter(|s| node.is_none() || s.node == node);
+    matches!(what, Element::Subscribe(_)) || own.any(|s| begins_steadily_in(&s.stretches))
+}
+
+/// The elements that an entry happened to besides its own, and those that are silent since then: `; also /odom`.
+fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
+    let elements = &mission.elements;
+    let own = elements.ends(entry.what);
+    let is_node = matches!(entry.what, Element::Node(_));
+    let (mut alike, mut silent) = (Vec::new(), Vec::new());
+    for part in parts
+        .iter()
+        .filter_map(|id| mission.ledger.entries.get(*id as usize))
+    {
+        let (node, topic) = elements.ends(part.what);
+        // The topics of a node that stopped or is silent are its own affair.
+        let sent = |topic| {
+            own.0
+                .is_some_and(|node| elements.publication(node, topic).is_some())
+        };
+        let is_own = part.what == entry.what || own.1.is_some() && topic == own.1;
+        if is_own || is_node && topic.is_some_and(sent) {
+            continue;
+        }
+        let is_edge = node.is_some() && node == own.0;
+        let name = match topic.filter(|_| is_edge) {
+            Some(topic) => visible(elements.topics[topic as usize].name.as_str()).into_owned(),
+            None => name(elements, part),
+        };
+        match part.kind {
+            kind if kind == entry.kind && kind != Kind::Restarted => alike.push(name),
+            Kind::Silent => silent.push(name),
+            _ => {}
+        }
+    }
+    let listed = |lead: &str, mut names: Vec<String>| {
+        names.sort_unstable();
+        names.dedup();
+        let names = (!names.is_empty()).then(|| words::some_of(&names, NAMED));
+        names.map_or_else(String::new, |names| format!("; {lead} {names}"))
+    };
+    listed("also", alike) + &listed("silent since then:", silent)
 }
 
 /// Who gets nothing over an edge, and by which policy of the quality of service.
@@ -102,6 +172,12 @@ pub(crate) fn interrupted(one: &Interruption) -> String {
     }
 }
 
+/// A switch to another mode as a sentence.
+pub(crate) fn switched(one: &Switch) -> String {
+    let stopped = words::count(one.stopped, "node");
+    format!("mode switch: {stopped} stopped, {} started", one.started)
+}
+
 /// The name of the element of an entry: a role where a role restarted.
 fn name(elements: &Elements, entry: &Entry) -> String {
     let (node, topic) = elements.names(entry.what);
@@ -120,14 +196,16 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let (mut sends, mut takes) = (BTreeSet::new(), BTreeSet::new());
     let entries = &mission.ledger.entries;
-    for part in parts.iter().filter_map(|id| entries.get(*id as usize)) {
+    let node = elements.ends(entry.what).0;
+    let parts = parts.iter().filter_map(|id| entries.get(*id as usize));
+    // Others may follow it, as those that subscribe what it publishes.
+    for part in parts.filter(|part| elements.ends(part.what).0 == node) {
         match part.what {
             Element::Publish(edge) => sends.insert(elements.publishes[edge as usize].topic),
             Element::Subscribe(edge) => takes.insert(elements.subscribes[edge as usize].topic),
             _ => false,
         };
     }
-    let node = elements.ends(entry.what).0;
     let space = node.map_or("", |id| {
         crate::base::name::namespace(elements.nodes[id as usize].name.as_str())
     });

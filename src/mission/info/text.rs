@@ -200,7 +200,7 @@ fn nodes(info: &Info, width: Option<usize>) -> String {
     table(&NODE_COLUMNS, &rows, width)
 }
 
-/// When a node is known to be alive: from its first to its last sign of life, or the only moment.
+/// When a node exists, as in the log.
 fn alive(node: &NodeInfo, start_ns: i64) -> String {
     let at = |time: i64| words::offset_seconds(time - start_ns);
     match (node.first_ns, node.last_ns) {

@@ -5,7 +5,10 @@ use std::sync::Arc;
 
 use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
-use crate::base::rhythm::{BACK_NS, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, TAKEN_NS};
+use crate::base::rhythm::{
+    BACK_NS, BREAK, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, SHUTDOWN_NS, TAKEN_NS,
+    broken_after,
+};
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender};
 use crate::graph::{Element, NodeId, TopicId};
@@ -18,10 +21,27 @@ struct RoleSending {
     first: Stamp,
     last: Stamp,
     count: u64,
+    /// The time between its last messages, in nanoseconds.
+    period: i64,
+}
+
+impl RoleSending {
+    /// The longest time for which both send while one takes over from the other: a few messages.
+    fn overlap(&self, new: &Self) -> i64 {
+        let few = self.period.max(new.period).saturating_mul(BREAK);
+        few.clamp(SHUTDOWN_NS, OVERLAP_NS)
+    }
 }
 
 /// Adds all hand-overs.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let stretches = told
+        .history
+        .sending
+        .senders
+        .iter()
+        .flat_map(|s| &s.stretches);
+    let end = stretches.map(|s| s.last).max().unwrap_or(Stamp::MAX);
     let mut of: BTreeMap<TopicId, Vec<&Sender>> = BTreeMap::new();
     for sender in &told.history.sending.senders {
         of.entry(sender.topic).or_default().push(sender);
@@ -33,7 +53,7 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
         let all = sendings(told, &senders);
         let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
         if roles.len() > 1 {
-            for (old, new) in replaced(&all) {
+            for (old, new) in replaced(&all, end) {
                 hand(told, drafts, topic, &old, &new);
             }
             shares(told, drafts, topic, &senders);
@@ -51,6 +71,7 @@ fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
             match own.last_mut() {
                 Some(last) if stretch.is_joined => {
                     (last.last, last.count) = (stretch.last, last.count + stretch.count);
+                    last.period = stretch.period;
                 }
                 _ => own.push(RoleSending {
                     role: Arc::clone(&told.elements.nodes[node as usize].role),
@@ -58,6 +79,7 @@ fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
                     first: stretch.first,
                     last: stretch.last,
                     count: stretch.count,
+                    period: stretch.period,
                 }),
             }
         }
@@ -67,10 +89,12 @@ fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     all
 }
 
-/// Every end of sending that the beginning of another role compensates.
-fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
+/// Every end of sending that the beginning of another role compensates, but for those at the end of the recording.
+fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> {
     let mut found = Vec::new();
-    for old in all.iter().filter(|s| s.count >= FEWEST_OF_SENDER) {
+    let ends = |s: &&RoleSending| end.since(s.last) > broken_after(s.period);
+    let senders = all.iter().filter(|s| s.count >= FEWEST_OF_SENDER);
+    for old in senders.filter(ends) {
         let own = || {
             all.iter()
                 .filter(|s| s.role == old.role && s.last > old.last)
@@ -83,7 +107,7 @@ fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
         let begins = others().find(|s| {
             let late = s.first.since(old.last);
             let soon = late <= TAKEN_NS || back.is_none();
-            late >= -OVERLAP_NS
+            late >= -old.overlap(s)
                 && soon
                 && s.first > old.first
                 && s.last > old.last
@@ -184,5 +208,41 @@ fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: 
             drafts.add(entry);
         }
         before = Some((main.node, nodes, pair[1]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    /// A role that sends twice a second.
+    fn sends(role: &str, node: NodeId, first: i64, last: i64) -> RoleSending {
+        RoleSending {
+            role: role.into(),
+            node,
+            first: Stamp(first * SECOND),
+            last: Stamp(last * SECOND),
+            count: 20,
+            period: SECOND / 2,
+        }
+    }
+
+    fn found(old: (i64, i64), new: (i64, i64)) -> usize {
+        let all = [sends("/a", 0, old.0, old.1), sends("/b", 1, new.0, new.1)];
+        replaced(&all, Stamp(100 * SECOND)).len()
+    }
+
+    #[test]
+    fn who_sends_to_the_end_of_the_recording_hands_nothing_over() {
+        assert_eq!(found((0, 50), (51, 100)), 1);
+        assert_eq!(found((0, 98), (97, 100)), 0);
+    }
+
+    #[test]
+    fn both_send_for_a_few_messages_at_most() {
+        assert_eq!(found((0, 50), (48, 90)), 1);
+        assert_eq!(found((0, 50), (46, 90)), 0);
     }
 }

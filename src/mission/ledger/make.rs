@@ -1,6 +1,6 @@
 //! The making of a mission's entries from its lives: each kind in a file of its own, then sorted and joined.
 
-use super::{Detail, Entry, EntryId, Kind, hands, incidents, lifetimes, rates, silence};
+use super::{Detail, Entry, EntryId, Kind, causes, hands, incidents, lifetimes, rates, silence};
 use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
@@ -28,6 +28,35 @@ impl Drafts {
         self.list.push(entry);
         EntryId::try_from(self.list.len() - 1).unwrap_or(EntryId::MAX)
     }
+
+    /// The entry at this place.
+    pub(crate) fn get(&self, id: EntryId) -> &Entry {
+        &self.list[id as usize]
+    }
+
+    /// Makes a headline a part of another entry, unless that is a part of it.
+    pub(crate) fn fold(&mut self, part: EntryId, whole: EntryId) {
+        let whole = self.root(whole);
+        if whole != part {
+            self.list[part as usize].part_of = Some(whole);
+        }
+    }
+
+    /// The headline that an entry is a part of, or the entry itself.
+    fn root(&self, mut id: EntryId) -> EntryId {
+        while let Some(whole) = self.get(id).part_of {
+            id = whole;
+        }
+        id
+    }
+
+    /// Makes the parts of parts parts of their headlines.
+    pub(crate) fn flatten(&mut self) {
+        for id in 0..self.list.len() {
+            let part_of = self.list[id].part_of.map(|whole| self.root(whole));
+            self.list[id].part_of = part_of;
+        }
+    }
 }
 
 /// Every entry of a mission, sorted.
@@ -39,6 +68,7 @@ pub(crate) fn make(told: &LedgerInput<'_>) -> Vec<Entry> {
     rates::tell(told, &mut drafts);
     lifecycles(told, &mut drafts);
     incidents::tell(told, &mut drafts);
+    causes::tell(told, &mut drafts);
     sorted(drafts.list, told.elements).0
 }
 

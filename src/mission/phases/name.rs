@@ -8,8 +8,8 @@ use crate::base::words::{count, some_of};
 /// The most names that are listed.
 const MOST: usize = 3;
 
-/// The name by the changes: `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−1 node: replanner`,
-/// `same nodes`.
+/// The name by the changes: `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `+4 −1 nodes: …`,
+/// `−1 node: replanner`, `same nodes`.
 pub(crate) fn of_changes(
     is_first: bool,
     added: &[&Arc<str>],
@@ -20,7 +20,11 @@ pub(crate) fn of_changes(
         (true, ..) => count(added.len(), unit),
         (_, [], []) => format!("same {unit}s"),
         (_, [], removed) => format!("−{}: {}", count(removed.len(), unit), listed(removed)),
-        (_, added, _) => format!("+{}: {}", count(added.len(), unit), listed(added)),
+        (_, added, []) => format!("+{}: {}", count(added.len(), unit), listed(added)),
+        (_, added, gone) => {
+            let changed = format!("+{} −{} {unit}s", added.len(), gone.len());
+            format!("{changed}: {}", listed(added))
+        }
     };
     Arc::from(text)
 }
@@ -44,8 +48,10 @@ mod tests {
         let names: Vec<Arc<str>> = ["/a/x", "/b/y", "/z", "/w"].map(Arc::from).to_vec();
         let all: Vec<&Arc<str>> = names.iter().collect();
         assert_eq!(&*of_changes(true, &all, &[], "node"), "4 nodes");
-        let began = of_changes(false, &all, &all[..1], "node");
+        let began = of_changes(false, &all, &[], "node");
         assert_eq!(&*began, "+4 nodes: x, y, z and 1 more");
+        let both = of_changes(false, &all[..1], &all[1..3], "node");
+        assert_eq!(&*both, "+1 −2 nodes: x");
         assert_eq!(&*of_changes(false, &[], &all[..1], "node"), "−1 node: x");
         assert_eq!(&*of_changes(false, &[], &[], "topic"), "same topics");
     }

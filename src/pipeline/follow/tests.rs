@@ -107,7 +107,9 @@ fn holds(name: &str, seeds: std::ops::Range<u64>) {
     let closed = read(&reading(&path), &mut Unwatched).unwrap();
     let expected = json(closed.clone());
     let log = log(&closed, LogFormat::Text, LogOptions::default());
-    let log: Vec<&str> = log.lines().map(what).collect();
+    // Several events together are a switch: that is known at the end.
+    let events = log.lines().filter(|line| !line.contains("mode switch"));
+    let log: Vec<&str> = events.map(what).collect();
     for seed in seeds {
         let (mission, lines) = followed(&path, &bytes, seed);
         assert!(json(mission) == expected, "{name}, seed {seed}");

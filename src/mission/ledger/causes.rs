@@ -1,0 +1,325 @@
+//! One cause, one headline: what follows from another event, comes and goes again and again, or happens to many at once
+//! becomes a part of one entry.
+
+use std::collections::BTreeMap;
+
+use super::make::{Drafts, LedgerInput};
+use super::{Detail, Entry, EntryId, Kind};
+use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
+use crate::base::time::Stamp;
+use crate::graph::{Element, NodeId, TopicId};
+
+/// Makes what has a known cause a part of it.
+pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    hand_overs(told, drafts);
+    subscribers(told, drafts);
+    follow_inputs(told, drafts);
+    flaps(told, drafts);
+    crowds(told, drafts);
+    drafts.flatten();
+}
+
+/// The places of the headlines of some kinds, in order of time.
+fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
+    let all = (0..).zip(&drafts.list);
+    let wanted = all.filter(|(_, e)| e.is_headline() && kinds.contains(&e.kind));
+    let mut places: Vec<EntryId> = wanted.map(|(id, _)| id).collect();
+    places.sort_by_key(|id| (drafts.get(*id).time, *id));
+    places
+}
+
+/// A node that is known by the messages of one topic only, and that hands it over or takes it over, need not have
+/// stopped or started.
+fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
+    for hand in headlines(drafts, &[Kind::HandedOver]) {
+        let entry = drafts.get(hand).clone();
+        let (Detail::Senders { from, to }, Element::Topic(topic)) = (&entry.detail, entry.what)
+        else {
+            continue;
+        };
+        for turn in &turns {
+            let other = drafts.get(*turn);
+            let Element::Node(node) = other.what else {
+                continue;
+            };
+            let (of, at) = match other.kind {
+                Kind::Stopped => (from, entry.earliest),
+                _ => (to, entry.time),
+            };
+            let is_end = of.contains(&node) && other.time.since(at).abs() <= TOGETHER_NS;
+            if is_end && is_only_sender(told, node, topic) {
+                drafts.fold(*turn, hand);
+            }
+        }
+    }
+}
+
+/// Whether the messages of this topic are all that is known of a node.
+fn is_only_sender(told: &LedgerInput<'_>, node: NodeId, topic: TopicId) -> bool {
+    let evidence = told.elements.nodes[node as usize].evidence;
+    let mut sent = told.elements.publishes.iter().filter(|e| e.node == node);
+    evidence.words().all(|word| word == "connection") && sent.all(|edge| edge.topic == topic)
+}
+
+/// Who subscribes a topic when its publisher starts, or no longer when that stops, follows the publisher.
+fn subscribers(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let mut turns: BTreeMap<(NodeId, bool), Vec<EntryId>> = BTreeMap::new();
+    for (id, entry) in (0..).zip(&drafts.list) {
+        if let (Element::Node(node), Kind::Started | Kind::Stopped) = (entry.what, entry.kind) {
+            let of = turns.entry((node, entry.kind == Kind::Started));
+            of.or_default().push(id);
+        }
+    }
+    let wiring = Wiring::of(told);
+    for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
+        let entry = drafts.get(id);
+        let (Element::Subscribe(_), (_, Some(topic))) =
+            (entry.what, told.elements.ends(entry.what))
+        else {
+            continue;
+        };
+        let senders = wiring.publishers.get(&topic).into_iter().flatten();
+        let of = senders.filter_map(|node| turns.get(&(*node, entry.kind == Kind::Appeared)));
+        let is_then = |turn: &EntryId| {
+            let turn = drafts.get(*turn);
+            is_within(turn.time, entry.time, TOGETHER_NS)
+        };
+        let cause = of.flatten().copied().find(is_then);
+        if let Some(cause) = cause {
+            drafts.fold(id, cause);
+        }
+    }
+}
+
+/// Who publishes and who subscribes what, without housekeeping.
+struct Wiring {
+    publishers: BTreeMap<TopicId, Vec<NodeId>>,
+    inputs: BTreeMap<NodeId, Vec<TopicId>>,
+}
+
+impl Wiring {
+    fn of(told: &LedgerInput<'_>) -> Self {
+        let (mut publishers, mut inputs) = (BTreeMap::new(), BTreeMap::new());
+        let is_meant =
+            |node: NodeId, topic| !told.is_by_the_way(topic) && !told.is_quiet(Element::Node(node));
+        for edge in &told.elements.publishes {
+            if is_meant(edge.node, edge.topic) {
+                let of: &mut Vec<_> = publishers.entry(edge.topic).or_default();
+                of.push(edge.node);
+            }
+        }
+        for edge in &told.elements.subscribes {
+            if is_meant(edge.node, edge.topic) {
+                let of: &mut Vec<_> = inputs.entry(edge.node).or_default();
+                of.push(edge.topic);
+            }
+        }
+        Self { publishers, inputs }
+    }
+
+    /// The nodes that send what an entry is about.
+    fn senders(&self, told: &LedgerInput<'_>, what: Element) -> Vec<NodeId> {
+        match (told.elements.ends(what), what) {
+            ((_, Some(topic)), Element::Topic(_)) => {
+                self.publishers.get(&topic).cloned().unwrap_or_default()
+            }
+            ((node, _), _) => node.into_iter().collect(),
+        }
+    }
+}
+
+/// A silence that begins within the pause of an input belongs to it, and so does a step of a rate that an input makes
+/// too.
+fn follow_inputs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let wiring = Wiring::of(told);
+    let mut pauses: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
+    let mut steps: BTreeMap<TopicId, Vec<EntryId>> = BTreeMap::new();
+    for (id, entry) in (0..).zip(&drafts.list) {
+        match (entry.kind, told.elements.ends(entry.what).1) {
+            (Kind::Silent | Kind::Stopped | Kind::Restarted, _) => {
+                pauses.entry(entry.what).or_default().push(id);
+            }
+            (Kind::Rate, Some(topic)) => steps.entry(topic).or_default().push(id),
+            _ => {}
+        }
+    }
+    for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
+        let entry = drafts.get(id);
+        let own = wiring.senders(told, entry.what);
+        let inputs = own.iter().filter_map(|node| wiring.inputs.get(node));
+        let cause = inputs.flatten().find_map(|input| {
+            if entry.kind == Kind::Rate {
+                let of = steps.get(input).into_iter().flatten();
+                return of
+                    .copied()
+                    .find(|step| is_same_step(entry, drafts.get(*step), CROWD_NS));
+            }
+            let senders = wiring.publishers.get(input).into_iter().flatten();
+            let whose = senders.map(|node| Element::Node(*node));
+            let of = whose
+                .chain([Element::Topic(*input)])
+                .filter_map(|what| pauses.get(&what));
+            of.flatten()
+                .copied()
+                .find(|pause| follows(entry, drafts.get(*pause)))
+        });
+        if let Some(cause) = cause {
+            drafts.fold(id, cause);
+        }
+    }
+}
+
+/// Whether a silence begins within a pause of its input.
+fn follows(silence: &Entry, pause: &Entry) -> bool {
+    let until = match pause.kind {
+        Kind::Stopped => pause.time.plus(TOGETHER_NS),
+        _ => pause.until.unwrap_or(Stamp::MAX),
+    };
+    pause.what != silence.what && pause.time <= silence.time.plus(CROWD_NS) && silence.time <= until
+}
+
+/// Whether two steps of rates are about as large, and less than `apart` nanoseconds apart.
+fn is_same_step(one: &Entry, other: &Entry, apart: i64) -> bool {
+    let ratio = |entry: &Entry| match entry.detail {
+        Detail::Rates { from_hz, to_hz } => to_hz / from_hz,
+        _ => f64::NAN,
+    };
+    let between = ratio(one) / ratio(other);
+    let is_near =
+        one.earliest <= other.latest.plus(apart) && other.earliest <= one.latest.plus(apart);
+    one.what != other.what && is_near && (1.0 / SAME_STEP..=SAME_STEP).contains(&between)
+}
+
+/// An edge or a topic that comes and goes again and again is one entry.
+fn flaps(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let mut of: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
+    for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
+        of.entry(drafts.get(id).what).or_default().push(id);
+    }
+    for (what, turns) in of {
+        let is_begin = |id: &&EntryId| drafts.get(**id).kind == Kind::Appeared;
+        let many = turns.iter().filter(is_begin).count();
+        let [first, .., last] = turns[..] else {
+            continue;
+        };
+        if many < FLAPS || told.is_quiet(what) {
+            continue;
+        }
+        let until = drafts.get(last).time;
+        let entry = &mut drafts.list[first as usize];
+        entry.detail = Detail::Count(many as u64);
+        entry.until = Some(until);
+        for turn in &turns[1..] {
+            drafts.fold(*turn, first);
+        }
+    }
+}
+
+/// What happens to many elements at once is one entry: connections of one node or topics without a known publisher that
+/// come or go, silences that begin and end together, steps of rates that are equal.
+fn crowds(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+    for kind in [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate] {
+        let mut of: BTreeMap<Option<NodeId>, Vec<EntryId>> = BTreeMap::new();
+        for id in headlines(drafts, &[kind]) {
+            let node = told.elements.ends(drafts.get(id).what).0;
+            // The silences of several nodes have one cause, and so have steps of one size.
+            let whose = node.filter(|_| !matches!(kind, Kind::Silent | Kind::Rate));
+            of.entry(whose).or_default().push(id);
+        }
+        for places in of.values() {
+            for (at, first) in places.iter().enumerate() {
+                let one = drafts.get(*first).clone();
+                let rest = places[at + 1..].iter().copied();
+                let soon =
+                    rest.take_while(|id| is_within(drafts.get(*id).time, one.time, CLOSE_NS));
+                let alike: Vec<EntryId> =
+                    soon.filter(|id| is_alike(&one, drafts.get(*id))).collect();
+                for id in alike.into_iter().filter(|_| one.is_headline()) {
+                    drafts.fold(id, *first);
+                }
+            }
+        }
+    }
+}
+
+/// Whether two headlines of a kind are about the same moment, and the same change.
+fn is_alike(first: &Entry, other: &Entry) -> bool {
+    let ends = match (first.until, other.until) {
+        (Some(a), Some(b)) => is_within(a, b, CROWD_NS),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    other.is_headline()
+        && match first.kind {
+            Kind::Rate => is_same_step(first, other, 0),
+            _ => is_within(other.time, first.time, CROWD_NS) && ends,
+        }
+}
+
+fn is_within(a: Stamp, b: Stamp, apart: i64) -> bool {
+    a.since(b).abs() <= apart
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::{Degree, Evidence};
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn entry(kind: Kind, topic: TopicId, from: i64, until: Option<i64>) -> Entry {
+        let time = Stamp(from * SECOND);
+        Entry {
+            kind,
+            what: Element::Topic(topic),
+            time,
+            earliest: time,
+            latest: time,
+            until: until.map(|at| Stamp(at * SECOND)),
+            detail: Detail::None,
+            degree: Degree::Measured,
+            evidence: Evidence::NONE,
+            part_of: None,
+            quiet: false,
+            weight: 1,
+        }
+    }
+
+    fn step(topic: TopicId, at: i64, from_hz: f64, to_hz: f64) -> Entry {
+        Entry {
+            detail: Detail::Rates { from_hz, to_hz },
+            ..entry(Kind::Rate, topic, at, None)
+        }
+    }
+
+    #[test]
+    fn a_silence_follows_an_input_only_within_its_pause() {
+        let pause = entry(Kind::Silent, 1, 10, Some(15));
+        let silence = |from| entry(Kind::Silent, 2, from, Some(16));
+        assert!(follows(&silence(10), &pause) && follows(&silence(14), &pause));
+        assert!(!follows(&silence(16), &pause) && !follows(&silence(8), &pause));
+        assert!(!follows(&pause, &pause));
+    }
+
+    #[test]
+    fn steps_are_one_if_they_are_as_large_and_at_one_time() {
+        let camera = step(1, 60, 30.0, 5.0);
+        assert!(is_same_step(&step(2, 60, 6.0, 1.0), &camera, 0));
+        assert!(!is_same_step(&step(2, 60, 6.0, 3.0), &camera, 0));
+        assert!(!is_same_step(&step(2, 64, 6.0, 1.0), &camera, CROWD_NS));
+    }
+
+    #[test]
+    fn parts_of_parts_are_parts_of_the_headline_and_nothing_is_its_own_part() {
+        let mut drafts = Drafts::default();
+        for topic in 0..3 {
+            drafts.add(entry(Kind::Silent, topic, 1, None));
+        }
+        drafts.fold(2, 1);
+        drafts.fold(1, 0);
+        drafts.fold(0, 2);
+        drafts.flatten();
+        let wholes: Vec<_> = drafts.list.iter().map(|e| e.part_of).collect();
+        assert_eq!(wholes, [None, Some(0), Some(0)]);
+    }
+}
