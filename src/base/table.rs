@@ -27,6 +27,19 @@ pub(crate) enum ColumnKind {
     Time,
 }
 
+/// A column: its name, its kind, and its cell in the row of an `R` that belongs to a `C`.
+pub(crate) type ColumnOf<C, R> = (
+    &'static str,
+    ColumnKind,
+    for<'a> fn(&'a C, &'a R) -> TableCell<'a>,
+);
+
+/// Columns as [`ColumnOf`], a line each.
+macro_rules! columns {
+    ($($name:literal $kind:ident $cell:expr;)*) => { &[$(($name, ColumnKind::$kind, $cell)),*] };
+}
+pub(crate) use columns;
+
 /// Texts, or strings of bytes, one after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TextColumn {
@@ -330,6 +343,25 @@ impl Batch {
             columns: columns.into_iter().collect(),
             rows: 0,
         }
+    }
+
+    /// A batch without rows, with these columns.
+    pub(crate) fn with<C, R>(columns: &[ColumnOf<C, R>]) -> Self {
+        Self::of(
+            columns
+                .iter()
+                .map(|(name, kind, _)| TableColumn::known(*name, *kind)),
+        )
+    }
+
+    /// The rows of a whole table that belongs to `all`.
+    pub(crate) fn filled<C, R>(columns: &[ColumnOf<C, R>], all: &C, rows: &[R]) -> Self {
+        let mut table = Self::with(columns);
+        for row in rows {
+            let cells = columns.iter().map(|(.., cell)| cell(all, row));
+            table.push(&cells.collect::<Vec<_>>());
+        }
+        table
     }
 
     /// Adds a row: a cell per column, unknown where it is of another kind than the column.

@@ -4,7 +4,7 @@
 
 pub(crate) mod folder;
 mod mission;
-mod runs;
+mod seen;
 pub(crate) mod writer;
 
 use std::io::Write as _;
@@ -90,9 +90,8 @@ impl Encoder for TablesEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let each = TABLES.iter().zip(files(&self.target, self.format.word()));
         let write = |(table, file): (&Table, Target)| {
-            let fill = table.fill_runs.filter(|_| self.has_runs);
-            let rows = |row: RowTaker<'_>| fill.unwrap_or(table.fill)(self.mission, row);
-            write(rows, table, &file, self.format)
+            let rows = |row: RowTaker<'_>| (table.fill)(self.mission, self.has_runs, row);
+            write(rows, (table.batch)(), &file, self.format)
         };
         // All of them are whole before the first one gets its name.
         let mut sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
@@ -111,8 +110,8 @@ impl Encoder for TablesEncoder<'_> {
 #[cfg(feature = "arrow")]
 pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     let fill = |table: &Table| {
-        let mut batch = Batch::new(table.columns);
-        (table.fill)(mission, &mut |row: &[TableCell<'_>]| batch.push(row));
+        let mut batch = (table.batch)();
+        (table.fill)(mission, false, &mut |row: &[TableCell<'_>]| batch.push(row));
         (table.word, batch)
     };
     TABLES.iter().map(fill).collect()
@@ -123,14 +122,13 @@ const MOST_ROWS: usize = 4096;
 
 fn write(
     rows: impl Fn(RowTaker<'_>),
-    table: &Table,
+    mut batch: Batch,
     target: &Target,
     format: TableFormat,
 ) -> Result<OutputSink> {
     let sink = OutputSink::create(target, None)?;
     let failed = Error::io("write", sink.path());
     let write = || {
-        let mut batch = Batch::new(table.columns);
         let mut writer = Writer::new(format, sink, &batch, &[])?;
         let mut result = Ok(());
         rows(&mut |row: &[TableCell<'_>]| {

@@ -1,502 +1,308 @@
-//! The tables of a mission: their columns, and the functions that fill them.
+//! The tables of a mission: their columns, each with its cell, and the rows they are made of.
 
-use std::borrow::Cow;
-
-use super::runs;
-use crate::base::table::{ColumnKind, TableCell};
-use crate::base::time::Stamp;
-use crate::evidence::Evidence;
+use super::seen::{Seen, edges, nodes, topics};
+use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
+use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
-use crate::graph::{Edge, EdgeState, Element, Measures, NodeId, NodeLoad};
+use crate::graph::{Element, NodeId, Topic};
+use crate::mission::Mission;
 use crate::mission::ledger::{Detail, Entry};
-use crate::mission::{Mission, Window};
 
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
-/// A table: its word in the file's name, its columns, and the function that fills it.
+/// A table: its word in the file's name, an empty batch of it, and the function that fills it, by runs of equal windows
+/// where that is asked for and it is about windows.
 pub(super) struct Table {
     pub(super) word: &'static str,
-    pub(super) columns: &'static [(&'static str, ColumnKind)],
-    pub(super) fill: fn(&Mission, RowTaker<'_>),
-    /// The function that fills it by runs of equal windows, where it is about windows.
-    pub(super) fill_runs: Option<fn(&Mission, RowTaker<'_>)>,
+    pub(super) batch: fn() -> Batch,
+    pub(super) fill: fn(&Mission, bool, RowTaker<'_>),
 }
 
-/// The first columns of every table about windows.
-const WIN: (&str, ColumnKind) = ("win", ColumnKind::I64);
-const START: (&str, ColumnKind) = ("start_ns", ColumnKind::Time);
-const END: (&str, ColumnKind) = ("end_ns", ColumnKind::Time);
-const LENGTH: (&str, ColumnKind) = ("length_ns", ColumnKind::I64);
+type Column<R> = ColumnOf<Mission, R>;
 
 /// All tables of a mission.
 pub(super) const TABLES: &[Table] = &[
     Table {
         word: "edges",
-        columns: &[
-            WIN,
-            START,
-            END,
-            LENGTH,
-            ("what", ColumnKind::Text),
-            ("node", ColumnKind::Text),
-            ("topic", ColumnKind::Text),
-            ("state", ColumnKind::Text),
-            ("degree", ColumnKind::Text),
-            ("evidence", ColumnKind::Text),
-            ("n", ColumnKind::I64),
-            ("hz", ColumnKind::F64),
-            ("bytes", ColumnKind::I64),
-            ("drops", ColumnKind::I64),
-            ("jitter_s", ColumnKind::F64),
-            ("age_s", ColumnKind::F64),
-            ("first_ns", ColumnKind::Time),
-            ("last_ns", ColumnKind::Time),
-        ],
-        fill: edges,
-        fill_runs: Some(runs::edges),
+        batch: || Batch::with(EDGES),
+        fill: |all, has_runs, row| edges(all, has_runs, &mut |one| put(all, EDGES, one, row)),
     },
     Table {
         word: "topics",
-        columns: &[
-            WIN,
-            START,
-            END,
-            LENGTH,
-            ("topic", ColumnKind::Text),
-            ("types", ColumnKind::Text),
-            ("state", ColumnKind::Text),
-            ("degree", ColumnKind::Text),
-            ("evidence", ColumnKind::Text),
-            ("n", ColumnKind::I64),
-            ("bytes", ColumnKind::I64),
-            ("hz", ColumnKind::F64),
-            ("median_period_s", ColumnKind::F64),
-            ("max_gap_s", ColumnKind::F64),
-            ("drops", ColumnKind::I64),
-            ("jitter_s", ColumnKind::F64),
-            ("age_s", ColumnKind::F64),
-            ("qos", ColumnKind::Text),
-            ("first_ns", ColumnKind::Time),
-            ("last_ns", ColumnKind::Time),
-        ],
-        fill: topics,
-        fill_runs: Some(runs::topics),
+        batch: || Batch::with(TOPICS),
+        fill: |all, has_runs, row| topics(all, has_runs, &mut |one| put(all, TOPICS, one, row)),
     },
     Table {
         word: "nodes",
-        columns: &[
-            WIN,
-            START,
-            END,
-            LENGTH,
-            ("node", ColumnKind::Text),
-            ("node_role", ColumnKind::Text),
-            ("state", ColumnKind::Text),
-            ("degree", ColumnKind::Text),
-            ("evidence", ColumnKind::Text),
-            ("hz", ColumnKind::F64),
-            ("messages_in", ColumnKind::I64),
-            ("messages_out", ColumnKind::I64),
-            ("bytes_in", ColumnKind::I64),
-            ("bytes_out", ColumnKind::I64),
-            ("topics_in", ColumnKind::I64),
-            ("topics_out", ColumnKind::I64),
-            ("lifecycle", ColumnKind::Text),
-            ("first_ns", ColumnKind::Time),
-            ("last_ns", ColumnKind::Time),
-        ],
-        fill: nodes,
-        fill_runs: Some(runs::nodes),
+        batch: || Batch::with(NODES),
+        fill: |all, has_runs, row| nodes(all, has_runs, &mut |one| put(all, NODES, one, row)),
     },
     Table {
         word: "changes",
-        columns: &[
-            WIN,
-            START,
-            END,
-            LENGTH,
-            ("kind", ColumnKind::Text),
-            ("what", ColumnKind::Text),
-            ("node", ColumnKind::Text),
-            ("topic", ColumnKind::Text),
-            ("time_ns", ColumnKind::Time),
-            ("from_hz", ColumnKind::F64),
-            ("to_hz", ColumnKind::F64),
-            ("from_value", ColumnKind::Text),
-            ("to_value", ColumnKind::Text),
-        ],
-        fill: changes,
-        fill_runs: None,
+        batch: || Batch::with(CHANGES),
+        fill: |all, _, row| {
+            for (at, window) in all.windows.iter().enumerate() {
+                let changes = window.changes.iter();
+                changes.for_each(|one| put(all, CHANGES, &WindowChange::new(at, one), row));
+            }
+        },
     },
     Table {
         word: "ledger",
-        columns: &[
-            ("entry", ColumnKind::I64),
-            ("kind", ColumnKind::Text),
-            ("what", ColumnKind::Text),
-            ("node", ColumnKind::Text),
-            ("topic", ColumnKind::Text),
-            ("time_ns", ColumnKind::Time),
-            ("earliest_ns", ColumnKind::Time),
-            ("latest_ns", ColumnKind::Time),
-            ("until_ns", ColumnKind::Time),
-            ("from_hz", ColumnKind::F64),
-            ("to_hz", ColumnKind::F64),
-            ("from_value", ColumnKind::Text),
-            ("to_value", ColumnKind::Text),
-            ("degree", ColumnKind::Text),
-            ("evidence", ColumnKind::Text),
-            ("part_of", ColumnKind::I64),
-            ("is_quiet", ColumnKind::Flag),
-            ("weight", ColumnKind::I64),
-        ],
-        fill: ledger,
-        fill_runs: None,
+        batch: || Batch::with(LEDGER),
+        fill: |all, _, row| (0..all.ledger.entries.len()).for_each(|id| put(all, LEDGER, &id, row)),
     },
     Table {
         word: "phases",
-        columns: &[
-            ("phase", ColumnKind::I64),
-            START,
-            END,
-            LENGTH,
-            ("phase_name", ColumnKind::Text),
-            ("nodes_added", ColumnKind::I64),
-            ("nodes_removed", ColumnKind::I64),
-            ("same_as", ColumnKind::I64),
-        ],
-        fill: phases,
-        fill_runs: None,
+        batch: || Batch::with(PHASES),
+        fill: |all, _, row| (0..all.ledger.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
     },
     Table {
         word: "bags",
-        columns: &[
-            ("bag", ColumnKind::Text),
-            ("bag_format", ColumnKind::Text),
-            ("compression", ColumnKind::Text),
-            ("tier", ColumnKind::Text),
-            ("tier_reason", ColumnKind::Text),
-            ("is_complete", ColumnKind::Flag),
-            ("file_bytes", ColumnKind::I64),
-        ],
-        fill: bags,
-        fill_runs: None,
+        batch: || Batch::with(BAGS),
+        fill: |all, _, row| (0..all.bags.len()).for_each(|at| put(all, BAGS, &at, row)),
     },
 ];
 
-fn bags(mission: &Mission, row: RowTaker<'_>) {
-    for bag in &mission.bags {
-        row(&[
-            TableCell::text(&bag.name),
-            TableCell::text(&bag.format),
-            TableCell::text(bag.compression.join(" ")),
-            TableCell::text(bag.tier.word()),
-            text(bag.tier_reason.as_deref()),
-            TableCell::Flag(bag.complete),
-            TableCell::count(bag.file_bytes),
-        ]);
-    }
+fn put<R>(mission: &Mission, columns: &[Column<R>], one: &R, row: RowTaker<'_>) {
+    let cells: Vec<_> = columns
+        .iter()
+        .map(|(.., cell)| cell(mission, one))
+        .collect();
+    row(&cells);
 }
 
-fn nodes(mission: &Mission, row: RowTaker<'_>) {
-    for (window, graph) in mission.each() {
-        let [win, start, end, length] = cells_of(window);
-        for (state, load) in graph.nodes.iter().zip(graph.loads(&mission.elements)) {
-            let [
-                messages_in,
-                messages_out,
-                bytes_in,
-                bytes_out,
-                topics_in,
-                topics_out,
-            ] = load_cells(Some(load));
-            let node = &mission.elements.nodes[state.id as usize];
-            row(&[
-                win.clone(),
-                start.clone(),
-                end.clone(),
-                length.clone(),
-                TableCell::text(node.name.as_str()),
-                TableCell::text(&*node.role),
-                TableCell::text(state.state.word()),
-                TableCell::text(state.degree.word()),
-                words(node.evidence),
-                TableCell::known(state.hz, TableCell::Float),
-                messages_in,
-                messages_out,
-                bytes_in,
-                bytes_out,
-                topics_in,
-                topics_out,
-                text(state.lifecycle.as_deref()),
-                time(node.first),
-                time(node.last),
-            ]);
-        }
-    }
+/// The columns of one table about elements, of those that all such tables have in common.
+macro_rules! of_elements {
+    ($($column:ident)*) => { &[$($column),*] };
 }
 
-fn topics(mission: &Mission, row: RowTaker<'_>) {
-    for (window, graph) in mission.each() {
-        let [win, start, end, length] = cells_of(window);
-        for state in &graph.topics {
-            let topic = &mission.elements.topics[state.id as usize];
-            let [drops, jitter, age] = measure_cells(state.measures);
-            row(&[
-                win.clone(),
-                start.clone(),
-                end.clone(),
-                length.clone(),
-                TableCell::text(topic.name.as_str()),
-                TableCell::text(topic.types.join(" ")),
-                TableCell::text(state.state.word()),
-                TableCell::text(state.degree.word()),
-                words(topic.evidence),
-                TableCell::count(state.count),
-                TableCell::known(state.bytes, TableCell::count),
-                TableCell::known(state.hz, TableCell::Float),
-                TableCell::known(state.median_period_s, TableCell::Float),
-                TableCell::known(state.max_gap_s, TableCell::Float),
-                drops,
-                jitter,
-                age,
-                text(topic.qos.as_deref()),
-                time(topic.first),
-                time(topic.last),
-            ]);
-        }
-    }
+const EDGES: &[Column<Seen>] = of_elements! {
+    WIN START END LENGTH WHAT NODE TOPIC STATE DEGREE EVIDENCE N HZ BYTES DROPS JITTER AGE FIRST LAST
+};
+const TOPICS: &[Column<Seen>] = of_elements! {
+    WIN START END LENGTH TOPIC TYPES STATE DEGREE EVIDENCE N BYTES HZ MEDIAN GAP DROPS JITTER AGE QOS FIRST LAST
+};
+const NODES: &[Column<Seen>] = of_elements! {
+    WIN START END LENGTH NODE ROLE STATE DEGREE EVIDENCE HZ MESSAGES_IN MESSAGES_OUT BYTES_IN BYTES_OUT TOPICS_IN
+    TOPICS_OUT LIFECYCLE FIRST LAST
+};
+
+macro_rules! element_columns {
+    ($($column:ident $name:literal $kind:ident $cell:expr;)*) => {
+        $(const $column: Column<Seen> = ($name, ColumnKind::$kind, $cell);)*
+    };
 }
 
-fn edges(mission: &Mission, row: RowTaker<'_>) {
-    let elements = &mission.elements;
-    for (window, graph) in mission.each() {
-        let [win, start, end, length] = cells_of(window);
-        let mut edge = |what: &'static str, edge: &Edge, state: &EdgeState| {
-            let [drops, jitter, age] = measure_cells(state.measures);
-            row(&[
-                win.clone(),
-                start.clone(),
-                end.clone(),
-                length.clone(),
-                TableCell::text(what),
-                TableCell::text(elements.nodes[edge.node as usize].name.as_str()),
-                TableCell::text(elements.topics[edge.topic as usize].name.as_str()),
-                TableCell::text(state.state.word()),
-                TableCell::text(state.degree.word()),
-                words(edge.evidence),
-                TableCell::known(state.count, TableCell::count),
-                TableCell::known(state.hz, TableCell::Float),
-                TableCell::known(state.bytes, TableCell::count),
-                drops,
-                jitter,
-                age,
-                time(edge.first),
-                time(edge.last),
-            ]);
-        };
-        for state in &graph.publishes {
-            edge("publish", &elements.publishes[state.id as usize], state);
-        }
-        for state in &graph.subscribes {
-            edge("subscribe", &elements.subscribes[state.id as usize], state);
-        }
-    }
+element_columns! {
+    WIN "win" I64 |_, one| TableCell::count(one.win);
+    START "start_ns" Time |_, one| start(one.span);
+    END "end_ns" Time |_, one| end(one.span);
+    LENGTH "length_ns" I64 |_, one| length(one.span);
+    WHAT "what" Text |_, one| what(one.what);
+    NODE "node" Text |all, one| node(all, one.what);
+    ROLE "node_role" Text |all, one| text(all.elements.nodes.get(one.what.place().1).map(|node| &*node.role));
+    TOPIC "topic" Text |all, one| topic(all, one.what);
+    TYPES "types" Text |all, one| words(topic_of(all, one).iter().flat_map(|topic| &topic.types).map(|kind| &**kind));
+    QOS "qos" Text |all, one| text(topic_of(all, one).and_then(|topic| topic.qos.as_deref()));
+    STATE "state" Text |_, one| TableCell::text(one.state.word());
+    DEGREE "degree" Text |_, one| TableCell::text(one.degree.word());
+    EVIDENCE "evidence" Text |all, one| words(all.elements.evidence(one.what).words());
+    LIFECYCLE "lifecycle" Text |_, one| text(one.lifecycle.as_deref());
+    N "n" I64 |_, one| count(one.count);
+    HZ "hz" F64 |_, one| float(one.hz);
+    BYTES "bytes" I64 |_, one| count(one.bytes);
+    MEDIAN "median_period_s" F64 |_, one| float(one.median);
+    GAP "max_gap_s" F64 |_, one| float(one.gap);
+    DROPS "drops" I64 |_, one| count(one.measures.drops);
+    JITTER "jitter_s" F64 |_, one| float(one.measures.jitter_s);
+    AGE "age_s" F64 |_, one| float(one.measures.age_s);
+    MESSAGES_IN "messages_in" I64 |_, one| count(one.load.map(|load| load.messages_in));
+    MESSAGES_OUT "messages_out" I64 |_, one| count(one.load.map(|load| load.messages_out));
+    BYTES_IN "bytes_in" I64 |_, one| count(one.load.and_then(|load| load.bytes_in));
+    BYTES_OUT "bytes_out" I64 |_, one| count(one.load.and_then(|load| load.bytes_out));
+    TOPICS_IN "topics_in" I64 |_, one| count(one.load.map(|load| load.topics_in.into()));
+    TOPICS_OUT "topics_out" I64 |_, one| count(one.load.map(|load| load.topics_out.into()));
+    FIRST "first_ns" Time |all, one| time(all.elements.life(one.what).0);
+    LAST "last_ns" Time |all, one| time(all.elements.life(one.what).1);
 }
 
-fn changes(mission: &Mission, row: RowTaker<'_>) {
-    for window in &mission.windows {
-        for change in &window.changes {
-            let (kind, what, at, detail) = told(mission, change);
-            let [node, topic] = ends(mission, what);
-            let [from_hz, to_hz, from, to] = detail;
-            let [win, start, end, length] = cells_of(window);
-            let (kind, what) = (TableCell::text(kind), TableCell::text(what.word()));
-            row(&[
-                win,
-                start,
-                end,
-                length,
-                kind,
+fn topic_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Topic> {
+    mission.elements.topics.get(one.what.place().1)
+}
+
+/// A change from one window to the next.
+struct WindowChange {
+    window: usize,
+    kind: &'static str,
+    what: Element,
+    time: Option<Stamp>,
+    detail: Detail,
+}
+
+impl WindowChange {
+    fn new(window: usize, change: &Change) -> Self {
+        let (what, time, detail) = match change {
+            Change::Added { what, time } | Change::Removed { what, time } => {
+                (*what, *time, Detail::None)
+            }
+            Change::Rate {
                 what,
-                node,
-                topic,
-                time(at),
                 from_hz,
                 to_hz,
-                from,
-                to,
-            ]);
-        }
-    }
-}
-
-/// The cells of a change beside its time: `from_hz to_hz from_value to_value`.
-type DetailCells<'a> = [TableCell<'a>; 4];
-
-const NO_DETAIL: DetailCells<'static> = [
-    TableCell::Null,
-    TableCell::Null,
-    TableCell::Null,
-    TableCell::Null,
-];
-
-fn rates(from_hz: f64, to_hz: f64) -> DetailCells<'static> {
-    [
-        TableCell::Float(from_hz),
-        TableCell::Float(to_hz),
-        TableCell::Null,
-        TableCell::Null,
-    ]
-}
-
-fn values<'a>(from: impl Into<Cow<'a, str>>, to: impl Into<Cow<'a, str>>) -> DetailCells<'a> {
-    [
-        TableCell::Null,
-        TableCell::Null,
-        TableCell::text(from),
-        TableCell::text(to),
-    ]
-}
-
-/// The kind of a change, its element, its time, and its detail.
-fn told<'a>(
-    mission: &Mission,
-    change: &'a Change,
-) -> (&'static str, Element, Option<Stamp>, DetailCells<'a>) {
-    let names = |nodes: &[NodeId]| names(mission, nodes);
-    match change {
-        Change::Added { what, time } => ("added", *what, *time, NO_DETAIL),
-        Change::Removed { what, time } => ("removed", *what, *time, NO_DETAIL),
-        Change::Rate {
+            } => {
+                let (from_hz, to_hz) = (*from_hz, *to_hz);
+                (*what, None, Detail::Rates { from_hz, to_hz })
+            }
+            Change::HandedOver { topic, from, to } => {
+                let (from, to) = (from.clone(), to.clone());
+                (Element::Topic(*topic), None, Detail::Senders { from, to })
+            }
+            Change::Restarted { node, time } => (Element::Node(*node), Some(*time), Detail::None),
+            Change::Value { what, from, to, .. } => {
+                let (from, to) = (from.clone(), to.clone());
+                (*what, None, Detail::Values { from, to })
+            }
+        };
+        Self {
+            window,
+            kind: change.word(),
             what,
-            from_hz,
-            to_hz,
-        } => ("rate", *what, None, rates(*from_hz, *to_hz)),
-        Change::HandedOver { topic, from, to } => {
-            let detail = values(names(from), names(to));
-            ("handed_over", Element::Topic(*topic), None, detail)
+            time,
+            detail,
         }
-        Change::Restarted { node, time } => {
-            ("restarted", Element::Node(*node), Some(*time), NO_DETAIL)
-        }
-        Change::Value {
-            kind,
-            what,
-            from,
-            to,
-        } => (kind.word(), *what, None, values(&**from, &**to)),
+    }
+
+    fn span(&self, mission: &Mission) -> Span {
+        mission.windows[self.window].span
     }
 }
 
-fn ledger(mission: &Mission, row: RowTaker<'_>) {
-    for (id, entry) in mission.ledger.entries.iter().enumerate() {
-        let [node, topic] = ends(mission, entry.what);
-        let [from_hz, to_hz, from, to] = detail(mission, entry);
-        row(&[
-            TableCell::count(id),
-            TableCell::text(entry.kind.word()),
-            TableCell::text(entry.what.word()),
-            node,
-            topic,
-            TableCell::Time(entry.time),
-            TableCell::Time(entry.earliest),
-            TableCell::Time(entry.latest),
-            time(entry.until),
-            from_hz,
-            to_hz,
-            from,
-            to,
-            TableCell::text(entry.degree.word()),
-            words(entry.evidence),
-            TableCell::known(entry.part_of, TableCell::count),
-            TableCell::Flag(entry.quiet),
-            TableCell::count(entry.weight),
-        ]);
+const CHANGES: &[Column<WindowChange>] = columns! {
+    "win" I64 |all, one| TableCell::count(all.windows[one.window].index);
+    "start_ns" Time |all, one| start(one.span(all));
+    "end_ns" Time |all, one| end(one.span(all));
+    "length_ns" I64 |all, one| length(one.span(all));
+    "kind" Text |_, one| TableCell::text(one.kind);
+    "what" Text |_, one| what(one.what);
+    "node" Text |all, one| node(all, one.what);
+    "topic" Text |all, one| topic(all, one.what);
+    "time_ns" Time |_, one| time(one.time);
+    "from_hz" F64 |_, one| float(rates(&one.detail).0);
+    "to_hz" F64 |_, one| float(rates(&one.detail).1);
+    "from_value" Text |all, one| values(all, &one.detail).0;
+    "to_value" Text |all, one| values(all, &one.detail).1;
+};
+
+const LEDGER: &[Column<usize>] = columns! {
+    "entry" I64 |_, id| TableCell::count(*id);
+    "kind" Text |all, id| TableCell::text(entry(all, *id).kind.word());
+    "what" Text |all, id| what(entry(all, *id).what);
+    "node" Text |all, id| node(all, entry(all, *id).what);
+    "topic" Text |all, id| topic(all, entry(all, *id).what);
+    "time_ns" Time |all, id| TableCell::Time(entry(all, *id).time);
+    "earliest_ns" Time |all, id| TableCell::Time(entry(all, *id).earliest);
+    "latest_ns" Time |all, id| TableCell::Time(entry(all, *id).latest);
+    "until_ns" Time |all, id| time(entry(all, *id).until);
+    "from_hz" F64 |all, id| float(rates(&entry(all, *id).detail).0);
+    "to_hz" F64 |all, id| float(rates(&entry(all, *id).detail).1);
+    "from_value" Text |all, id| values(all, &entry(all, *id).detail).0;
+    "to_value" Text |all, id| values(all, &entry(all, *id).detail).1;
+    "degree" Text |all, id| TableCell::text(entry(all, *id).degree.word());
+    "evidence" Text |all, id| words(entry(all, *id).evidence.words());
+    "part_of" I64 |all, id| count(entry(all, *id).part_of.map(u64::from));
+    "is_quiet" Flag |all, id| TableCell::Flag(entry(all, *id).quiet);
+    "weight" I64 |all, id| TableCell::count(entry(all, *id).weight);
+};
+
+const PHASES: &[Column<usize>] = columns! {
+    "phase" I64 |_, at| TableCell::count(*at);
+    "start_ns" Time |all, at| start(all.ledger.phases[*at].span);
+    "end_ns" Time |all, at| end(all.ledger.phases[*at].span);
+    "length_ns" I64 |all, at| length(all.ledger.phases[*at].span);
+    "phase_name" Text |all, at| TableCell::text(&*all.ledger.phases[*at].name);
+    "nodes_added" I64 |all, at| TableCell::count(all.ledger.phases[*at].nodes_added);
+    "nodes_removed" I64 |all, at| TableCell::count(all.ledger.phases[*at].nodes_removed);
+    "same_as" I64 |all, at| count(all.ledger.phases[*at].same_as.map(u64::from));
+};
+
+const BAGS: &[Column<usize>] = columns! {
+    "bag" Text |all, at| TableCell::text(&all.bags[*at].name);
+    "bag_format" Text |all, at| TableCell::text(&all.bags[*at].format);
+    "compression" Text |all, at| TableCell::text(all.bags[*at].compression.join(" "));
+    "tier" Text |all, at| TableCell::text(all.bags[*at].tier.word());
+    "tier_reason" Text |all, at| text(all.bags[*at].tier_reason.as_deref());
+    "is_complete" Flag |all, at| TableCell::Flag(all.bags[*at].complete);
+    "file_bytes" I64 |all, at| TableCell::count(all.bags[*at].file_bytes);
+};
+
+fn entry(mission: &Mission, id: usize) -> &Entry {
+    &mission.ledger.entries[id]
+}
+
+fn rates(detail: &Detail) -> (Option<f64>, Option<f64>) {
+    match detail {
+        Detail::Rates { from_hz, to_hz } => (Some(*from_hz), Some(*to_hz)),
+        _ => (None, None),
     }
 }
 
-fn detail<'a>(mission: &Mission, entry: &'a Entry) -> DetailCells<'a> {
-    match &entry.detail {
-        Detail::None => NO_DETAIL,
-        Detail::Rates { from_hz, to_hz } => rates(*from_hz, *to_hz),
-        Detail::Count(many) => values("", many.to_string()),
-        Detail::Senders { from, to } => values(names(mission, from), names(mission, to)),
-        Detail::Values { from, to } => values(&**from, &**to),
-    }
-}
-
-fn phases(mission: &Mission, row: RowTaker<'_>) {
-    for (at, phase) in mission.ledger.phases.iter().enumerate() {
-        row(&[
-            TableCell::count(at),
-            TableCell::Time(phase.span.start),
-            TableCell::Time(phase.span.end),
-            TableCell::Int(phase.span.nanos()),
-            TableCell::text(&*phase.name),
-            TableCell::count(phase.nodes_added),
-            TableCell::count(phase.nodes_removed),
-            TableCell::known(phase.same_as, TableCell::count),
-        ]);
-    }
-}
-
-fn names(mission: &Mission, nodes: &[NodeId]) -> String {
-    let nodes = nodes.iter().map(|n| &mission.elements.nodes[*n as usize]);
-    nodes.map(|n| n.name.as_str()).collect::<Vec<_>>().join(" ")
-}
-
-/// The node and the topic of an element; unknown for the one it does not have.
-fn ends(mission: &Mission, what: Element) -> [TableCell<'_>; 2] {
-    let (node, topic) = mission.elements.names(what);
-    [node, topic].map(|name| TableCell::known(name, TableCell::text))
-}
-
-/// `win start_ns end_ns length_ns` of a window.
-fn cells_of(window: &Window) -> [TableCell<'static>; 4] {
-    let span = window.span;
-    let (start, end) = (TableCell::Time(span.start), TableCell::Time(span.end));
-    [
-        TableCell::count(window.index),
-        start,
-        end,
-        TableCell::Int(span.nanos()),
-    ]
-}
-
-/// `drops jitter_s age_s`.
-pub(super) fn measure_cells(measures: Measures) -> [TableCell<'static>; 3] {
-    [
-        TableCell::known(measures.drops, TableCell::count),
-        TableCell::known(measures.jitter_s, TableCell::Float),
-        TableCell::known(measures.age_s, TableCell::Float),
-    ]
-}
-
-/// `messages_in messages_out bytes_in bytes_out topics_in topics_out`.
-pub(super) fn load_cells(load: Option<NodeLoad>) -> [TableCell<'static>; 6] {
-    let cell = |value: fn(NodeLoad) -> Option<u64>| {
-        TableCell::known(load.and_then(value), TableCell::count)
+fn values<'a>(mission: &Mission, detail: &'a Detail) -> (TableCell<'a>, TableCell<'a>) {
+    let names = |nodes: &[NodeId]| {
+        let nodes = nodes.iter().map(|n| &mission.elements.nodes[*n as usize]);
+        words(nodes.map(|n| n.name.as_str()))
     };
-    [
-        cell(|load| Some(load.messages_in)),
-        cell(|load| Some(load.messages_out)),
-        cell(|load| load.bytes_in),
-        cell(|load| load.bytes_out),
-        cell(|load| Some(load.topics_in.into())),
-        cell(|load| Some(load.topics_out.into())),
-    ]
+    match detail {
+        Detail::None | Detail::Rates { .. } => (TableCell::Null, TableCell::Null),
+        Detail::Count(many) => (TableCell::text(""), TableCell::text(many.to_string())),
+        Detail::Senders { from, to } => (names(from), names(to)),
+        Detail::Values { from, to } => (TableCell::text(&**from), TableCell::text(&**to)),
+    }
 }
 
-pub(super) fn words(evidence: Evidence) -> TableCell<'static> {
-    TableCell::text(evidence.words().collect::<Vec<_>>().join(" "))
+fn start(span: Span) -> TableCell<'static> {
+    TableCell::Time(span.start)
 }
 
-pub(super) fn text(text: Option<&str>) -> TableCell<'_> {
+fn end(span: Span) -> TableCell<'static> {
+    TableCell::Time(span.end)
+}
+
+fn length(span: Span) -> TableCell<'static> {
+    TableCell::Int(span.nanos())
+}
+
+fn what(what: Element) -> TableCell<'static> {
+    TableCell::text(what.word())
+}
+
+/// The node of an element; unknown for a topic.
+fn node(mission: &Mission, what: Element) -> TableCell<'_> {
+    text(mission.elements.names(what).0)
+}
+
+/// The topic of an element; unknown for a node.
+fn topic(mission: &Mission, what: Element) -> TableCell<'_> {
+    text(mission.elements.names(what).1)
+}
+
+fn words<'a>(words: impl Iterator<Item = &'a str>) -> TableCell<'static> {
+    TableCell::text(words.collect::<Vec<_>>().join(" "))
+}
+
+fn text(text: Option<&str>) -> TableCell<'_> {
     TableCell::known(text, TableCell::text)
 }
 
-pub(super) fn time(stamp: Option<Stamp>) -> TableCell<'static> {
+fn count(count: Option<u64>) -> TableCell<'static> {
+    TableCell::known(count, TableCell::count)
+}
+
+fn float(number: Option<f64>) -> TableCell<'static> {
+    TableCell::known(number, TableCell::Float)
+}
+
+fn time(stamp: Option<Stamp>) -> TableCell<'static> {
     TableCell::known(stamp, TableCell::Time)
 }

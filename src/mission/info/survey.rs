@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::{Info, NodeInfo, info};
+use super::{BagInfo, Info, NodeInfo, info};
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::name::{is_player, is_recorder};
-use crate::base::table::{Batch, ColumnKind, TableCell};
+use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::evidence::Evidence;
@@ -40,90 +40,60 @@ impl SurveyRow {
     }
 }
 
-const COLUMNS: &[(&str, ColumnKind)] = &[
-    ("path", ColumnKind::Text),
-    ("bag_format", ColumnKind::Text),
-    ("compression", ColumnKind::Text),
-    ("tier", ColumnKind::Text),
-    ("is_complete", ColumnKind::Flag),
-    ("file_bytes", ColumnKind::I64),
-    ("start_ns", ColumnKind::Time),
-    ("duration_s", ColumnKind::F64),
-    ("messages", ColumnKind::I64),
-    ("topics", ColumnKind::I64),
-    ("nodes", ColumnKind::I64),
-    ("publishes", ColumnKind::I64),
-    ("subscribes", ColumnKind::I64),
-    ("nodes_measured", ColumnKind::I64),
-    ("publishes_measured", ColumnKind::I64),
-    ("subscribes_measured", ColumnKind::I64),
-    ("subscribes_stated", ColumnKind::I64),
-    ("named_nodes", ColumnKind::I64),
-    ("unknown_publishers", ColumnKind::I64),
-    ("evidence", ColumnKind::Text),
-    ("error", ColumnKind::Text),
-];
-
-/// The place of the column `is_complete`, behind which `file_bytes` stands.
-const COMPLETE: usize = 4;
+const COLUMNS: &[ColumnOf<(), SurveyRow>] = columns! {
+    "path" Text |(), row| TableCell::text(&row.path);
+    "bag_format" Text |(), row| of_bag(row, |bag| TableCell::text(&bag.format));
+    "compression" Text |(), row| of_bag(row, |bag| TableCell::text(bag.compression.join(" ")));
+    "tier" Text |(), row| of_bag(row, |bag| TableCell::text(bag.tier));
+    "is_complete" Flag |(), row| TableCell::Flag(row.is_complete);
+    "file_bytes" I64 |(), row| TableCell::known(row.file_bytes, TableCell::count);
+    "start_ns" Time |(), row| known(row, |info| TableCell::Time(Stamp(info.start_ns)));
+    "duration_s" F64 |(), row| known(row, |info| TableCell::Float(info.duration_s));
+    "messages" I64 |(), row| known(row, |info| TableCell::count(info.messages));
+    "topics" I64 |(), row| known(row, |info| TableCell::count(info.topics.len()));
+    "nodes" I64 |(), row| known(row, |info| TableCell::count(info.nodes_by_degree.total()));
+    "publishes" I64 |(), row| known(row, |info| TableCell::count(info.publishes_by_degree.total()));
+    "subscribes" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.total()));
+    "nodes_measured" I64 |(), row| known(row, |info| TableCell::count(info.nodes_by_degree.measured));
+    "publishes_measured" I64 |(), row| known(row, |info| TableCell::count(info.publishes_by_degree.measured));
+    "subscribes_measured" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.measured));
+    "subscribes_stated" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.stated));
+    "named_nodes" I64 |(), row| known(row, |info| TableCell::count(info.nodes.iter().filter(is_named).count()));
+    "unknown_publishers" I64 |(), row| known(row, unknown_publishers);
+    "evidence" Text |(), row| known(row, |info| TableCell::text(evidence(info)));
+    "error" Text |(), row| TableCell::known(row.error.as_deref(), TableCell::text);
+};
 
 /// The survey as a table, a row per bag, readable or not.
 pub(crate) fn survey_table(rows: &[SurveyRow]) -> Batch {
-    let mut table = Batch::new(COLUMNS);
-    for row in rows {
-        table.push(&cells(row));
-    }
-    table
+    Batch::filled(COLUMNS, &(), rows)
 }
 
-fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
-    let path = TableCell::text(&row.path);
-    let Some(info) = &row.info else {
-        let mut cells = vec![TableCell::Null; COLUMNS.len()];
-        cells[0] = path;
-        cells[COMPLETE] = TableCell::Flag(row.is_complete);
-        cells[COMPLETE + 1] = TableCell::known(row.file_bytes, TableCell::count);
-        cells[COLUMNS.len() - 1] = TableCell::known(row.error.as_deref(), TableCell::text);
-        return cells;
-    };
-    let bag = info.bags.first();
-    let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
-    let is_named = |node: &&NodeInfo| {
-        let is_guess = node
-            .evidence
-            .iter()
-            .all(|word| Evidence::of(word).is_guess());
-        !is_guess && !is_recorder(&node.name) && !is_player(&node.name)
-    };
-    let named = info.nodes.iter().filter(is_named).count();
-    let unknown: u32 = info
-        .topics
-        .iter()
-        .filter_map(|t| t.unknown_publishers)
-        .sum();
-    vec![
-        path,
-        TableCell::known(bag, |b| TableCell::text(&b.format)),
-        TableCell::known(bag, |b| TableCell::text(b.compression.join(" "))),
-        TableCell::known(bag, |b| TableCell::text(b.tier)),
-        TableCell::Flag(row.is_complete),
-        TableCell::known(row.file_bytes, TableCell::count),
-        TableCell::Time(Stamp(info.start_ns)),
-        TableCell::Float(info.duration_s),
-        TableCell::count(info.messages),
-        TableCell::count(info.topics.len()),
-        TableCell::count(info.nodes_by_degree.total()),
-        TableCell::count(info.publishes_by_degree.total()),
-        TableCell::count(info.subscribes_by_degree.total()),
-        TableCell::count(info.nodes_by_degree.measured),
-        TableCell::count(info.publishes_by_degree.measured),
-        TableCell::count(info.subscribes_by_degree.measured),
-        TableCell::count(info.subscribes_by_degree.stated),
-        TableCell::count(named),
-        TableCell::count(unknown),
-        TableCell::text(evidence.join(" ")),
-        TableCell::known(row.error.as_deref(), TableCell::text),
-    ]
+/// A cell of what was read; unknown where nothing was.
+fn known<'a>(row: &'a SurveyRow, cell: fn(&'a Info) -> TableCell<'a>) -> TableCell<'a> {
+    TableCell::known(row.info.as_ref(), cell)
+}
+
+fn of_bag<'a>(row: &'a SurveyRow, cell: fn(&'a BagInfo) -> TableCell<'a>) -> TableCell<'a> {
+    let info = row.info.as_ref();
+    TableCell::known(info.and_then(|info| info.bags.first()), cell)
+}
+
+/// Whether a node is the robot's, with a name of its own.
+fn is_named(node: &&NodeInfo) -> bool {
+    let mut evidence = node.evidence.iter();
+    let is_guess = evidence.all(|word| Evidence::of(word).is_guess());
+    !is_guess && !is_recorder(&node.name) && !is_player(&node.name)
+}
+
+fn unknown_publishers(info: &Info) -> TableCell<'_> {
+    let topics = info.topics.iter();
+    TableCell::count(topics.filter_map(|t| t.unknown_publishers).sum::<u32>())
+}
+
+fn evidence(info: &Info) -> String {
+    let words: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
+    words.join(" ")
 }
 
 /// The survey as a table for people, fitted to `width`; a bag that cannot be read has a line that says why.
@@ -165,7 +135,6 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
 fn text_row(row: &SurveyRow) -> Option<Vec<Cell>> {
     let info = row.info.as_ref().filter(|_| row.error.is_none())?;
     let bag = info.bags.first();
-    let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
     let cells = [
         visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
@@ -177,7 +146,7 @@ fn text_row(row: &SurveyRow) -> Option<Vec<Cell>> {
         info.nodes_by_degree.total().to_string(),
         info.publishes_by_degree.total().to_string(),
         info.subscribes_by_degree.total().to_string(),
-        evidence.join(" "),
+        evidence(info),
     ];
     Some(cells.into_iter().map(Cell::Text).collect())
 }

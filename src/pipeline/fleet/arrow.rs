@@ -48,8 +48,9 @@ pub fn mission_batches(mission: &Mission) -> Result<Vec<(&'static str, RecordBat
 /// [`Error::Usage`] for a column that is missing, of another type, or unknown where it must be known.
 pub fn counts_of(batch: &RecordBatch) -> Result<Vec<Count>> {
     // A role follows from a name, and tables of before had none.
-    let columns = COUNTS.iter().filter(|(name, _)| *name != ROLE);
-    let table = from_arrow(batch, &columns.copied().collect::<Vec<_>>())?;
+    let columns = COUNTS.iter().filter(|(name, ..)| *name != ROLE);
+    let columns: Vec<_> = columns.map(|(name, kind, _)| (*name, *kind)).collect();
+    let table = from_arrow(batch, &columns)?;
     (0..table.rows).map(|row| count(&table, row)).collect()
 }
 
