@@ -40,9 +40,12 @@ use crate::base::error::{Error, Result};
 
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
-pub(crate) use encoder::{AtOnce, Single, single};
 pub(crate) use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Pack, Packet};
+pub(crate) use encoder::{Single, single};
+pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
+use png::StillKind;
 use sequence::Sequence;
+use tables::TableFormat;
 use target::Target;
 pub(crate) use tex::needs_figure;
 
@@ -70,13 +73,13 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: png::start_png,
+        start: |sequence, target| png::start(sequence, target, StillKind::Png),
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: png::start_webp,
+        start: |sequence, target| png::start(sequence, target, StillKind::WebP),
         ..IMAGE
     },
     OutputFormat {
@@ -113,7 +116,7 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "mp4",
         what: "a video, through `ffmpeg`",
         check: Some(video::check),
-        start: video::start_mp4,
+        start: |sequence, target| video::start(sequence, target, &video::MP4),
         ..PICTURE
     },
     #[cfg(feature = "video")]
@@ -121,7 +124,7 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "webm",
         what: "a video, through `ffmpeg`",
         check: Some(video::check),
-        start: video::start_webm,
+        start: |sequence, target| video::start(sequence, target, &video::WEBM),
         ..PICTURE
     },
     OutputFormat {
@@ -154,7 +157,7 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
         check: Some(tables::check),
-        start: tables::start_csv,
+        start: |sequence, target| tables::start(sequence, target, TableFormat::Csv),
         ..DATA
     },
     #[cfg(feature = "parquet")]
@@ -162,7 +165,7 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "parquet",
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
         check: Some(tables::check),
-        start: tables::start_parquet,
+        start: |sequence, target| tables::start(sequence, target, TableFormat::Parquet),
         ..DATA
     },
     OutputFormat {

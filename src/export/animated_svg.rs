@@ -1,7 +1,8 @@
 //! The whole sequence as one animated SVG.
 
-use super::{AtOnce, Encoder};
-use crate::base::error::Result;
+use std::io::Write as _;
+
+use super::{Started, one_file};
 use crate::draw::paint::animated::AnimatedScenes;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::target::Target;
@@ -14,12 +15,9 @@ const MANY: usize = 100;
 /// Begins the animation.
 ///
 /// # Errors
-/// As [`AtOnce::start`].
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    AtOnce::start(target, move || {
+/// As [`one_file`].
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_file(target, "all windows are in one file", move |sink| {
         let remarks = remark(sequence.view).into_iter().collect();
         let times = sequence.frame_times();
         let busiest = sequence.view.busiest();
@@ -27,7 +25,8 @@ pub(crate) fn start<'a>(
         let scene = |time: &FrameTime| (sequence.picture.scene(time.window, 1.0), time.ms);
         let scenes = AnimatedScenes::new(times.iter().filter(|t| t.is_settled()).map(scene));
         let title = sequence.picture.title().unwrap_or_default();
-        (scenes.write(title, still.unwrap_or(0)), remarks)
+        let text = scenes.write(title, still.unwrap_or(0));
+        sink.write_all(text.as_bytes()).map(|()| remarks)
     })
 }
 

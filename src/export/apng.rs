@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Started, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
@@ -36,10 +36,7 @@ impl Write for Shared {
 ///
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Apng {
         target: target.clone(),

@@ -1,15 +1,17 @@
 //! The parts of an output format: an encoder that takes frames and writes bytes, and the row that names it.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
-use super::sink::OutputSink;
+use super::sink::{OutputSink, write_file};
 use super::target::Target;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
+use crate::view::union::union;
+use crate::view::{SeenWindow, View};
 
 /// The data that an encoder needs of every frame; each includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -165,44 +167,87 @@ pub trait Encoder: Send {
     fn finish(self: Box<Self>) -> Result<Written>;
 }
 
-/// An output of one file that is written when the sequence is over.
-pub(crate) struct AtOnce<W> {
-    target: Target,
-    /// The function that makes the text, with remarks for the user.
-    write: W,
-}
+/// The beginning of an output.
+pub(crate) type Started<'a> = Result<Box<dyn Encoder + 'a>>;
 
-impl<'a, W: FnOnce() -> (String, Vec<String>) + Send + 'a> AtOnce<W> {
-    /// # Errors
-    /// [`Error::Usage`] for a name with `{n}`.
-    pub(crate) fn start(target: &Target, write: W) -> Result<Box<dyn Encoder + 'a>> {
-        if target.is_numbered() {
-            return Err(Error::usage(
-                format!("`{}` asks for a file per window", target.path().display()),
-                "all windows are in one file: leave `{n}` out",
-            ));
-        }
-        Ok(Box::new(Self {
-            target: target.clone(),
-            write,
-        }))
+/// An output that is written when the sequence is over.
+struct AtEnd<W>(W);
+
+impl<W: FnOnce() -> Result<Written> + Send> Encoder for AtEnd<W> {
+    fn finish(self: Box<Self>) -> Result<Written> {
+        (self.0)()
     }
 }
 
-impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
-    fn finish(self: Box<Self>) -> Result<Written> {
-        let mut written = Written::to(&self.target);
-        let mut sink = OutputSink::create(&self.target, None)?;
-        let (text, remarks) = (self.write)();
-        sink.write_all(text.as_bytes()).map_err(sink.error())?;
-        written.remarks = remarks;
+/// Begins an output that takes no frames.
+pub(crate) fn at_end<'a>(write: impl FnOnce() -> Result<Written> + Send + 'a) -> Started<'a> {
+    Ok(Box::new(AtEnd(write)))
+}
+
+/// Begins an output of one file that takes no frames; `write` returns remarks for the user.
+///
+/// # Errors
+/// [`Error::Usage`] with the reason for a name with `{n}`.
+pub(crate) fn one_file<'a>(
+    target: &Target,
+    reason: &str,
+    write: impl FnOnce(&mut OutputSink) -> io::Result<Vec<String>> + Send + 'a,
+) -> Started<'a> {
+    target.must_be_one(reason)?;
+    let target = target.clone();
+    at_end(move || {
+        let mut written = Written::to(&target);
+        let mut sink = OutputSink::create(&target, None)?;
+        written.remarks = write(&mut sink).map_err(sink.error())?;
         written.add(sink.commit()?);
         Ok(written)
+    })
+}
+
+/// Begins an output of one text.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn one_text<'a>(
+    target: &Target,
+    text: impl FnOnce() -> String + Send + 'a,
+) -> Started<'a> {
+    one_file(target, "all windows are in one file", |sink| {
+        sink.write_all(text().as_bytes()).map(|()| Vec::new())
+    })
+}
+
+/// Writes a text per window, where the name has `{n}`; otherwise one of the only window, or of the union of all. `text`
+/// takes the number of the window where there are several.
+pub(crate) fn text_per_window(
+    view: &View,
+    target: &Target,
+    text: impl Fn(&SeenWindow, Option<usize>) -> String,
+    remark: impl Fn(&Target, &SeenWindow, &str) -> Option<String>,
+) -> Result<Written> {
+    let mut written = Written::to(target);
+    let mut write = |target: &Target, seen: &SeenWindow, index: Option<usize>| -> Result<()> {
+        let text = text(seen, index);
+        written.add(write_file(target, text.as_bytes())?);
+        written.remarks.extend(remark(target, seen, &text));
+        Ok(())
+    };
+    let frames = &view.frames;
+    if target.is_numbered() {
+        for (k, frame) in frames.iter().enumerate() {
+            let target = target.numbered(frame.index, frames.len());
+            write(&target, &view.seen(k), Some(frame.index))?;
+        }
+    } else if frames.len() == 1 {
+        write(target, &view.seen(0), None)?;
+    } else if let Some(all) = union(view) {
+        write(target, &all, None)?;
     }
+    Ok(written)
 }
 
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
-pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Started<'a>;
 
 /// Whether a format holds one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -275,8 +320,8 @@ pub(crate) const DATA: OutputFormat = OutputFormat {
 };
 
 /// The start that each row replaces by its own.
-fn nothing<'a>(_: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    AtOnce::start(target, || (String::new(), Vec::new()))
+fn nothing<'a>(_: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_text(target, String::new)
 }
 
 #[cfg(test)]

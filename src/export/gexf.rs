@@ -3,10 +3,8 @@
 //! Nodes of the mission and its topics are nodes, publications and subscriptions edges; each has a spell for every life
 //! of its, in seconds from the mission's start, and its rate over time.
 
-use super::encoder::AtOnce;
 use super::spells::{SpellOf, parts};
-use super::{Encoder, Sequence};
-use crate::base::error::Result;
+use super::{Sequence, Started, one_text};
 use crate::draw::paint::xml::Xml;
 use crate::export::target::Target;
 use crate::mission::Mission;
@@ -15,11 +13,8 @@ use crate::mission::Mission;
 ///
 /// # Errors
 /// A name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    AtOnce::start(target, || (text(sequence.data), Vec::new()))
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_text(target, || text(sequence.data))
 }
 
 /// Attributes of nodes and edges: number, name, type.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Started, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
@@ -25,10 +25,7 @@ struct Gif {
 ///
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Gif {
         target: target.clone(),

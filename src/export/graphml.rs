@@ -1,9 +1,7 @@
 //! The union of all windows as one graph in `GraphML` (<http://graphml.graphdrawing.org>).
 
-use super::encoder::AtOnce;
 use super::spells::{SpellOf, parts};
-use super::{Encoder, Sequence};
-use crate::base::error::Result;
+use super::{Sequence, Started, one_text};
 use crate::draw::paint::xml::Xml;
 use crate::export::target::Target;
 use crate::mission::Mission;
@@ -12,11 +10,8 @@ use crate::mission::Mission;
 ///
 /// # Errors
 /// A name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    AtOnce::start(target, || (text(sequence.data), Vec::new()))
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_text(target, || text(sequence.data))
 }
 
 /// The attributes of nodes and edges: name and type. Times are seconds from the mission's start.

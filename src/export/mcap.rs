@@ -12,45 +12,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Cursor, Write as _};
 
 pub(crate) use self::graph_file::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
-use super::{Encoder, Sequence, Written};
-use crate::base::error::{Error, Result};
+use super::{Sequence, Started, one_file};
 use crate::base::name::UNKNOWN_NODE;
 use crate::base::time::Stamp;
-use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::graph::{Edge, Element, Topic};
 use crate::mission::Mission;
 use crate::mission::events::sentence;
 
-struct McapEncoder<'a> {
-    mission: &'a Mission,
-    target: Target,
-}
-
 /// Begins the file.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    target.must_be_one("the graphs of all windows are one file")?;
-    Ok(Box::new(McapEncoder {
-        mission: sequence.data,
-        target: target.clone(),
-    }))
-}
-
-impl Encoder for McapEncoder<'_> {
-    fn finish(self: Box<Self>) -> Result<Written> {
-        let mut sink = OutputSink::create(&self.target, None)?;
-        let bytes = written(self.mission).map_err(Error::io("write", self.target.path()))?;
-        sink.write_all(&bytes).map_err(sink.error())?;
-        let mut written = Written::to(&self.target);
-        written.add(sink.commit()?);
-        Ok(written)
-    }
+/// [`Error::Usage`](crate::base::error::Error::Usage) for a name with `{n}`.
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    one_file(target, "the graphs of all windows are one file", |sink| {
+        let bytes = written(sequence.data)?;
+        sink.write_all(&bytes).map(|()| Vec::new())
+    })
 }
 
 /// The whole file.

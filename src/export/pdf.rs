@@ -1,16 +1,15 @@
 //! A page per window, or the strip, as one PDF file.
 
-use std::io::Write as _;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Needs, Pack, Packet, Written};
+use super::{Encoder, Needs, Pack, Packet, Started, Written};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 use crate::draw::paint::pdf::{self, PdfPage};
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::OutputSink;
+use crate::export::sink::write_file;
 use crate::export::target::Target;
 
 /// The largest number of pages that wait to be written.
@@ -30,10 +29,7 @@ struct Book<'a> {
 ///
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     target.must_be_one("a PDF has a page per window")?;
     let (sheets, waiting) = sync_channel(WAITING);
     let fonts = sequence.fonts.clone();
@@ -113,10 +109,8 @@ impl Encoder for Book<'_> {
             }
             Err(_) => return Err(refused),
         };
-        let mut sink = OutputSink::create(&target, None)?;
-        sink.write_all(&bytes).map_err(sink.error())?;
         let mut written = Written::to(&target);
-        written.add(sink.commit()?);
+        written.add(write_file(&target, &bytes)?);
         Ok(written)
     }
 }

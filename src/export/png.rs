@@ -1,17 +1,15 @@
 //! Images as PNG and WebP: one per window, or the strip.
 
-use std::io::Write as _;
-
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Single, Written, single};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Single, Started, Written, single};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::OutputSink;
+use crate::export::sink::write_file;
 use crate::export::target::Target;
 
 /// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
@@ -19,7 +17,7 @@ const PAPER: f64 = 300.0 / 96.0;
 
 /// The two formats of still images.
 #[derive(Clone, Copy)]
-enum StillKind {
+pub(crate) enum StillKind {
     Png,
     WebP,
 }
@@ -36,36 +34,11 @@ struct Images<'a> {
     written: Written,
 }
 
-/// Begins PNG images.
-///
-/// # Errors
-/// [`Error::Usage`] for several windows without `{n}`.
-pub(crate) fn start_png<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, StillKind::Png)
-}
-
-/// Begins WebP images.
-///
-/// # Errors
-/// [`Error::Usage`] for several windows without `{n}`.
-pub(crate) fn start_webp<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, StillKind::WebP)
-}
-
 /// Begins the PNG image of the first window.
 ///
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start_poster<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start_poster<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     target.must_be_one("a poster is one image")?;
     Ok(Box::new(Images {
         kind: StillKind::Png,
@@ -78,11 +51,15 @@ pub(crate) fn start_poster<'a>(
     }))
 }
 
-fn start<'a>(
+/// Begins the images, one per window or one of the strip.
+///
+/// # Errors
+/// As [`single`].
+pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
     kind: StillKind,
-) -> Result<Box<dyn Encoder + 'a>> {
+) -> Started<'a> {
     let strip = match single(sequence, target, true)? {
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
@@ -96,15 +73,6 @@ fn start<'a>(
         windows: sequence.view.frames.len(),
         written: Written::to(target),
     }))
-}
-
-impl Images<'_> {
-    fn write(&mut self, bytes: &[u8], target: &Target) -> Result<()> {
-        let mut sink = OutputSink::create(target, None)?;
-        sink.write_all(bytes).map_err(sink.error())?;
-        self.written.add(sink.commit()?);
-        Ok(())
-    }
 }
 
 impl Encoder for Images<'_> {
@@ -131,7 +99,8 @@ impl Encoder for Images<'_> {
             return Ok(());
         };
         let target = self.target.numbered(index, self.windows);
-        self.write(&bytes, &target)
+        self.written.add(write_file(&target, &bytes)?);
+        Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
@@ -139,8 +108,8 @@ impl Encoder for Images<'_> {
             let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
             let scale = self.sequence.options.scale * paper;
             let pixels = self.sequence.painter.paint(scene, scale)?;
-            let target = self.target.clone();
-            self.write(&encoded(self.kind, &pixels)?, &target)?;
+            let bytes = encoded(self.kind, &pixels)?;
+            self.written.add(write_file(&self.target, &bytes)?);
         }
         Ok(self.written)
     }

@@ -126,6 +126,16 @@ impl OutputSink {
     }
 }
 
+/// Writes a whole file; returns its size.
+///
+/// # Errors
+/// Where the system refuses.
+pub(crate) fn write_file(target: &Target, bytes: &[u8]) -> Result<u64> {
+    let mut sink = OutputSink::create(target, None)?;
+    sink.write_all(bytes).map_err(sink.error())?;
+    sink.commit()
+}
+
 impl Write for OutputSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.written + bytes.len() as u64 > self.limit {

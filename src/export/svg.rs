@@ -1,13 +1,11 @@
 //! Drawings as SVG text: one per window, or the strip.
 
-use std::io::Write as _;
-
-use super::{Encoder, Needs, Pack, Packet, Single, Written, single};
+use super::{Encoder, Needs, Pack, Packet, Single, Started, Written, single};
 use crate::base::error::Result;
 use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::OutputSink;
+use crate::export::sink::write_file;
 use crate::export::target::Target;
 
 struct SvgEncoder<'a> {
@@ -22,10 +20,7 @@ struct SvgEncoder<'a> {
 ///
 /// # Errors
 /// [`Error::Usage`](crate::base::error::Error::Usage) for several windows without `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let strip = match single(sequence, target, sequence.options.is_one_drawing())? {
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
@@ -55,21 +50,15 @@ impl Encoder for SvgEncoder<'_> {
             return Ok(());
         };
         let target = self.target.numbered(index, self.windows);
-        self.written.add(write(&bytes, &target)?);
+        self.written.add(write_file(&target, &bytes)?);
         Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
         if let Some(scene) = self.strip {
             let text = svg::write(scene);
-            self.written.add(write(text.as_bytes(), &self.target)?);
+            self.written.add(write_file(&self.target, text.as_bytes())?);
         }
         Ok(self.written)
     }
-}
-
-fn write(text: &[u8], target: &Target) -> Result<u64> {
-    let mut sink = OutputSink::create(target, None)?;
-    sink.write_all(text).map_err(sink.error())?;
-    sink.commit()
 }

@@ -9,7 +9,7 @@ pub(crate) mod writer;
 
 use std::io::Write as _;
 
-use super::{Encoder, Written};
+use super::{Started, Written, at_end};
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, TableCell};
 use crate::export::sequence::Sequence;
@@ -19,36 +19,6 @@ use crate::mission::Mission;
 use mission::{RowTaker, TABLES, Table};
 pub(crate) use writer::TableFormat;
 use writer::Writer;
-
-struct TablesEncoder<'a> {
-    mission: &'a Mission,
-    target: Target,
-    format: TableFormat,
-    has_runs: bool,
-}
-
-/// Begins the tables as CSV.
-///
-/// # Errors
-/// As [`check`].
-pub(crate) fn start_csv<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, TableFormat::Csv)
-}
-
-/// Begins the tables as Parquet.
-///
-/// # Errors
-/// As [`start_csv`].
-#[cfg(feature = "parquet")]
-pub(crate) fn start_parquet<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, TableFormat::Parquet)
-}
 
 /// Whether several files can be made of this name.
 ///
@@ -72,38 +42,35 @@ pub(crate) fn files(target: &Target, word: &str) -> Vec<Target> {
     TABLES.iter().map(file).collect()
 }
 
-fn start<'a>(
+/// Begins the tables.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
     format: TableFormat,
-) -> Result<Box<dyn Encoder + 'a>> {
+) -> Started<'a> {
     check(target)?;
-    Ok(Box::new(TablesEncoder {
-        mission: sequence.data,
-        target: target.clone(),
-        format,
-        has_runs: sequence.options.has_runs,
-    }))
-}
-
-impl Encoder for TablesEncoder<'_> {
-    fn finish(self: Box<Self>) -> Result<Written> {
-        let each = TABLES.iter().zip(files(&self.target, self.format.word()));
+    let target = target.clone();
+    at_end(move || {
+        let each = TABLES.iter().zip(files(&target, format.word()));
+        let has_runs = sequence.options.has_runs;
         let write = |(table, file): (&Table, Target)| {
-            let rows = |row: RowTaker<'_>| (table.fill)(self.mission, self.has_runs, row);
-            write(rows, (table.batch)(), &file, self.format)
+            let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, has_runs, row);
+            write(rows, (table.batch)(), &file, format)
         };
         // All of them are whole before the first one gets its name.
         let mut sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
         for sink in &mut sinks {
             sink.flush().map_err(sink.error())?;
         }
-        let mut written = Written::to(&self.target);
+        let mut written = Written::to(&target);
         for sink in sinks {
             written.add(sink.commit()?);
         }
         Ok(written)
-    }
+    })
 }
 
 /// Every table of a mission by its word, whole.

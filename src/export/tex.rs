@@ -1,7 +1,7 @@
 //! The lines that include a figure in `LaTeX`, written beside its picture.
 
-use super::{AtOnce, Encoder};
-use crate::base::error::{Error, Result};
+use super::{Started, one_text};
+use crate::base::error::Error;
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
 
@@ -9,14 +9,11 @@ use crate::export::target::Target;
 ///
 /// # Errors
 /// [`Error::Usage`] without a figure, and for a name with `{n}`.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let Some(latex) = sequence.latex else {
         return Err(needs_figure(target));
     };
-    AtOnce::start(target, move || (latex.to_owned(), Vec::new()))
+    one_text(target, || latex.to_owned())
 }
 
 /// The error for lines without a figure.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Needs, Pack, Packet, Written};
+use super::{Encoder, Needs, Pack, Packet, Started, Written};
 use crate::base::budget;
 use crate::base::error::{Error, Result};
 use crate::export::palette::Palette;
@@ -19,19 +19,19 @@ const FINEST_MS: u32 = 20;
 const FEWEST_PER_SECOND: f64 = 10.0;
 
 /// A kind of video: the container and the arguments of ffmpeg for it.
-struct VideoKind {
+pub(crate) struct VideoKind {
     arguments: &'static [&'static str],
     /// Arguments of the container for a pipe, in which ffmpeg cannot go back.
     piped: &'static [&'static str],
 }
 
-const MP4: VideoKind = VideoKind {
+pub(crate) const MP4: VideoKind = VideoKind {
     arguments: &[
         "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
     ],
     piped: &["-movflags", "frag_keyframe+empty_moov"],
 };
-const WEBM: VideoKind = VideoKind {
+pub(crate) const WEBM: VideoKind = VideoKind {
     arguments: &[
         "-c:v",
         "libvpx-vp9",
@@ -102,33 +102,15 @@ struct FfmpegJob {
     time: (u64, u64),
 }
 
-/// Begins an MP4 file.
+/// Begins the video.
 ///
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start_mp4<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, &MP4)
-}
-
-/// Begins a `WebM` file.
-///
-/// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start_webm<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, &WEBM)
-}
-
-fn start<'a>(
+pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
     kind: &'static VideoKind,
-) -> Result<Box<dyn Encoder + 'a>> {
+) -> Started<'a> {
     target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Video {
         sequence,

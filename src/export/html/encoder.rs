@@ -1,23 +1,19 @@
 //! The mission as one page that plays it.
 
-use crate::base::error::Result;
 use crate::draw::picture::Union;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::html::{HtmlPage, PageGraph};
 use crate::export::sequence::{Sequence, UnionDrawings};
 use crate::export::target::Target;
-use crate::export::{AtOnce, Encoder};
+use crate::export::{Started, one_text};
 
 /// Begins the page.
 ///
 /// # Errors
-/// As [`AtOnce::start`].
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+/// As [`one_text`].
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let style = Style::builtin(BUILTIN[0].0)?;
-    AtOnce::start(target, move || (page(sequence, &style), Vec::new()))
+    one_text(target, move || page(sequence, &style))
 }
 
 /// The page with every element one by one, and with the picture where that folds something.

@@ -1,20 +1,16 @@
 //! The report in Markdown: a file of its own, or at the end of one that a job collects.
 
-use crate::base::error::Result;
 use crate::base::{budget, file};
 use crate::export::report::report;
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
-use crate::export::{AtOnce, Encoder};
+use crate::export::{Started, one_text};
 
 /// Begins the report; it follows the text already in the file if that is the file to append to.
 ///
 /// # Errors
-/// As [`AtOnce::start`]; as [`file::read_text`] for the file to append to.
-pub(crate) fn start<'a>(
-    sequence: &'a Sequence<'a>,
-    target: &Target,
-) -> Result<Box<dyn Encoder + 'a>> {
+/// As [`one_text`]; as [`file::read_text`] for the file to append to.
+pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let path = target.path();
     let is_appended = sequence.options.append_to.as_deref() == Some(path) && path.is_file();
     let before = if is_appended {
@@ -22,12 +18,11 @@ pub(crate) fn start<'a>(
     } else {
         String::new()
     };
-    AtOnce::start(target, move || {
+    one_text(target, move || {
         let report = report(sequence);
-        let text = match before.trim_end() {
+        match before.trim_end() {
             "" => report,
             before => format!("{before}\n\n{report}"),
-        };
-        (text, Vec::new())
+        }
     })
 }
