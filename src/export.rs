@@ -38,12 +38,12 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
+use self::png::StillKind;
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Pack, Packet};
 pub(crate) use encoder::{Single, single};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
-use png::StillKind;
 use sequence::Sequence;
 use tables::TableFormat;
 use target::Target;

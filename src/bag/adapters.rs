@@ -28,12 +28,12 @@ impl<'a> Clip<'a> {
 }
 
 impl Sink for Clip<'_> {
-    fn connection(&mut self, connection: &Connection) -> Want {
-        self.sink.connection(connection)
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
     }
 
-    fn part(&mut self) {
-        self.sink.part();
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.sink.connection(connection)
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -53,9 +53,6 @@ impl Sink for Clip<'_> {
     }
 
     /// A reader with a range lumps together only messages inside it.
-    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
-        self.sink.lump(connection, window, count);
-    }
 
     fn message(&mut self, message: Message<'_>) {
         if self.range.is_none_or(|r| r.contains(message.time)) {
@@ -66,10 +63,6 @@ impl Sink for Clip<'_> {
     fn notice(&mut self, notice: Notice) {
         self.lost |= notice.kind.is_loss();
         self.sink.notice(notice);
-    }
-
-    fn progress(&mut self, done: u64, total: u64) {
-        self.sink.progress(done, total);
     }
 }
 

@@ -99,8 +99,17 @@ pub trait Sink {
     /// Takes a new connection; returns the wanted part of its payloads.
     fn connection(&mut self, connection: &Connection) -> Want;
 
+    /// The sink behind this one, which gets all that this one does not take itself.
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        None
+    }
+
     /// Notes that all that follows stands in the file behind all that came, as far as stamps go.
-    fn part(&mut self) {}
+    fn part(&mut self) {
+        if let Some(sink) = self.behind() {
+            sink.part();
+        }
+    }
 
     /// Takes log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the
     /// reader knows them (always if wanted); then it is as long as `stamps`.
@@ -108,16 +117,32 @@ pub trait Sink {
 
     /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is
     /// known: instead of their stamps, and only where [`OpenOptions::lumps`] asks for it.
-    fn lump(&mut self, _connection: ConnectionId, _window: Stamp, _count: u64) {}
+    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+        if let Some(sink) = self.behind() {
+            sink.lump(connection, window, count);
+        }
+    }
 
     /// Takes a wanted message.
-    fn message(&mut self, message: Message<'_>);
+    fn message(&mut self, message: Message<'_>) {
+        if let Some(sink) = self.behind() {
+            sink.message(message);
+        }
+    }
 
     /// Takes a notice for the user.
-    fn notice(&mut self, notice: Notice);
+    fn notice(&mut self, notice: Notice) {
+        if let Some(sink) = self.behind() {
+            sink.notice(notice);
+        }
+    }
 
     /// Takes the progress of the reader, in bytes of `total` (0 where the size is not known).
-    fn progress(&mut self, _done: u64, _total: u64) {}
+    fn progress(&mut self, done: u64, total: u64) {
+        if let Some(sink) = self.behind() {
+            sink.progress(done, total);
+        }
+    }
 }
 
 /// The way a bag was read; `reading.md` calls them tiers.

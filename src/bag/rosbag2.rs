@@ -331,6 +331,10 @@ impl<'a> PartsAdapter<'a> {
 }
 
 impl Sink for PartsAdapter<'_> {
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
+    }
+
     fn connection(&mut self, connection: &Connection) -> Want {
         let publisher = connection.publisher.clone();
         let key = (
@@ -355,10 +359,6 @@ impl Sink for PartsAdapter<'_> {
             connection,
             ..message
         });
-    }
-
-    fn notice(&mut self, notice: Notice) {
-        self.sink.notice(notice);
     }
 
     fn progress(&mut self, done: u64, total: u64) {

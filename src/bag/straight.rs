@@ -5,7 +5,6 @@
 //! one moves each run behind the one before.
 
 use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
-use crate::base::notice::Notice;
 use crate::base::rhythm::{OUT_OF_ORDER_NS, RUN_FEWEST, RUN_SHARE};
 use crate::base::time::Stamp;
 
@@ -135,6 +134,10 @@ impl<'a> Watched<'a> {
 }
 
 impl Sink for Watched<'_> {
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
+    }
+
     fn connection(&mut self, connection: &Connection) -> Want {
         self.lines.push(Line::default());
         self.sink.connection(connection)
@@ -158,18 +161,6 @@ impl Sink for Watched<'_> {
             }
         }
         self.sink.stamps(connection, stamps, sizes);
-    }
-
-    fn message(&mut self, message: Message<'_>) {
-        self.sink.message(message);
-    }
-
-    fn notice(&mut self, notice: Notice) {
-        self.sink.notice(notice);
-    }
-
-    fn progress(&mut self, done: u64, total: u64) {
-        self.sink.progress(done, total);
     }
 }
 
@@ -239,13 +230,13 @@ impl<'a> Straightened<'a> {
 }
 
 impl Sink for Straightened<'_> {
+    fn behind(&mut self) -> Option<&mut dyn Sink> {
+        Some(&mut *self.sink)
+    }
+
     fn connection(&mut self, connection: &Connection) -> Want {
         self.counts.push([0; 2]);
         self.sink.connection(connection)
-    }
-
-    fn part(&mut self) {
-        self.sink.part();
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -257,14 +248,6 @@ impl Sink for Straightened<'_> {
     fn message(&mut self, message: Message<'_>) {
         let time = self.moved(message.connection, 1, message.time);
         self.sink.message(Message { time, ..message });
-    }
-
-    fn notice(&mut self, notice: Notice) {
-        self.sink.notice(notice);
-    }
-
-    fn progress(&mut self, done: u64, total: u64) {
-        self.sink.progress(done, total);
     }
 }
 
@@ -288,10 +271,6 @@ mod tests {
             self.0.resize(self.0.len().max(at + 1), Vec::new());
             self.0[at].extend(stamps.iter().map(|t| t.0.div_euclid(SECOND)));
         }
-
-        fn message(&mut self, _: Message<'_>) {}
-
-        fn notice(&mut self, _: Notice) {}
     }
 
     /// Parts of a file: of each the connections with their seconds.

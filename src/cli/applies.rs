@@ -27,15 +27,23 @@ impl Given {
         Self(names.collect())
     }
 
-    /// The first of `options` that was typed.
-    fn any(&self, options: &[&'static str]) -> Option<&'static str> {
-        options.iter().copied().find(|name| self.0.contains(*name))
+    /// Refuses these options, of which `what` says why.
+    fn refuse(&self, options: &str, what: &str, hint: &str) -> Result<()> {
+        match self.any(options) {
+            None => Ok(()),
+            Some(option) => Err(Error::usage(format!("`--{option}` {what}"), hint)),
+        }
+    }
+
+    /// The first of `options`, with blanks between them, that was typed.
+    fn any<'a>(&self, options: &'a str) -> Option<&'a str> {
+        options.split(' ').find(|name| self.0.contains(*name))
     }
 }
 
 /// A rule for options that only apply to some outputs.
 struct AppliesTo {
-    options: &'static [&'static str],
+    options: &'static str,
     /// Whether they apply to this output.
     takes: fn(&Asked<'_>, &Output) -> bool,
     /// The outputs to which they apply, for the hint.
@@ -82,24 +90,12 @@ fn plays(output: &Output) -> bool {
 
 const RULES: &[AppliesTo] = &[
     AppliesTo {
-        options: &[
-            "style",
-            "view",
-            "for",
-            "size",
-            "width",
-            "fit",
-            "expand",
-            "orientation",
-            "layout",
-            "layout-from",
-            "font",
-        ],
+        options: "style view for size width fit expand orientation layout layout-from font",
         takes: |_, output| is_picture(output),
         what: "it applies to pictures, such as `x.gif`",
     },
     AppliesTo {
-        options: &["title"],
+        options: "title",
         takes: |asked, output| {
             let is_plain =
                 output.format.word == "dot" && asked.args.sequence.dot_profile == "plain";
@@ -108,38 +104,29 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to pictures, reports and `--dot-profile plain`",
     },
     AppliesTo {
-        options: &["bare"],
+        options: "bare",
         takes: |asked, output| asked.is_window(output) || is_figure(asked.args, output),
         what: "it applies to animations, pages, figures and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
     },
     AppliesTo {
-        options: &["captions", "phases"],
+        options: "captions phases",
         takes: |_, output| {
             output.format.is_drawn || ["json", "csv", "parquet"].contains(&output.format.word)
         },
         what: "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
     },
     AppliesTo {
-        options: &[
-            "mode",
-            "ns-filter",
-            "topic-filter",
-            "hide",
-            "group",
-            "collapse",
-            "show-recorder",
-            "rqt-defaults",
-        ],
+        options: "mode ns-filter topic-filter hide group collapse show-recorder rqt-defaults",
         takes: |asked, output| !is_data(output) || asked.args.view.filtered,
         what: "data files contain the whole graph; `--filtered` writes what a picture would show",
     },
     AppliesTo {
-        options: &["filtered"],
+        options: "filtered",
         takes: |_, output| is_data(output),
         what: "it applies to data: json, csv, parquet, gexf, graphml; pictures are already filtered",
     },
     AppliesTo {
-        options: &["frame-ms"],
+        options: "frame-ms",
         takes: |asked, output| {
             let is_animated = output.format.word == "svg" && !asked.is_window(output);
             plays(output) || is_animated && !is_figure(asked.args, output)
@@ -147,113 +134,81 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to animations: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
     },
     AppliesTo {
-        options: &["tween", "hold-changes"],
+        options: "tween hold-changes",
         takes: |_, output| plays(output),
         what: "it applies to animations: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
     },
     AppliesTo {
-        options: &["strip"],
+        options: "strip",
         takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
         what: "it applies to pictures of the whole: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
     },
     AppliesTo {
-        options: &["max-bytes"],
+        options: "max-bytes",
         takes: |_, output| output.format.is_limited,
         what: "it applies to `x.gif` and `x.apng`",
     },
     AppliesTo {
-        options: &["dot-profile"],
+        options: "dot-profile",
         takes: |_, output| output.format.word == "dot",
         what: "it applies to `x.dot`",
     },
     AppliesTo {
-        options: &["bytes"],
+        options: "bytes",
         takes: |_, output| ["json", "csv", "parquet"].contains(&output.format.word),
         what: "data holds sizes: `x.json`, `x.csv`",
     },
     AppliesTo {
-        options: &["link"],
+        options: "link",
         takes: |_, output| output.format.word == "md",
         what: "it applies to reports: `x.md`",
     },
     AppliesTo {
-        options: &["json"],
+        options: "json",
         takes: |_, output| output.format.word == "json",
         what: "it applies to `x.json`",
     },
     AppliesTo {
-        options: &["runs"],
+        options: "runs",
         takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
         what: "it applies to tables: `x.csv`",
     },
 ];
 
 /// Options that have no effect on figures.
-const NOT_OF_FIGURES: &[&str] = &[
-    "style",
-    "size",
-    "fit",
-    "orientation",
-    "layout",
-    "layout-from",
-    "mode",
-    "hide",
-    "group",
-    "collapse",
-    "expand",
-    "rqt-defaults",
-    "show-recorder",
-    "title",
-];
+const NOT_OF_FIGURES: &str = "style size fit orientation layout layout-from mode hide group collapse expand rqt-defaults \
+    show-recorder title";
 
 /// Options that ask for windows one after the other.
-const OF_FILMS: &[&str] = &[
-    "period",
-    "step",
-    "align",
-    "skip-unchanged",
-    "cut",
-    "frame-ms",
-    "tween",
-    "hold-changes",
-    "max-bytes",
-    "poster",
-    "strip",
-    "figure",
-    "captions",
-    "phases",
-    "format",
-];
+const OF_FILMS: &str = "period step align skip-unchanged cut frame-ms tween hold-changes max-bytes poster strip figure \
+    captions phases format";
 
 /// Whether a mission in which nothing changes may be one picture: the output is left to us, or is one picture already, and
 /// no option asks for a film.
 pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
     let is_whole = |o: &Output| o.format.whole != OneDrawing::Never && !o.target.is_numbered();
-    let is_left = given.any(&["outputs"]).is_none();
+    let is_left = given.any("outputs").is_none();
     given.any(OF_FILMS).is_none() && (is_left || outputs.iter().all(is_whole))
 }
 
 /// Refuses options that apply to none of the outputs.
 pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
     let asked = Asked { args };
-    if args.sequence.draws_steps()
-        && let Some(option) = given.any(NOT_OF_FIGURES)
-    {
-        let what = format!("`--{option}` has no effect on `--strip changes`, which draws steps");
+    if args.sequence.draws_steps() {
+        let what = "has no effect on `--strip changes`, which draws steps";
         let hint = "`--strip 3x2` puts windows side by side, each as a whole";
-        return Err(Error::usage(what, hint));
+        given.refuse(NOT_OF_FIGURES, what, hint)?;
     }
     for rule in RULES {
-        let is_taken = || outputs.iter().any(|output| (rule.takes)(&asked, output));
-        if let Some(option) = given.any(rule.options)
-            && !is_taken()
-        {
-            let names = outputs
-                .iter()
-                .map(|o| format!("`{}`", o.target.path().display()));
-            let names: Vec<String> = names.collect();
-            let what = format!("`--{option}` has no effect on {}", names.join(", "));
-            return Err(Error::usage(what, rule.what));
+        if !outputs.iter().any(|output| (rule.takes)(&asked, output)) {
+            let names = outputs.iter();
+            let names = names.map(|o| format!("`{}`", o.target.path().display()));
+            let names = names.collect::<Vec<_>>().join(", ");
+            given.refuse(
+                rule.options,
+                &format!("has no effect on {names}"),
+                rule.what,
+            )?;
         }
     }
     Ok(())
@@ -275,42 +230,23 @@ pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
 }
 
 /// Options that say how bags are read and windows cut: a mission's JSON holds windows already.
-const OF_BAGS: &[&str] = &[
-    "verify",
-    "period",
-    "step",
-    "start",
-    "end",
-    "align",
-    "skip-unchanged",
-    "cut",
-    "grace",
-    "roles",
-    "topology",
-    "source",
-    "infer",
-    "bytes",
-];
+const OF_BAGS: &str =
+    "verify period step start end align skip-unchanged cut grace roles topology source infer bytes";
 
 /// Refuses options about bags where the input is a mission's JSON.
 pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
-    let Some(option) = given.any(OF_BAGS) else {
-        return Ok(());
-    };
-    match mission_file(&reading.inputs)? {
-        None => Ok(()),
-        Some(path) => {
-            let what = format!(
-                "`--{option}` applies to bags, but `{}` is a mission's JSON",
-                path.display()
-            );
-            Err(Error::usage(what, "give the bag itself"))
-        }
+    if given.any(OF_BAGS).is_some()
+        && let Some(path) = mission_file(&reading.inputs)?
+    {
+        let path = path.display();
+        let what = format!("applies to bags, but `{path}` is a mission's JSON");
+        return given.refuse(OF_BAGS, &what, "give the bag itself");
     }
+    Ok(())
 }
 
 /// Options that say how time is cut into windows.
-const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "cut", "grace"];
+const OF_WINDOWS: &str = "period step align skip-unchanged cut grace";
 
 /// The note where an option about windows is given for `what`, which tells continuous time; `None` without one. That is
 /// not a mistake: scripts ask for the log and for pictures with the same options.
@@ -323,15 +259,11 @@ pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
 
 /// Refuses the options of `diff` that do not apply where one of the two is an expectation.
 pub(super) fn check_against(given: &Given) -> Result<()> {
-    match given.any(&["style", "size", "rate-change"]) {
-        None => Ok(()),
-        Some(option) => {
-            let what = format!(
-                "`--{option}` has no effect when a mission is compared with an expectations file"
-            );
-            Err(Error::usage(what, "give two missions, or omit it"))
-        }
-    }
+    given.refuse(
+        "style size rate-change",
+        "has no effect when a mission is compared with an expectations file",
+        "give two missions, or omit it",
+    )
 }
 
 /// Refuses the options of `diff` that only pictures show, where there is none.
@@ -340,51 +272,38 @@ pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> 
     if has_picture {
         return Ok(());
     }
-    if let Some(option) = given.any(&["style", "size"]) {
-        let what = format!("`--{option}` has no effect without a picture");
-        return Err(Error::usage(
-            what,
-            "it applies to pictures: `-o d.svg`, `-o d.html`",
-        ));
-    }
-    match given.any(&["source", "infer"]) {
-        None => Ok(()),
-        Some(option) => {
-            let what = format!(
-                "`--{option}` has no effect without a picture: only measured and stated elements are compared"
-            );
-            Err(Error::usage(what, "add a picture: `-o d.svg`"))
-        }
-    }
+    given.refuse(
+        "style size",
+        "has no effect without a picture",
+        "it applies to pictures: `-o d.svg`, `-o d.html`",
+    )?;
+    given.refuse(
+        "source infer",
+        "has no effect without a picture: only measured and stated elements are compared",
+        "add a picture: `-o d.svg`",
+    )
 }
 
 /// Refuses the options of `baseline` that add elements that it never writes.
 pub(super) fn check_baseline(given: &Given) -> Result<()> {
-    match given.any(&["source", "infer"]) {
-        None => Ok(()),
-        Some(option) => {
-            let what = format!(
-                "`--{option}` has no effect on a baseline, which contains what was measured or stated"
-            );
-            Err(Error::usage(
-                what,
-                "use it with `check`, which accepts weaker evidence",
-            ))
-        }
-    }
+    given.refuse(
+        "source infer",
+        "has no effect on a baseline, which contains what was measured or stated",
+        "use it with `check`, which accepts weaker evidence",
+    )
 }
 
 /// Refuses the options of `check` that apply to none of these formats.
 pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> Result<()> {
     check_guesses(infer)?;
-    if given.any(&["link"]).is_some() && !formats.contains(&"markdown") {
-        let what = "`--link` has no effect on these formats";
-        return Err(Error::usage(
-            what,
-            "it applies to Markdown: `--format markdown`, `-o check.md`",
-        ));
+    if formats.contains(&"markdown") {
+        return Ok(());
     }
-    Ok(())
+    given.refuse(
+        "link",
+        "has no effect on these formats",
+        "it applies to Markdown: `--format markdown`, `-o check.md`",
+    )
 }
 
 /// Refuses to judge by nodes that nothing in the bag names.

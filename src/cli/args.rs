@@ -294,19 +294,8 @@ pub(super) struct SizeArgs {
 }
 
 /// The options of `render` that `-h` lists; `--help` lists all of them.
-const RENDER_ESSENTIALS: [&str; 11] = [
-    "bags",
-    "outputs",
-    "period",
-    "start",
-    "end",
-    "mode",
-    "ns_filter",
-    "topic_filter",
-    "style",
-    "size",
-    "for",
-];
+const RENDER_ESSENTIALS: &str =
+    "bags outputs period start end mode ns_filter topic_filter style size for";
 
 impl Typed {
     /// The command line's grammar. Its short help keeps to one screen.
@@ -314,7 +303,7 @@ impl Typed {
         Self::command().mut_subcommand("render", |render| {
             render.mut_args(|arg| {
                 let id = arg.get_id().as_str();
-                let is_essential = RENDER_ESSENTIALS.contains(&id);
+                let is_essential = RENDER_ESSENTIALS.split(' ').any(|known| known == id);
                 let is_of_figures = ["figure", "rows", "steps", "text"].contains(&id);
                 arg.hide_short_help(!is_essential).hide(is_of_figures)
             })

@@ -20,33 +20,18 @@ const FEWEST_PER_SECOND: f64 = 10.0;
 
 /// A kind of video: the container and the arguments of ffmpeg for it.
 pub(crate) struct VideoKind {
-    arguments: &'static [&'static str],
+    arguments: &'static str,
     /// Arguments of the container for a pipe, in which ffmpeg cannot go back.
-    piped: &'static [&'static str],
+    piped: &'static str,
 }
 
 pub(crate) const MP4: VideoKind = VideoKind {
-    arguments: &[
-        "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
-    ],
-    piped: &["-movflags", "frag_keyframe+empty_moov"],
+    arguments: "-c:v libx264 -crf 18 -pix_fmt yuv420p -f mp4",
+    piped: "-movflags frag_keyframe+empty_moov",
 };
 pub(crate) const WEBM: VideoKind = VideoKind {
-    arguments: &[
-        "-c:v",
-        "libvpx-vp9",
-        "-crf",
-        "24",
-        "-b:v",
-        "0",
-        "-row-mt",
-        "1",
-        "-pix_fmt",
-        "yuv420p",
-        "-f",
-        "webm",
-    ],
-    piped: &[],
+    arguments: "-c:v libvpx-vp9 -crf 24 -b:v 0 -row-mt 1 -pix_fmt yuv420p -f webm",
+    piped: "",
 };
 
 /// Whether ffmpeg can be run.
@@ -146,21 +131,15 @@ impl Video<'_> {
         let fps = rate.max(FEWEST_PER_SECOND);
         command.args(["-vf", &format!("fps={fps},{pad}")]);
         // No version and no time in the file: the same sequence gives the same bytes.
-        command.args([
-            "-fflags",
-            "+bitexact",
-            "-flags:v",
-            "+bitexact",
-            "-map_metadata",
-            "-1",
-        ]);
-        command.args(self.kind.arguments);
+        command.args("-fflags +bitexact -flags:v +bitexact -map_metadata -1".split(' '));
+        command.args(self.kind.arguments.split(' '));
         match sink.handle()? {
             Some(file) => {
                 command.arg("/dev/stdout").stdout(file);
             }
             None => {
-                command.args(self.kind.piped).arg("pipe:1");
+                let piped = self.kind.piped.split_whitespace();
+                command.args(piped).arg("pipe:1");
             }
         }
         // An interrupt on the terminal is ours to handle: ffmpeg ends when its pipe does.

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use super::finding::{Finding, FindingKind, KINDS, Severity};
 use super::judge::Verdict;
+use crate::base::columns::hang;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
 
@@ -180,30 +181,10 @@ fn quoted(text: &str) -> String {
 /// The meaning of a kind of finding, for `--explain`; `None` for an unknown word.
 pub(crate) fn explain(word: &str) -> Option<String> {
     let (_, word, says, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
-    let more = wrapped(more);
+    let [says, more] = [says, more].map(|text| hang("", text, 0, Some(80)));
     Some(format!(
-        "{word}\n\n{}\n\n{more}\n\nTo forgive it:\n\nallow:\n  - {{finding: {word}, name: /name, until: 2027-01-31, why: \"…\"}}\n",
-        wrapped(says)
+        "{word}\n\n{says}\n{more}\nTo forgive it:\n\nallow:\n  - {{finding: {word}, name: /name, until: 2027-01-31, why: \"…\"}}\n"
     ))
-}
-
-/// Text in lines of 80 characters.
-fn wrapped(text: &str) -> String {
-    let mut out = String::new();
-    let mut width = 0;
-    for word in text.split_whitespace() {
-        let long = word.chars().count();
-        if width > 0 && width + 1 + long > 80 {
-            out.push('\n');
-            width = 0;
-        } else if width > 0 {
-            out.push(' ');
-            width += 1;
-        }
-        out.push_str(word);
-        width += long;
-    }
-    out
 }
 
 /// The findings grouped by cause, in the order of the worst of each; those without a cause stand alone.

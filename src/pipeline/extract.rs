@@ -9,9 +9,7 @@ use std::path::PathBuf;
 use super::inputs::{each_once, known_span};
 use super::read::files;
 use super::{Stage, Watch};
-use crate::bag::{
-    self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Report, Sink, Want,
-};
+use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Report, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Moment, Span, Stamp};
@@ -162,8 +160,4 @@ impl Sink for Bounds {
             span.end = span.end.max(end);
         }
     }
-
-    fn message(&mut self, _: Message<'_>) {}
-
-    fn notice(&mut self, _: Notice) {}
 }

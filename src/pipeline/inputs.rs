@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 
-use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Sink, Want};
+use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -116,8 +116,4 @@ impl Sink for Contents {
             self.sum = self.sum.wrapping_add(hasher.finish());
         }
     }
-
-    fn message(&mut self, _: Message<'_>) {}
-
-    fn notice(&mut self, _: Notice) {}
 }

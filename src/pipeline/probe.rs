@@ -8,7 +8,6 @@ use super::collect::Collected;
 use super::inputs::each_once;
 use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
 use crate::base::error::Result;
-use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::numbers::{self, Number};
 
@@ -79,6 +78,4 @@ impl Sink for Probe<'_> {
             self.found.extend(number.map(|number| (*at, *time, number)));
         }
     }
-
-    fn notice(&mut self, _: Notice) {}
 }

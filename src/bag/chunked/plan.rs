@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::index::IndexSum;
 use super::record::Connections;
-use crate::bag::model::{ConnectionId, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, Sink, Want};
 use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 
@@ -201,8 +201,4 @@ impl Sink for Extremes {
             self.0 = Some((first.min(*at), last.max(*at)));
         }
     }
-
-    fn message(&mut self, _: Message<'_>) {}
-
-    fn notice(&mut self, _: Notice) {}
 }

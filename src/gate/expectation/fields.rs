@@ -89,25 +89,23 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The mapping `part` with the keys that it may hold.
+    /// The mapping `part` with the keys that it may hold, blanks between them.
     pub(super) fn fields(
         self,
         part: &'a YamlPart,
         what: &'a str,
-        known: &'static [&'static str],
+        known: &'static str,
     ) -> Result<Fields<'a>> {
         let pairs = self.pairs(part, what)?;
-        if let Some((key, at, _)) = pairs
-            .iter()
-            .find(|(key, ..)| !known.contains(&key.as_str()))
-        {
-            return Err(self.unknown(*at, "key", key, known.iter().copied()));
-        }
-        Ok(Fields {
+        let fields = Fields {
             document: self,
             at: part.at,
             pairs,
-        })
+        };
+        match fields.other(known) {
+            Some((key, at)) => Err(self.unknown(at, "key", key, known.split(' '))),
+            None => Ok(fields),
+        }
     }
 }
 
@@ -135,11 +133,10 @@ impl<'a> Fields<'a> {
     }
 
     /// The first key that is not one of these.
-    pub(super) fn other(&self, keys: &[&str]) -> Option<(&'a str, YamlPlace)> {
-        let other = self
-            .pairs
-            .iter()
-            .find(|(key, ..)| !keys.contains(&key.as_str()));
+    pub(super) fn other(&self, keys: &str) -> Option<(&'a str, YamlPlace)> {
+        let is_other = |key: &str| keys.split(' ').all(|known| known != key);
+        let mut pairs = self.pairs.iter();
+        let other = pairs.find(|(key, ..)| is_other(key));
         other.map(|(key, at, _)| (key.as_str(), *at))
     }
 

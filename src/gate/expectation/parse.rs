@@ -13,112 +13,28 @@ use crate::base::yaml::{YamlPart, parse_placed};
 use crate::gate::FindingKind;
 use crate::gate::pattern::Pattern;
 
-/// The keys of the whole file.
-const FILE: &[&str] = &[
-    "schema", "from", "period", "policy", "nodes", "topics", "rules", "allow",
-];
-const POLICY: &[&str] = &[
-    "unexpected_nodes",
-    "unexpected_topics",
-    "unexpected_publishers",
-    REMARKS[0].0,
-    REMARKS[1].0,
-    REMARKS[2].0,
-];
-const NODE: &[&str] = &[
-    "forbidden",
-    "optional",
-    "may_end",
-    "known_by",
-    "restarts",
-    "lifecycle",
-    "present_within",
-    "within",
-];
-const TOPIC: &[&str] = &[
-    "forbidden",
-    "optional",
-    "may_end",
-    "type",
-    "by",
-    "to",
-    "hz",
-    "mean_hz",
-    "percent",
-    "max_gap",
-    "within",
-    "latched",
-    "qos",
-];
+/// The keys of the whole file, and of each part of it.
+const FILE: &str = "schema from period policy nodes topics rules allow";
+const POLICY: &str = "unexpected_nodes unexpected_topics unexpected_publishers starved duplicate_names messages_lost";
+const NODE: &str = "forbidden optional may_end known_by restarts lifecycle present_within within";
+const TOPIC: &str =
+    "forbidden optional may_end type by to hz mean_hz percent max_gap within latched qos";
+const EVENT: &str = "added removed restarted silent handed_over rate lifecycle from to";
+const ALLOW: &str = "finding name until why";
 /// The keys that give the form of a rule, each with those that go with it.
-const FORMS: &[(&str, &[&str])] = &[
+const FORMS: [(&str, &str); 6] = [
     ("node", NODE),
     ("nodes", NODE),
     (
         "topic",
-        &[
-            "hz",
-            "mean_hz",
-            "percent",
-            "max_gap",
-            "within",
-            "by",
-            "to",
-            "type",
-            "latched",
-            "qos",
-            "may_end",
-            "optional",
-            "forbidden",
-            "while",
-            "during",
-        ],
+        "hz mean_hz percent max_gap within by to type latched qos may_end optional forbidden while during",
     ),
-    ("appear_in_order", &[]),
-    ("when", &["expect", "within"]),
-    ("changes", &["during"]),
+    ("appear_in_order", ""),
+    ("when", "expect within"),
+    ("changes", "during"),
 ];
-const RULE: &[&str] = &[
-    "id",
-    "node",
-    "nodes",
-    "topic",
-    "appear_in_order",
-    "when",
-    "changes",
-    "expect",
-    "within",
-    "while",
-    "during",
-    "forbidden",
-    "optional",
-    "may_end",
-    "known_by",
-    "restarts",
-    "lifecycle",
-    "present_within",
-    "type",
-    "by",
-    "to",
-    "hz",
-    "mean_hz",
-    "percent",
-    "max_gap",
-    "latched",
-    "qos",
-];
-const EVENT: &[&str] = &[
-    "added",
-    "removed",
-    "restarted",
-    "silent",
-    "handed_over",
-    "rate",
-    "lifecycle",
-    "from",
-    "to",
-];
-const ALLOW: &[&str] = &["finding", "name", "until", "why"];
+const RULE: &str = "id node nodes topic appear_in_order when changes expect within while during forbidden optional may_end \
+    known_by restarts lifecycle present_within type by to hz mean_hz percent max_gap latched qos";
 
 /// Reads an expectation.
 ///
@@ -177,9 +93,9 @@ fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
         Ok(found.map_or(usual, |found| found.value))
     };
     policy.at = part.at;
-    policy.nodes = closed(POLICY[0], policy.nodes)?;
-    policy.topics = closed(POLICY[1], policy.topics)?;
-    policy.publishers = closed(POLICY[2], policy.publishers)?;
+    policy.nodes = closed("unexpected_nodes", policy.nodes)?;
+    policy.topics = closed("unexpected_topics", policy.topics)?;
+    policy.publishers = closed("unexpected_publishers", policy.publishers)?;
     for ((key, ..), remark) in REMARKS.iter().zip(&mut policy.remarks) {
         *remark = closed(key, *remark)?;
     }
@@ -190,7 +106,7 @@ fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
 fn section<T>(
     file: &Fields<'_>,
     key: &'static str,
-    known: &'static [&'static str],
+    known: &'static str,
     facts: impl Fn(&Fields<'_>) -> Result<T>,
 ) -> Result<Vec<Named<T>>> {
     let Some(part) = file.get(key) else {
@@ -278,14 +194,13 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
     let id = document.text(id, "`id`")?.to_owned();
     let form = FORMS.iter().find(|(key, _)| fields.get(key).is_some());
     let Some((form, with)) = form else {
-        let keys: Vec<&str> = FORMS.iter().map(|(key, _)| *key).collect();
-        let hint = format!("a rule has one of {}", keys.join(", "));
+        let hint = format!("a rule has one of {}", FORMS.map(|(key, _)| key).join(", "));
         return Err(document.bad(part.at, "the rule has no subject", hint));
     };
-    let allowed = [&["id", form], *with].concat();
-    if let Some((key, at)) = fields.other(&allowed) {
+    let together = with.replace(' ', ", ");
+    if let Some((key, at)) = fields.other(&format!("id {form} {with}")) {
         let reason = format!("`{key}` does not go with `{form}`");
-        let hint = format!("with it go {}", with.join(", "));
+        let hint = format!("with it go {together}");
         return Err(document.bad(at, reason, hint));
     }
     let demand = demand(&fields, form)?;
@@ -303,7 +218,7 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
         Demand::Reaction { .. } | Demand::Changes { .. } => false,
     };
     if is_empty {
-        let hint = format!("with `{form}` go {}", with.join(", "));
+        let hint = format!("with `{form}` go {together}");
         return Err(document.bad(part.at, format!("the rule `{id}` has no condition"), hint));
     }
     Ok(Rule {
@@ -359,7 +274,7 @@ fn whilst(fields: &Fields<'_>) -> Result<Option<While>> {
         return Ok(None);
     };
     let document = fields.document;
-    let inner = document.fields(part, "`while`", &["topic", "hz", "node"])?;
+    let inner = document.fields(part, "`while`", "topic hz node")?;
     let rate = (
         inner.name("topic")?,
         inner.range("hz")?,

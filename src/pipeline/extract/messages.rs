@@ -1,7 +1,7 @@
 //! A row per message, in order of time over all bags, from the index, without payloads.
 
 use super::{Extract, Extracted, of_report, stop};
-use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
+use crate::bag::{Connection, ConnectionId, Sink as Takes, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, Notices};
@@ -104,8 +104,6 @@ impl Takes for OfBag<'_> {
             self.taken.stamps.add(series, stamps, sizes);
         }
     }
-
-    fn message(&mut self, _: Message<'_>) {}
 
     fn notice(&mut self, notice: Notice) {
         self.taken.notices.add(notice);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::counts::{Count, FleetBag};
 use super::plan::{CountDetail, PlannedBag};
 use crate::bag::{
-    self, Connection, ConnectionId, ETAG, Input, Lumps, Message, OpenOptions, Report, Sink, Want,
+    self, Connection, ConnectionId, ETAG, Input, Lumps, OpenOptions, Report, Sink, Want,
 };
 use crate::base::error::{Error, Result};
 use crate::base::name::NodeName;
@@ -371,8 +371,6 @@ impl Sink for BagTally {
         *sent.lumps.entry(window).or_default() += count;
         self.messages += count;
     }
-
-    fn message(&mut self, _: Message<'_>) {}
 
     fn notice(&mut self, notice: Notice) {
         self.notices.add(notice);
