@@ -160,6 +160,7 @@ mod bridge {
 
     /// As `foxglove_bridge`: the graph comes when a subscription follows the one to the graph.
     fn serve(stream: TcpStream) {
+        #[expect(clippy::result_large_err, reason = "the type is the library's")]
         let protocol = |_: &Request, mut response: Response| {
             let own = "foxglove.websocket.v1".parse().unwrap();
             response.headers_mut().insert("Sec-WebSocket-Protocol", own);
@@ -179,11 +180,11 @@ mod bridge {
         );
         let asked = hear(&mut client);
         assert_eq!(asked["subscriptions"][0]["channelId"], 7, "{asked}");
-        let subscription = asked["subscriptions"][0]["id"].as_u64().unwrap() as u32;
+        let subscription = asked["subscriptions"][0]["id"].as_u64().unwrap();
         say(&mut client, &update(&["/lidar"]));
         for time in 0..60_u64 {
             let mut message = vec![1];
-            message.extend(subscription.to_le_bytes());
+            message.extend(&subscription.to_le_bytes()[..4]);
             message.extend((time * 50_000_000).to_le_bytes());
             message.extend([0, 1, 0, 0, 0]);
             client.send(Message::binary(message)).unwrap();
