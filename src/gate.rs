@@ -9,6 +9,7 @@ mod expectation;
 mod facts;
 mod finding;
 mod judge;
+mod measure;
 mod pattern;
 mod range;
 mod report;

@@ -68,6 +68,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("gate", &[
         &["pattern", "range"],
         &["finding"],
+        &["measure"],
         &["expectation"],
         &["facts"],
         &["judge"],

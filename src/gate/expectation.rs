@@ -6,6 +6,7 @@ mod parse;
 use std::path::PathBuf;
 
 use super::finding::FindingKind;
+use super::measure::MEASURES;
 use super::pattern::Pattern;
 use super::range::{During, Range};
 use crate::base::time::{Period, Stamp};
@@ -120,6 +121,8 @@ pub(crate) struct TopicFacts {
     pub(crate) percent: Option<f64>,
     /// The longest silence in nanoseconds.
     pub(crate) max_gap: Option<At<i64>>,
+    /// The ranges of [`MEASURES`] in every window.
+    pub(crate) measures: [Option<At<Range>>; MEASURES.len()],
     pub(crate) latched: Option<At<bool>>,
     /// Words that its quality of service must hold.
     pub(crate) qos: Option<At<String>>,
@@ -136,6 +139,7 @@ impl TopicFacts {
             || self.mean_hz.is_some()
             || self.max_gap.is_some()
             || self.within.is_some()
+            || self.measures.iter().any(Option::is_some)
     }
 }
 

@@ -26,6 +26,9 @@ pub(crate) enum FindingKind {
     TopicGap,
     TopicLate,
     TopicGone,
+    TopicAge,
+    TopicBytes,
+    TopicDrops,
     PublisherMissing,
     PublisherUnexpected,
     SubscriberMissing,
@@ -142,6 +145,25 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "topic-gone",
         "A topic's last message came before its time.",
         "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.",
+    ),
+    (
+        FindingKind::TopicAge,
+        "topic-age",
+        "The messages of a topic were older than allowed when they arrived.",
+        "`age: ..0.2s` is checked against the mean age in every window, from statistics or, where they are read, from the stamps \
+         in headers. Undecidable in a bag without either.",
+    ),
+    (
+        FindingKind::TopicBytes,
+        "topic-bytes",
+        "A topic had more, or fewer, bytes per second than allowed.",
+        "`bytes: ..5MB/s` is checked in every window.",
+    ),
+    (
+        FindingKind::TopicDrops,
+        "topic-drops",
+        "More messages of a topic were lost than allowed.",
+        "`drops: ..0` is checked in every window, by the drops that statistics report. Undecidable in a bag without them.",
     ),
     (
         FindingKind::PublisherMissing,

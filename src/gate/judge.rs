@@ -2,6 +2,7 @@
 
 mod allow;
 mod event;
+mod measure;
 mod node;
 mod policy;
 mod rate;

@@ -14,10 +14,20 @@ pub(crate) struct Range {
 impl Range {
     /// Reads a range of numbers ≥ 0; `None` if it is not a range, or if nothing lies in it.
     pub(crate) fn parse(text: &str) -> Option<Self> {
+        let plain = |c: char| c.is_ascii_digit() || c == '.';
+        Self::parse_ends(text, |end| end.parse().ok().filter(|_| end.chars().all(plain)))
+    }
+
+    /// As [`Self::parse`], with ends that `parse` reads.
+    pub(crate) fn parse_ends(text: &str, parse: impl Fn(&str) -> Option<f64>) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
+        let end = |text: &str| match text.trim() {
+            "" => Some(None),
+            text => parse(text).map(Some),
+        };
         let range = Self {
-            from: bound(from).ok()?,
-            to: bound(to).ok()?,
+            from: end(from)?,
+            to: end(to)?,
         };
         let is_some = range.from.is_some() || range.to.is_some();
         let is_ordered = range.from.unwrap_or(0.0) <= range.to.unwrap_or(f64::INFINITY);
@@ -38,17 +48,6 @@ impl Range {
     pub(crate) fn holds(&self, value: f64) -> bool {
         !self.is_above(value) && !self.is_below(value)
     }
-}
-
-/// One end of a range: nothing, or a number; an error for anything else.
-fn bound(text: &str) -> Result<Option<f64>, ()> {
-    let text = text.trim();
-    if text.is_empty() {
-        return Ok(None);
-    }
-    let plain = |c: char| c.is_ascii_digit() || c == '.';
-    let number = text.parse().ok().filter(|_| text.chars().all(plain));
-    number.map(Some).ok_or(())
 }
 
 impl fmt::Display for Range {

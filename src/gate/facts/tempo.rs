@@ -57,7 +57,7 @@ impl<'a> Facts<'a> {
     }
 
     /// The windows in which a topic is, each with its row of the graph.
-    fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
+    pub(crate) fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
         let windows = &self.mission.windows;
         let rows = self.mission.graphs.rows(Element::Topic(topic));
         rows.filter_map(|(at, row)| Some((windows.get(at)?, row)))

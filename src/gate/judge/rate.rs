@@ -142,7 +142,7 @@ impl Judge<'_> {
     }
 
     /// The windows in which a topic is judged.
-    fn judged(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Rate> {
+    pub(super) fn judged(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Rate> {
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));
         let mut rates = self.facts.rates(topic, facts.may_end.is_some(), during);

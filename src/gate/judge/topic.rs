@@ -6,6 +6,7 @@ use crate::base::words;
 use crate::evidence::Degree;
 use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
 use crate::gate::finding::{Finding, FindingKind};
+use crate::gate::measure::MEASURES;
 use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
 
@@ -76,6 +77,18 @@ impl Judge<'_> {
             });
             let found = found.collect();
             self.note(title, place, found);
+        }
+        for (measure, range) in MEASURES.iter().zip(&facts.measures) {
+            let Some(At { at, value }) = range else { continue };
+            let title = format!("{title} {}", measure.key);
+            if !self.is_sent(&topics) {
+                self.moot(title, *at);
+                continue;
+            }
+            let found = topics.iter();
+            let found = found.filter_map(|topic| self.measured(*topic, measure, *value, facts, *at));
+            let found = found.collect();
+            self.note(title, *at, found);
         }
     }
 
