@@ -229,6 +229,37 @@ fn bytes_drops_jitter_and_age_are_true_to_one_per_cent() {
     );
 }
 
+#[test]
+fn age_bytes_and_drops_are_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("a.bag"), rosbag1::write(&measured(), Pack::Lz4, 16_384)).unwrap();
+    let check = |rules: &str| {
+        let text = format!("schema: bagreel.expect/1\nperiod: 10s\ntopics:\n  {rules}\n");
+        fs::write(folder.join("graph.yaml"), text).unwrap();
+        let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+        run.current_dir(folder);
+        let done = run.args(["check", "a.bag", "--expect", "graph.yaml"]).output();
+        let done = done.unwrap();
+        let said = String::from_utf8(done.stdout).unwrap();
+        (done.status.code(), said + &String::from_utf8_lossy(&done.stderr))
+    };
+    let (code, said) = check("/scan: {age: ..0.06s, bytes: 9kB/s..11kB/s, drops: ..20}");
+    assert!(code == Some(0) && said.contains("no findings"), "{said}");
+    for (rules, finding) in [
+        ("/scan: {age: ..40ms}", "error[topic-age]: /scan has age 50 ms, expected ..40 ms"),
+        ("/scan: {bytes: ..5kB/s}", "error[topic-bytes]: /scan has bytes 10"),
+        ("/scan: {drops: ..0}", "error[topic-drops]: /scan has drops 20, expected ..0"),
+    ] {
+        let (code, said) = check(rules);
+        assert!(code == Some(1) && said.contains(finding), "{rules}: {said}");
+    }
+    let (_, said) = check("/statistics: {drops: ..0}");
+    assert!(said.contains("unknown[topic-drops]: cannot tell the drops of /statistics"), "{said}");
+    let (code, said) = check("/scan: {bytes: ..5 apples}");
+    assert!(code == Some(2) && said.contains("..5MB/s"), "{said}");
+}
+
 /// The names of the elements in each window, as lines.
 fn seen(mission: &Mission) -> Vec<Vec<String>> {
     let all = &mission.elements;
