@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use bagreel::values::{Length, Period};
 use bagreel::{Mission, Reading, read};
@@ -67,7 +68,7 @@ fn losses_starved_subscribers_and_double_names_are_events_and_findings() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(&lossy(), folder.path(), "lossy.mcap");
     let run = |args: &[&str]| {
-        let run = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
             .args(args)
             .output()
             .unwrap();
@@ -233,29 +234,50 @@ fn bytes_drops_jitter_and_age_are_true_to_one_per_cent() {
 fn age_bytes_and_drops_are_checked() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("a.bag"), rosbag1::write(&measured(), Pack::Lz4, 16_384)).unwrap();
+    fs::write(
+        folder.join("a.bag"),
+        rosbag1::write(&measured(), Pack::Lz4, 16_384),
+    )
+    .unwrap();
     let check = |rules: &str| {
         let text = format!("schema: bagreel.expect/1\nperiod: 10s\ntopics:\n  {rules}\n");
         fs::write(folder.join("graph.yaml"), text).unwrap();
         let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
         run.current_dir(folder);
-        let done = run.args(["check", "a.bag", "--expect", "graph.yaml"]).output();
+        let done = run
+            .args(["check", "a.bag", "--expect", "graph.yaml"])
+            .output();
         let done = done.unwrap();
         let said = String::from_utf8(done.stdout).unwrap();
-        (done.status.code(), said + &String::from_utf8_lossy(&done.stderr))
+        (
+            done.status.code(),
+            said + &String::from_utf8_lossy(&done.stderr),
+        )
     };
     let (code, said) = check("/scan: {age: ..0.06s, bytes: 9kB/s..11kB/s, drops: ..20}");
     assert!(code == Some(0) && said.contains("no findings"), "{said}");
     for (rules, finding) in [
-        ("/scan: {age: ..40ms}", "error[topic-age]: /scan has age 50 ms, expected ..40 ms"),
-        ("/scan: {bytes: ..5kB/s}", "error[topic-bytes]: /scan has bytes 10"),
-        ("/scan: {drops: ..0}", "error[topic-drops]: /scan has drops 20, expected ..0"),
+        (
+            "/scan: {age: ..40ms}",
+            "error[topic-age]: /scan has age 50 ms, expected ..40 ms",
+        ),
+        (
+            "/scan: {bytes: ..5kB/s}",
+            "error[topic-bytes]: /scan has bytes 10",
+        ),
+        (
+            "/scan: {drops: ..0}",
+            "error[topic-drops]: /scan has drops 20, expected ..0",
+        ),
     ] {
         let (code, said) = check(rules);
         assert!(code == Some(1) && said.contains(finding), "{rules}: {said}");
     }
     let (_, said) = check("/statistics: {drops: ..0}");
-    assert!(said.contains("unknown[topic-drops]: cannot tell the drops of /statistics"), "{said}");
+    assert!(
+        said.contains("unknown[topic-drops]: cannot tell the drops of /statistics"),
+        "{said}"
+    );
     let (code, said) = check("/scan: {bytes: ..5 apples}");
     assert!(code == Some(2) && said.contains("..5MB/s"), "{said}");
 }
@@ -306,7 +328,7 @@ fn our_own_graph_read_back_is_the_same_in_every_window() {
             .join("examples")
             .join(bag);
         let out = folder.path().join("graph.mcap");
-        let run = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
             .args([
                 "render",
                 path.to_str().unwrap(),

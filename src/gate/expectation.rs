@@ -19,7 +19,7 @@ pub(crate) use parse::read;
 pub(crate) const SCHEMA: &str = "bagreel.expect/1";
 
 /// A value and its place in the file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct At<T> {
     pub(crate) at: YamlPlace,
     pub(crate) value: T,

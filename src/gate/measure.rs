@@ -4,7 +4,7 @@ use super::finding::FindingKind;
 use super::range::Range;
 use crate::base::time::{Span, parse_nanos};
 use crate::base::words;
-use crate::graph::graphs::Row;
+use crate::graph::Row;
 
 /// A number of a topic in each window.
 pub(crate) struct Measure {
@@ -38,7 +38,11 @@ pub(crate) const MEASURES: [Measure; 3] = [
         hint: "write a range of bytes per second: `..5MB/s`",
         parse: bytes_per_second,
         of: |row, span| Some(row.bytes? as f64 / (span.nanos().max(1) as f64 / 1e9)),
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "casts saturate"
+        )]
         shown: |bytes| format!("{}/s", words::bytes(bytes as u64)),
     },
     Measure {
@@ -68,7 +72,9 @@ impl Measure {
 fn bytes_per_second(text: &str) -> Option<f64> {
     const UNITS: [(&str, f64); 4] = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("B", 1.0)];
     let text = text.strip_suffix("/s").unwrap_or(text);
-    let unit = UNITS.iter().find_map(|(unit, size)| Some((text.strip_suffix(unit)?, size)));
+    let unit = UNITS
+        .iter()
+        .find_map(|(unit, size)| Some((text.strip_suffix(unit)?, size)));
     let (number, size) = unit.unwrap_or((text, &1.0));
     let number: f64 = number.trim_end().parse().ok()?;
     Some(number * size).filter(|bytes| (0.0..1e18).contains(bytes))
@@ -88,7 +94,13 @@ mod tests {
         assert_eq!(shown(0, "5ms..1m").as_deref(), Some("5 ms..1 min"));
         assert_eq!(shown(1, "1kB/s..5MB/s").as_deref(), Some("1 kB/s..5 MB/s"));
         assert_eq!(shown(2, "..0").as_deref(), Some("..0"));
-        for (at, text) in [(0, "0.2s"), (0, "..x"), (1, "..5 apples"), (1, "5MB/s..1B/s"), (2, "..")] {
+        for (at, text) in [
+            (0, "0.2s"),
+            (0, "..x"),
+            (1, "..5 apples"),
+            (1, "5MB/s..1B/s"),
+            (2, ".."),
+        ] {
             assert_eq!(shown(at, text), None, "{text}");
         }
     }

@@ -15,7 +15,9 @@ impl Range {
     /// Reads a range of numbers ≥ 0; `None` if it is not a range, or if nothing lies in it.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let plain = |c: char| c.is_ascii_digit() || c == '.';
-        Self::parse_ends(text, |end| end.parse().ok().filter(|_| end.chars().all(plain)))
+        Self::parse_ends(text, |end| {
+            end.parse().ok().filter(|_| end.chars().all(plain))
+        })
     }
 
     /// As [`Self::parse`], with ends that `parse` reads.

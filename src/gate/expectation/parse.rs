@@ -11,14 +11,14 @@ use crate::base::error::Result;
 use crate::base::time::{Moment, Period, Stamp};
 use crate::base::yaml::{YamlPart, parse_placed};
 use crate::gate::FindingKind;
+use crate::gate::measure::MEASURES;
 use crate::gate::pattern::Pattern;
 
 /// The keys of the whole file, and of each part of it.
 const FILE: &str = "schema from period policy nodes topics rules allow";
 const POLICY: &str = "unexpected_nodes unexpected_topics unexpected_publishers starved duplicate_names messages_lost";
 const NODE: &str = "forbidden optional may_end known_by restarts lifecycle present_within within";
-const TOPIC: &str =
-    "forbidden optional may_end type by to hz mean_hz percent max_gap within latched qos";
+const TOPIC: &str = "forbidden optional may_end type by to hz mean_hz percent max_gap within age bytes drops latched qos";
 const EVENT: &str = "added removed restarted silent handed_over rate lifecycle from to";
 const ALLOW: &str = "finding name until why";
 /// The keys that give the form of a rule, each with those that go with it.
@@ -27,14 +27,14 @@ const FORMS: [(&str, &str); 6] = [
     ("nodes", NODE),
     (
         "topic",
-        "hz mean_hz percent max_gap within by to type latched qos may_end optional forbidden while during",
+        "hz mean_hz percent max_gap within age bytes drops by to type latched qos may_end optional forbidden while during",
     ),
     ("appear_in_order", ""),
     ("when", "expect within"),
     ("changes", "during"),
 ];
 const RULE: &str = "id node nodes topic appear_in_order when changes expect within while during forbidden optional may_end \
-    known_by restarts lifecycle present_within type by to hz mean_hz percent max_gap latched qos";
+    known_by restarts lifecycle present_within type by to hz mean_hz percent max_gap age bytes drops latched qos";
 
 /// Reads an expectation.
 ///
@@ -155,6 +155,10 @@ fn node(fields: &Fields<'_>) -> Result<NodeFacts> {
 }
 
 fn topic(fields: &Fields<'_>) -> Result<TopicFacts> {
+    let mut measures = [None; MEASURES.len()];
+    for (own, measure) in measures.iter_mut().zip(&MEASURES) {
+        *own = fields.read(measure.key, measure.hint, |text| measure.range(text))?;
+    }
     let share = |text: &str| text.parse().ok().filter(|p| (0.0..=100.0).contains(p));
     Ok(TopicFacts {
         forbidden: fields.is_set("forbidden")?,
@@ -170,6 +174,7 @@ fn topic(fields: &Fields<'_>) -> Result<TopicFacts> {
             .read("percent", "write 0 to 100", share)?
             .map(|p| p.value),
         max_gap: fields.length("max_gap")?,
+        measures,
         latched: fields.flag("latched")?,
         qos: fields.string("qos")?,
         during: None,

@@ -36,7 +36,8 @@ impl Judge<'_> {
         if bad.len() as f64 <= known.len() as f64 * (1.0 - facts.percent.unwrap_or(100.0) / 100.0) {
             return None;
         }
-        let off = |value: f64| (value - range.to.unwrap_or(0.0)).max(range.from.unwrap_or(0.0) - value);
+        let off =
+            |value: f64| (value - range.to.unwrap_or(0.0)).max(range.from.unwrap_or(0.0) - value);
         let worst = bad.iter().max_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         let span = Span::new(bad.first()?.0.start, bad.last()?.0.end);
         let (seen, expected) = ((measure.shown)(worst.1), measure.range_shown(range));
@@ -52,7 +53,9 @@ impl Judge<'_> {
             .saw(seen, expected)
             .at(span)
             .detail(detail);
-        finding.cause = self.facts.cause_for_topic(topic, Span::new(span.start, span.start));
+        finding.cause = self
+            .facts
+            .cause_for_topic(topic, Span::new(span.start, span.start));
         Some(finding)
     }
 }

@@ -79,16 +79,18 @@ impl Judge<'_> {
             self.note(title, place, found);
         }
         for (measure, range) in MEASURES.iter().zip(&facts.measures) {
-            let Some(At { at, value }) = range else { continue };
+            let Some(At { at, value }) = *range else {
+                continue;
+            };
             let title = format!("{title} {}", measure.key);
             if !self.is_sent(&topics) {
-                self.moot(title, *at);
+                self.moot(title, at);
                 continue;
             }
             let found = topics.iter();
-            let found = found.filter_map(|topic| self.measured(*topic, measure, *value, facts, *at));
+            let found = found.filter_map(|topic| self.measured(*topic, measure, value, facts, at));
             let found = found.collect();
-            self.note(title, *at, found);
+            self.note(title, at, found);
         }
     }
 
