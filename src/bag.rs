@@ -1,6 +1,6 @@
-//! Bags as streams: one interface over every format, distinguished by their first bytes.
+//! Bags as streams: one interface for all formats, recognized by their first bytes.
 //!
-//! A reader owns a file and feeds a [`Sink`]; it knows nothing of evidence, windows or graphs. Adding a format is
+//! A reader owns a file and feeds a [`Sink`]; it does not depend on evidence, windows or graphs. Adding a format takes
 //! one file below `bag/` and one row in `FORMATS`.
 
 mod adapters;
@@ -56,19 +56,18 @@ pub const FORMATS: &[FormatRow] = &[
 pub enum InputKind {
     /// A bag of this format. Standard input and URLs are not read for this and count as ROS 1 bags here.
     Bag(&'static FormatRow),
-    /// JSON text, such as an evolution of ours, which is not a bag.
+    /// JSON text, such as a mission written by bagreel; not a bag.
     Json,
 }
 
-/// Tells the kind of `input` by its first bytes. Standard input is left untouched.
+/// Detects the kind of `input` from its first bytes. Standard input is left untouched.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if
-/// it is of no known format.
+/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if its format is unknown.
 pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,
-        // What is far away is looked into once, when it is opened.
+        // Remote objects are inspected once, when they are opened.
         _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
@@ -84,8 +83,8 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
 /// Opens a bag of any format, recognized by its first bytes. Objects need the feature `remote`.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::Remote`] if a store does not give it, [`Error::UnknownBag`], [`Error::Unsupported`] or [`Error::Malformed`] with a
-/// hint if nothing in it can be.
+/// [`Error::Io`] if it cannot be read, [`Error::Remote`] if a store fails; [`Error::UnknownBag`],
+/// [`Error::Unsupported`] or [`Error::Malformed`], with a hint, if no content can be read.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     if let Input::Url(url) = input {
         return object::open(url, options);
@@ -103,11 +102,11 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     Err(explain(&path, &head, folder))
 }
 
-/// Follows a recording that is still being written, told by its first bytes; of a folder that is not a recording the newest
-/// in it.
+/// Follows a recording that is still being written, recognized by its first bytes; in a folder that is not a
+/// recording, the newest one.
 ///
 /// # Errors
-/// As [`open`], and [`Error::Unsupported`] for what does not grow: pipes, objects, and what is
+/// As [`open`], and [`Error::Unsupported`] for inputs that do not grow: pipes, objects, and bags
 /// compressed as a whole.
 pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
     let within = match input {
@@ -131,7 +130,7 @@ pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
     }
 }
 
-/// The recording in a folder that was written to last.
+/// The most recently written recording in a folder.
 fn newest(folder: &Path) -> Option<Input> {
     let entries = folder.read_dir().ok()?.flatten();
     let bags = entries

@@ -1,4 +1,4 @@
-//! Sinks that stand between a reader and the sink it was given: clipping to a range, gathering, changing threads.
+//! Sinks between a reader and its target sink: clipping to a range, batching, crossing threads.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -8,16 +8,16 @@ use crate::base::notice::Notice;
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
-/// A sink that lets through only messages inside a range, and notes whether anything was lost.
+/// A sink that passes on only messages inside a range, and records whether anything was lost.
 pub(crate) struct Clip<'a> {
     range: Option<Span>,
     sink: &'a mut dyn Sink,
-    /// Whether a notice said that data was skipped.
+    /// Whether a notice reported skipped data.
     pub(crate) lost: bool,
 }
 
 impl<'a> Clip<'a> {
-    /// A clip in front of `sink`; without a range everything passes.
+    /// A filter in front of `sink`; without a range everything passes.
     pub(crate) fn new(range: Option<Span>, sink: &'a mut dyn Sink) -> Self {
         Self {
             range,
@@ -66,13 +66,13 @@ impl Sink for Clip<'_> {
     }
 }
 
-/// The bytes of `whole` that `done` of `total` equal parts stand for.
+/// The bytes of `whole` that correspond to `done` of `total` equal parts.
 pub(crate) fn share(done: usize, total: usize, whole: u64) -> u64 {
     let bytes = u128::from(whole) * done as u128 / (total as u128).max(1);
     u64::try_from(bytes).unwrap_or(whole)
 }
 
-/// Stamps and sizes of single messages, gathered per connection so that a sink gets them in long runs.
+/// Stamps and sizes of single messages, batched per connection so that a sink receives long runs.
 #[derive(Default)]
 pub(crate) struct Gather {
     /// Whether the sizes are not known.
@@ -81,15 +81,15 @@ pub(crate) struct Gather {
     touched: Vec<ConnectionId>,
     held: usize,
     last: Stamp,
-    /// The numbers of stamps held of each connection where time fell.
+    /// For each place where time went back, the number of stamps held per connection.
     cuts: Vec<Vec<usize>>,
-    /// Whether some stamps had to be handed over early.
+    /// Whether some stamps were flushed early.
     spilled: bool,
 }
 
-/// The most places where time falls that are told of one gathering: with more, messages are simply out of order.
+/// The most places in one batch where time goes back that are reported: beyond that, messages are just out of order.
 pub(crate) const MOST_CUTS: usize = 64;
-/// The most stamps that are gathered: 3 MB.
+/// The most stamps in a batch: 3 MB.
 const MOST_GATHERED: usize = 1 << 18;
 
 impl Gather {
@@ -118,13 +118,13 @@ impl Gather {
         }
     }
 
-    /// The number of messages held of a connection.
+    /// The number of messages held for a connection.
     pub(crate) fn count(&self, id: ConnectionId) -> u64 {
         let run = self.runs.get(id.0 as usize);
         run.map_or(0, |run| run.0.len() as u64)
     }
 
-    /// Whether exactly these stamps are held of a connection, in any order.
+    /// Whether exactly these stamps are held for a connection, in any order.
     pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
         let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
         let sorted = |stamps: &[Stamp]| {
@@ -135,7 +135,7 @@ impl Gather {
         held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
     }
 
-    /// Drops the stamps held of a connection; returns their number, or `None` if some have been handed over.
+    /// Drops the stamps held for a connection; returns their number, or `None` if some were already flushed.
     pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
         if self.spilled {
             return None;
@@ -152,8 +152,7 @@ impl Gather {
         Some(held as u64)
     }
 
-    /// Keeps the messages whose time is right, and one of those at the same time; returns the number of messages
-    /// dropped.
+    /// Keeps messages with a correct time, one per time; returns the number of messages dropped.
     pub(crate) fn retain(&mut self, is_right: impl Fn(Stamp) -> bool) -> u64 {
         let mut gone = 0;
         self.cuts.clear();
@@ -170,7 +169,7 @@ impl Gather {
         gone as u64
     }
 
-    /// Hands over all gathered stamps, by connection.
+    /// Passes on all batched stamps, by connection.
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
         self.spilled = false;
@@ -252,14 +251,14 @@ enum Sent {
 struct BatchSender {
     batch: Delivery,
     to: SyncSender<Sent>,
-    /// Whether the receiver is gone.
-    deaf: bool,
+    /// Whether the receiver has hung up.
+    is_closed: bool,
 }
 
 impl BatchSender {
     fn flush(&mut self) {
         let batch = std::mem::take(&mut self.batch);
-        self.deaf |= self.to.send(Sent::Some(batch)).is_err();
+        self.is_closed |= self.to.send(Sent::Some(batch)).is_err();
     }
 
     fn flush_if_full(&mut self) {
@@ -270,7 +269,7 @@ impl BatchSender {
 
     fn done(&mut self) {
         self.flush();
-        self.deaf |= self.to.send(Sent::Done).is_err();
+        self.is_closed |= self.to.send(Sent::Done).is_err();
     }
 }
 
@@ -306,11 +305,11 @@ impl Sink for BatchSender {
     }
 }
 
-/// The number of chunks in one part: handing over to another thread costs more than reading a small index.
+/// The number of chunks in one part: a hand-over between threads costs more than reading a small index.
 pub(crate) const GROUP: usize = 16;
 
-/// Does `work` on the parts `0..count` on `threads` threads and reports their findings to `sink` in the order of the
-/// parts: the same calls as with one thread. `after` is called when a part has been reported.
+/// Runs `work` on the parts `0..count` on `threads` threads and reports their findings to `sink` in part order:
+/// the same calls as with one thread. `after` is called after each reported part.
 ///
 /// All connections must have been announced before; `work` cannot announce more.
 pub(crate) fn in_order(
@@ -356,12 +355,12 @@ fn work_on(
     let mut sender = BatchSender {
         batch: Delivery::default(),
         to,
-        deaf: false,
+        is_closed: false,
     };
     for part in (first..count).step_by(step) {
         work(part, &mut sender);
         sender.done();
-        if sender.deaf {
+        if sender.is_closed {
             break;
         }
     }

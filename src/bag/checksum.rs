@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-/// A sum that goes on.
+/// A running checksum.
 #[derive(Clone, Default)]
 pub(crate) struct Checksum(crc32fast::Hasher);
 
@@ -23,7 +23,7 @@ impl Checksum {
     }
 }
 
-/// A reader that sums up the bytes it reads.
+/// A reader that computes the checksum of the bytes it reads.
 pub(crate) struct CrcReader<R> {
     from: R,
     sum: Checksum,
@@ -39,7 +39,7 @@ impl<R> CrcReader<R> {
         }
     }
 
-    /// The CRC-32 of all bytes; `None` before the end of them.
+    /// The CRC-32 of all bytes; `None` before the end is reached.
     pub(crate) fn sum(&self) -> Option<u32> {
         self.is_at_end.then(|| self.sum.crc())
     }

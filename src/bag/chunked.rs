@@ -1,7 +1,7 @@
 //! Bags made of chunks, ROS 1 and MCAP alike: one driver over two grammars of records.
 //!
 //! A [`Grammar`] parses the records of a bag and its tail. The driver reads a file by the index behind each chunk, or
-//! record by record from the front where that is missing; a pipe only so.
+//! record by record from the front where that is missing, and always from a pipe.
 
 mod check;
 mod chunk;
@@ -37,7 +37,7 @@ use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
 
-/// The parser for one format of chunked bags. A value keeps what one description says about later ones.
+/// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.
 pub(crate) trait Grammar: Default + Send + 'static {
     /// The format's name in JSON.
     const NAME: &'static str;
@@ -48,7 +48,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// The head of a description record.
     type Description;
 
-    /// Refuses input that turns out not to be of this format, from its first bytes.
+    /// Rejects input that is not of this format, judging by its first bytes.
     fn accept(path: &Path, head: &[u8]) -> Result<()>;
 
     /// Goes to the first record.
@@ -57,11 +57,11 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Takes the head of the next record.
     fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Self::Description>, NoRecord>;
 
-    /// The connection that a description announces, with the bag's number for it; `None` if there is none, or a known
-    /// one.
+    /// The connection that a description announces, with its number in the bag; `None` if there is none or it is
+    /// known already.
     ///
     /// # Errors
-    /// Where the lengths in it lead out of it.
+    /// If lengths inside it exceed it.
     fn describe(
         &mut self,
         what: &Self::Description,
@@ -69,7 +69,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
         known: &Connections,
     ) -> Result<Option<(u32, Connection)>, NoRecord>;
 
-    /// Whether a chunk begins here. Asked at every byte where records broke off.
+    /// Whether a chunk begins here. Called at every byte after a broken record.
     fn is_chunk(bytes: &[u8]) -> bool;
 
     /// The index records in `bytes`, if they add up to `promised`.
@@ -81,12 +81,12 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Reads the tail.
     fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
 
-    /// Whether the end of the data may state a checksum of all of it; `None` is a pipe, whose end is not known yet.
+    /// Whether the end of the data may state a checksum of all of it; `None` for a pipe, whose end is unknown yet.
     fn is_summed(_source: Option<&FileSource>) -> bool {
         false
     }
 
-    /// Stored facts worth showing, from the first bytes.
+    /// Facts from the first bytes, to show in `info`.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
 
     /// Reports everything that an independent reader finds to `sink`.
@@ -101,7 +101,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
 #[derive(Default)]
 pub(crate) struct SecondReading {
     pub(crate) compression: BTreeSet<Compression>,
-    /// The reason why it did not get to the end, if so.
+    /// The reason why it did not reach the end, if so.
     pub(crate) stopped: Option<String>,
     /// Whether it reported nothing at all.
     pub(crate) refused: bool,
@@ -124,7 +124,7 @@ struct Piped<G> {
     grammar: PhantomData<fn() -> G>,
 }
 
-/// The number of first bytes that tell whether a bag is of this format.
+/// The number of first bytes needed to recognize the format.
 const HEAD: usize = 32;
 
 /// Opens a bag of this grammar.
@@ -229,7 +229,7 @@ impl<G: Grammar> Indexed<G> {
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
-            // What cannot be had now is asked for again, and told then.
+            // What fails here is requested again later, and reported then.
             let mut places = indexes(groups[at]);
             places.extend(self.heads(plan, groups[at], &wants));
             let _ = self.source.expect(&places);
@@ -251,8 +251,8 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// The places of the heads, with a first message's, of those of these chunks that hold messages of which more than the
-    /// time is wanted, if they are far away.
+    /// If the bag is remote: the ranges of the chunk heads, each with its first message's, for chunks with messages of
+    /// which more than the time is wanted.
     fn heads(&self, plan: &ChunkPlan, chunks: &[&Chunk], wants: &[Want]) -> Vec<Range<u64>> {
         if !self.source.is_far() {
             return Vec::new();
@@ -263,8 +263,8 @@ impl<G: Grammar> Indexed<G> {
         chunks.map(head).collect()
     }
 
-    /// Counts chunks as a whole where that is asked for and enough; returns the other chunks, and the way the bag is
-    /// read then.
+    /// Counts chunks as a whole where that is requested and sufficient; returns the other chunks and the tier that
+    /// results.
     fn in_lumps<'p>(
         &self,
         plan: &ChunkPlan,
@@ -302,7 +302,7 @@ impl<G: Grammar> Indexed<G> {
         let mut found = self.forward(sink);
         found.complete &= !is_wrong;
         if reason.fault == Fault::Cut && found.complete {
-            // Cut where a record ends, so that only the head knows.
+            // Cut exactly between records, so only the head reveals it.
             found.complete = false;
             let text = "the end of the bag is missing";
             sink.notice(Notice::new(NoticeKind::Truncated, text));
@@ -314,8 +314,8 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// Reads everything with the independent reader; where that refuses, reads from the front with ours, which uses no
-    /// index, and verifies nothing if there was none.
+    /// Reads everything with the independent reader; if that fails, reads from the front with ours, which uses no
+    /// index and verifies nothing if there was none.
     fn by_the_second_reader(&self, sink: &mut Clip<'_>) -> Report {
         let verified = G::verify(&self.source, &self.plan, sink);
         let Some(why) = verified.stopped else {
@@ -344,7 +344,7 @@ impl<G: Grammar> Indexed<G> {
 
     fn forward(&self, sink: &mut dyn Sink) -> forward::ForwardScan {
         let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
-        // To read what would be passed over is worth it only where nothing is known to be wrong yet.
+        // Reading bytes that could be skipped pays off only if no damage is known yet.
         let is_sound = matches!(&self.plan, Err(reason) if reason.fault == Fault::Missing);
         if is_sound && G::is_summed(Some(&self.source)) {
             stream.sum_up();
@@ -358,14 +358,14 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// The places of the indexes of these chunks, of those that are read whole.
+/// The ranges of the indexes of those chunks that are read whole.
 fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
     let ranges = chunks.iter().map(|chunk| chunk.index.clone());
     let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
     ranges.filter(is_held).collect()
 }
 
-/// A report with the values common to all ways of reading.
+/// A report with the values common to all tiers.
 fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
     Report {
         name,
@@ -400,8 +400,8 @@ impl<G: Grammar> Reader for Piped<G> {
     }
 }
 
-/// The number of threads worth using for `chunks` chunks of which the longest index takes `index` bytes: the reads wait
-/// for the disk, or for a store, and a long index takes memory.
+/// The number of threads to use for `chunks` chunks whose longest index takes `index` bytes: reads wait for the
+/// disk or a store, and a long index takes memory.
 fn threads(chunks: usize, index: u64, is_far: bool) -> usize {
     if index > LONGEST_INDEX / 16 {
         return 1;

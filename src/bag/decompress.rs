@@ -1,4 +1,4 @@
-//! The compressions of bags as streams: the output is read piece by piece, so no number in a file sizes memory.
+//! Decompression of bags as streams: output is read piece by piece, so no number in a file determines memory use.
 
 use std::io::{self, Read};
 use std::ops::Range;
@@ -42,8 +42,8 @@ impl Compression {
         }
     }
 
-    /// The cost of unpacking a byte, in units of the fastest compression's. bzip2 takes that many times as long, even
-    /// for zeros.
+    /// The cost of decompressing a byte, relative to the fastest compression. bzip2 takes that many times as long,
+    /// even for zeros.
     fn cost(self) -> u64 {
         match self {
             Self::Bz2 => 16,
@@ -54,7 +54,7 @@ impl Compression {
     /// A reader of the unpacked content of `from`. Memory: at most 4 MiB per LZ4 block, 8 MiB per Zstandard window.
     ///
     /// # Errors
-    /// Fails where a decompressor cannot be set up. Damage in the data shows when it is read.
+    /// Fails if a decompressor cannot be set up. Damaged data fails when it is read.
     pub(crate) fn reader<'a>(
         self,
         from: impl Read + Send + 'a,
@@ -72,8 +72,8 @@ impl Compression {
     }
 }
 
-/// The amount that may be unpacked of one bag, in all places together, so that a small file cannot keep a reader busy
-/// for hours. Shared by threads; which of them first meets the end of a bomb's allowance is chance.
+/// The total amount that may be decompressed from one bag, so that a small file cannot keep a reader busy for
+/// hours. Shared by threads; which of them first exhausts it on a decompression bomb is not deterministic.
 #[derive(Debug, Default)]
 pub(crate) struct Allowance {
     packed: AtomicU64,
@@ -123,7 +123,7 @@ impl Allowance {
 struct Counted<R> {
     from: R,
     allowance: Arc<Allowance>,
-    /// The cost of a byte for the allowance; `None` for packed bytes, which add to it.
+    /// What a byte costs of the allowance; `None` for compressed bytes, which increase it.
     spends: Option<u64>,
 }
 
@@ -141,11 +141,11 @@ impl<R: Read> Read for Counted<R> {
 /// The error for a bag that spent its [`Allowance`].
 const UNFOLDS: &str = "the bag decompresses to far more than its size";
 
-/// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
+/// The largest window that a Zstandard frame may require, as a power of two: 8 MiB, which every decoder must support.
 const LARGEST_WINDOW: u32 = 23;
 
 #[cfg(feature = "sqlite")]
-/// The whole of one Zstandard frame of at most `limit` bytes, such as a payload that rosbag2 compressed by itself.
+/// The content of one Zstandard frame, at most `limit` bytes, such as a payload that rosbag2 compressed individually.
 /// `None` if it is damaged or larger.
 pub(crate) fn zstd_payload(
     bytes: &[u8],
@@ -159,8 +159,8 @@ pub(crate) fn zstd_payload(
     (out.len() <= limit).then_some(out)
 }
 
-/// LZ4 frames as ROS writes them, of independent blocks, are unpacked block by block: without the content's checksum
-/// that takes two thirds of the time. All others go through the crate's own decoder.
+/// LZ4 frames of independent blocks, as ROS writes them, are decompressed block by block: without the content
+/// checksum that takes two thirds of the time. All others go through the crate's decoder.
 fn lz4<'a>(mut from: impl Read + Send + 'a) -> io::Result<Box<dyn Read + Send + 'a>> {
     let mut head = Vec::new();
     from.by_ref().take(6).read_to_end(&mut head)?;
@@ -173,7 +173,7 @@ fn lz4<'a>(mut from: impl Read + Send + 'a) -> io::Result<Box<dyn Read + Send + 
             6 => 1 << 20,
             _ => 4 << 20,
         };
-        // The content's size, if it stands there, and a checksum of the head.
+        // The content size, if present, and a checksum of the head.
         let rest = if head[4] & 0b1000 == 0 { 1 } else { 9 };
         io::copy(&mut from.by_ref().take(rest), &mut io::sink())?;
         return Ok(Box::new(Blocks {
@@ -196,7 +196,7 @@ struct Blocks<R> {
     checksums: bool,
     packed: Vec<u8>,
     plain: Vec<u8>,
-    /// The part of `plain` that has not been handed out.
+    /// The part of `plain` that has not been read yet.
     ready: Range<usize>,
     ended: bool,
 }
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_packed_comes_out_again() {
+    fn compressed_data_round_trips() {
         let plain: Vec<u8> = (0..3_000_000u32)
             .flat_map(|i| (i / 7).to_le_bytes())
             .collect();
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_lz4_frame_comes_out_again() {
+    fn every_kind_of_lz4_frame_round_trips() {
         use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
         let plain: Vec<u8> = (0..500_000u64)
             .flat_map(|i| (i * i / 7).to_le_bytes())

@@ -1,15 +1,14 @@
-//! Many bags, of which only a few are open at a time: systems allow a process as little as 256 open files.
+//! Many bags, only a few of them open at a time: some systems allow a process only 256 open files.
 
 use super::input::Input;
 use super::model::{OpenOptions, Reader, Report, Sink};
 use crate::base::error::Result;
 use crate::base::time::Span;
 
-/// The number of bags of a list that stay open until they have been read; each of them may be a folder that keeps as
-/// many.
+/// The number of bags that stay open until they are read; each may be a folder that keeps as many files open.
 const STAY_OPEN: usize = 8;
 
-/// A bag that is opened when it is needed.
+/// A bag that is opened on demand.
 struct Deferred {
     input: Input,
     options: OpenOptions,
@@ -17,8 +16,8 @@ struct Deferred {
     open: Option<Box<dyn Reader>>,
 }
 
-/// The readers of `inputs`, in order; each has been opened once, so that an input that is not a bag is reported at
-/// once.
+/// The readers of `inputs`, in order; each is opened once up front, so that an input that is not a bag is reported
+/// immediately.
 pub(crate) fn open_each(
     inputs: impl IntoIterator<Item = Input>,
     options: &OpenOptions,

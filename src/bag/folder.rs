@@ -1,4 +1,4 @@
-//! The recordings in a folder: a folder of rosbag2 is one, every other bag below is one by itself.
+//! The recordings in a folder: a rosbag2 folder is one recording, and so is every other bag file below it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use super::input::{Input, file_name};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 
-/// The depth below the folder to which bags are searched.
+/// The depth below the folder down to which bags are searched for.
 const DEEPEST: usize = 16;
 /// The most recordings that an error lists.
 const LISTED: usize = 8;
@@ -19,14 +19,14 @@ const LISTED: usize = 8;
 /// [`Error::UnknownBag`] for a folder without a recording, [`Error::Usage`] for one with several, which lists them.
 pub(crate) fn only_recording(folder: &Path) -> Result<PathBuf> {
     let mut found = recordings(folder)?;
-    // Beside files of the folder's own, links are no parts of a recording.
+    // If the folder has files of its own, links are not part of the recording.
     if found.iter().any(|path| !path.is_symlink()) {
         found.retain(|path| !path.is_symlink());
     }
     match &found[..] {
         [] => Err(super::explain(folder, &[], true)),
         [one] => Ok(one.clone()),
-        // What lies beside the files of a recording is told when it is read.
+        // Other files beside a recording's are reported when it is read.
         [first, ..] if first == folder => Ok(first.clone()),
         all => {
             let name = |path: &PathBuf| {
@@ -48,20 +48,19 @@ pub(crate) fn only_recording(folder: &Path) -> Result<PathBuf> {
     }
 }
 
-/// Every recording below `folder`, a path each, in order of names; the folder itself where it is one.
+/// The path of every recording below `folder`, sorted by name; the folder itself if it is one.
 ///
 /// # Errors
-/// If the folder cannot be read.
+/// Fails if the folder cannot be read.
 pub(crate) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut bags = Vec::new();
     find(folder, DEEPEST, &mut bags)?;
     Ok(bags)
 }
 
-/// Adds every recording in `folder` in order of names: the folder itself where it is one, each other file that is a
-/// bag, and those of the folders in it. A link to a file is that file, as tools that keep large files elsewhere leave
-/// them (DVC, git-annex), and a bag that cannot be read where that is not there; links to folders, which may lead round,
-/// are not followed.
+/// Adds every recording in `folder`, sorted by name: the folder itself if it is one, otherwise each bag file and the
+/// recordings in its subfolders. Links to files are followed (DVC and git-annex store large files that way), and
+/// dangling ones count as unreadable bags; links to folders, which may be cyclic, are not followed.
 fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
@@ -77,15 +76,15 @@ fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
         if (path.is_file() && is_bag(&path)) || (is_gone && is_named(&path)) {
             bags.push(path);
         } else if is_own && path.is_dir() && deeper > 0 {
-            // A folder below that may not be read hides its bags, not the others.
+            // An unreadable subfolder hides only its own bags.
             let _ = find(&path, deeper - 1, bags);
         }
     }
     Ok(())
 }
 
-/// Whether a folder has files of rosbag2 of its own, such as those of a recording whose `metadata.yaml` is written at its
-/// end.
+/// Whether a folder directly contains rosbag2 storage files, such as those of a recording whose `metadata.yaml` is
+/// not written yet.
 pub(crate) fn has_storage(folder: &Path) -> bool {
     let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
     entries.any(|entry| {
@@ -101,8 +100,8 @@ fn is_storage(path: &Path) -> bool {
 /// The longest `metadata.yaml` that is searched for names, in bytes.
 const MOST_METADATA: u64 = 16 << 20;
 
-/// The files that make `folder` one recording of rosbag2: those that its `metadata.yaml` names, all storage files if it
-/// names none that is there. Without it, numbered parts of one name with no other storage file beside them.
+/// The files that make `folder` one rosbag2 recording: those that its `metadata.yaml` lists, or all storage files if
+/// none of those exists. Without metadata, numbered parts of one name with no other storage file beside them.
 fn own_parts(folder: &Path, paths: &[PathBuf]) -> Option<Vec<PathBuf>> {
     let storage = paths.iter().filter(|path| is_storage(path));
     let storage: Vec<PathBuf> = storage.cloned().collect();
@@ -136,7 +135,7 @@ fn numbered(path: &Path) -> Option<String> {
     is_number.then(|| stem.to_owned())
 }
 
-/// Whether a path is a bag by its first bytes, or has the ending of one: a broken bag has its row too.
+/// Whether a path is a bag by its first bytes or its extension: a broken bag gets a row too.
 fn is_bag(path: &Path) -> bool {
     is_named(path)
         || matches!(

@@ -1,4 +1,4 @@
-//! The place of a bag, and its first bytes, which tell its format.
+//! The location of a bag, and its first bytes, which determine its format.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -21,13 +21,13 @@ pub enum Input {
     Stdin,
 }
 
-/// The beginnings of URLs, by which they are distinguished from paths.
+/// The URL schemes that distinguish URLs from paths.
 const SCHEMES: &[&str] = &[
     "s3://", "s3a://", "gs://", "az://", "abfs://", "abfss://", "azure://", "https://", "http://",
 ];
 
 impl Input {
-    /// The input of this text: `-` is standard input, a URL an object, everything else a path.
+    /// Parses an input: `-` is standard input, a URL an object, everything else a path.
     pub fn parse(text: impl AsRef<OsStr>) -> Self {
         let text = text.as_ref();
         let is_url = |text: &&str| SCHEMES.iter().any(|scheme| text.starts_with(scheme));
@@ -57,8 +57,8 @@ impl Input {
     }
 }
 
-/// A URL as it may be reported: that of a web server without a password, and without what stands behind `?`, which may be a
-/// signature that opens the file.
+/// A URL that is safe to report: for web servers, without the password and the query, which may contain a signature
+/// that grants access.
 pub(crate) fn told_url(url: &str) -> String {
     let Some((scheme, rest)) = url.split_once("://").filter(|_| url.starts_with("http")) else {
         return url.to_owned();
@@ -69,8 +69,8 @@ pub(crate) fn told_url(url: &str) -> String {
     format!("{scheme}://{host}/{path}")
 }
 
-/// The bytes that an input takes on disk, a folder's own files together; `None` for pipes and inputs whose
-/// size is not known.
+/// The size of an input on disk in bytes, for a folder that of its own files; `None` for pipes and inputs of
+/// unknown size.
 pub fn size_on_disk(input: &Input) -> Option<u64> {
     let Input::Path(path) = input else {
         return None;
@@ -94,15 +94,15 @@ pub struct FormatRow {
     pub name: &'static str,
     /// A description for people.
     pub what: &'static str,
-    /// The names that such bags usually end in. For information only: the first bytes decide.
+    /// The usual file extensions. For information only: the first bytes decide.
     pub extensions: &'static [&'static str],
     /// The kind of input that it is read from.
     pub(crate) medium: Medium,
-    /// Whether the first bytes of an input are those of such a bag.
+    /// Whether an input's first bytes are those of such a bag.
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
-    /// Makes a reader.
+    /// Opens a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
-    /// Makes a reader of one that is still being written.
+    /// Opens a reader of a bag that is still being written.
     pub(crate) follow: Option<Follow>,
 }
 
@@ -115,11 +115,11 @@ pub(crate) enum Medium {
     File,
     /// A folder.
     Folder,
-    /// A file or a pipe with a bag of another format in it.
+    /// A file or a pipe that wraps a bag of another format.
     Wrapping,
 }
 
-/// The place of a bag, opened.
+/// The location of a bag, opened.
 pub(crate) enum BagPlace {
     /// A folder.
     Folder(PathBuf),
@@ -129,10 +129,10 @@ pub(crate) enum BagPlace {
     Pipe(String, ByteStream<'static>),
 }
 
-/// The number of first bytes that tell a format.
+/// The number of first bytes needed to recognize a format.
 pub(crate) const HEAD: usize = 512;
 
-/// Opens an input, without reading more than its kind.
+/// Opens an input and reads nothing but its kind.
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,
@@ -170,8 +170,8 @@ pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
     }
 }
 
-/// The new name of a bag that is gone under the name it had while it was recorded: a recorder removes `.active` when it
-/// closes a bag.
+/// The new name of a bag that no longer exists under the name it had while recording: a recorder drops `.active`
+/// when it closes a bag.
 pub(crate) fn closed(path: &Path) -> Option<PathBuf> {
     let is_active = path.extension().is_some_and(|end| end == "active");
     let closed = path.with_extension("");

@@ -91,7 +91,7 @@ impl Grammar for Mcap {
         let mut found = IndexSum::default();
         let mut index = Index::default();
         let mut rest = FieldCursor(bytes);
-        // The crate reads these into a vector of pairs each, which takes several times as long.
+        // The crate reads these into vectors of pairs, which takes several times as long.
         while let Some(kind) = rest.u8() {
             let len = usize::try_from(rest.u64()?).ok()?;
             let (record, after) = rest.0.split_at_checked(len)?;

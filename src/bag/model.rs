@@ -1,4 +1,4 @@
-//! The data model of bags: connections, messages, the sink that takes them in, the reader that feeds it.
+//! The data model of bags: connections, messages, the sink that receives them, the reader that feeds it.
 
 use std::io;
 use std::path::Path;
@@ -16,26 +16,26 @@ pub enum Encoding {
     Ros1,
     /// ROS 2 serialisation: CDR behind a header of four bytes.
     Cdr,
-    /// Anything else, by the name that the bag gives it; never decoded.
+    /// Anything else, as named in the bag; never decoded.
     Other(String),
 }
 
-/// The place of a connection among those that one reader has announced, counted from 0 without gaps.
+/// The index of a connection among those that a reader has announced, from 0 without gaps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConnectionId(pub u32);
 
 /// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
-    /// The place among the reader's connections.
+    /// The index among the reader's connections.
     pub id: ConnectionId,
     /// The topic as recorded.
     pub topic: TopicName,
-    /// The message type as recorded: `std_msgs/String`, `std_msgs/msg/String`; empty if the bag does not say.
+    /// The message type as recorded: `std_msgs/String`, `std_msgs/msg/String`; empty if not recorded.
     pub type_name: Arc<str>,
-    /// The text of the message definition, if the bag holds one.
+    /// The message definition, if the bag contains one.
     pub definition: Option<Arc<str>>,
-    /// The md5 sum (ROS 1) or RIHS01 hash (ROS 2) of the type, if the bag holds one.
+    /// The md5 sum (ROS 1) or RIHS01 hash (ROS 2) of the type, if the bag contains one.
     pub type_hash: Option<Arc<str>>,
     /// The node that publishes, if the header names one (`callerid`).
     pub publisher: Option<NodeName>,
@@ -47,7 +47,7 @@ pub struct Connection {
     pub encoding: Encoding,
 }
 
-/// The part of a connection's payloads that a sink wants. Stamps come in any case.
+/// The part of a connection's payloads that a sink wants. Stamps are always delivered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Want {
     /// No payloads: the reader only needs its index.
@@ -55,7 +55,7 @@ pub enum Want {
     Stamps,
     /// The size of each payload, even if that means reading more than the index.
     Sizes,
-    /// As [`Want::Head`], unless an index makes reading payloads needless: where no other connection's are wanted.
+    /// As [`Want::Head`], unless the bag has an index and no other connection's payloads are wanted.
     Beside(usize),
     /// The first bytes of each payload: at least this many, or all of a shorter payload; more may come.
     Head(usize),
@@ -77,7 +77,7 @@ pub struct Message<'a> {
 }
 
 impl Want {
-    /// Decides what is only wanted beside others, for all connections of a bag that is read by its index.
+    /// Resolves every [`Want::Beside`] for a bag that is read by its index.
     pub(crate) fn settle(wants: &mut [Self]) {
         let is_read = wants
             .iter()
@@ -92,9 +92,9 @@ impl Want {
 
 /// The receiver of everything that a reader finds.
 ///
-/// Order: a connection is announced before its stamps and messages, otherwise anything may come in any order.
-/// Every message of the bag (inside the range asked for) is stamped exactly once through [`Sink::stamps`]; a wanted
-/// one comes through [`Sink::message`] as well, before or after.
+/// Order: a connection is announced before its stamps and messages; otherwise calls may come in any order.
+/// Every message of the bag (inside the requested range) is stamped exactly once through [`Sink::stamps`]; a wanted
+/// one is also passed to [`Sink::message`], before or after.
 pub trait Sink {
     /// Takes a new connection; returns the wanted part of its payloads.
     fn connection(&mut self, connection: &Connection) -> Want;
@@ -111,8 +111,8 @@ pub trait Sink {
         }
     }
 
-    /// Takes log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the
-    /// reader knows them (always if wanted); then it is as long as `stamps`.
+    /// Takes log times of messages of one connection, in file order. `sizes`, if the reader knows them (always if
+    /// wanted), holds each payload's size in bytes and is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
     /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is
@@ -150,7 +150,7 @@ pub trait Sink {
 pub enum Tier {
     /// By its index: only wanted payloads are read.
     Index,
-    /// By its tail, which counts the messages of each chunk; by the index only where a chunk lies in several windows.
+    /// By the message counts per chunk in its tail; by the index only if a chunk spans several windows.
     Chunks,
     /// Record by record from the front.
     Forward,
@@ -170,10 +170,10 @@ impl Tier {
     }
 }
 
-/// The fact that is the version of an object in a store.
+/// The name of the fact with the version of an object in a store.
 pub(crate) const ETAG: &str = "etag";
 
-/// The report of a reader about its bag when it is done.
+/// A reader's report about its bag after reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
     /// The file's or folder's own name, without a path.
@@ -184,13 +184,13 @@ pub struct Report {
     pub compression: Vec<String>,
     /// The way it was read.
     pub tier: Tier,
-    /// The reason why it was not read by its index, if so.
+    /// Why it was not read by its index, if so.
     pub tier_reason: Option<String>,
     /// Whether nothing was lost.
     pub complete: bool,
-    /// Bytes read from the file, for benchmarks; 0 where not known.
+    /// Bytes read from the file, for benchmarks; 0 if unknown.
     pub bytes_read: u64,
-    /// The size of the bag on disk in bytes; 0 where not known.
+    /// The size of the bag on disk in bytes; 0 if unknown.
     pub file_bytes: u64,
     /// Stored facts to show in `info`: `ros_distro`, `library`, `storage`, …
     pub facts: Vec<(String, String)>,
@@ -198,20 +198,20 @@ pub struct Report {
 
 /// An open bag.
 pub trait Reader: Send {
-    /// Whether time never falls from one part of the bag to the next, as far as an index tells.
+    /// Whether, according to an index, time never goes back from one part of the bag to the next.
     fn is_straight(&self) -> bool {
         true
     }
 
-    /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index tells it without
-    /// reading the bag. `None` when only reading will tell. A big bag with a lying tail may hold stamps outside.
+    /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index contains it.
+    /// `None` if only reading the bag can determine it. A large bag with a wrong tail may hold stamps outside.
     fn span(&mut self) -> Result<Option<Span>>;
 
     /// Reads the bag once, front to back or by its index, into `sink`. With `range` only messages inside it are
-    /// stamped, and parts of the bag outside are not read where the index allows; connections are announced anyway.
+    /// stamped, and parts outside are not read if the index allows it; connections are announced anyway.
     ///
     /// # Errors
-    /// Fails only where nothing at all can be read. Anything lost on the way is a notice, and `Report::complete` is
+    /// Fails only if nothing at all can be read. Partial loss is reported by a notice and sets `Report::complete` to
     /// false.
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report>;
 }
@@ -227,13 +227,13 @@ pub(crate) enum Growth {
     Ended,
 }
 
-/// A recording that is read while it is written. Every message is reported once, as soon as it can be read; what is
-/// half written is not there yet. What is lost or damaged only shows when the closed recording is read.
+/// A recording that is read while it is written. Every message is reported once, as soon as it is complete.
+/// Lost or damaged data is only detected when the closed recording is read.
 pub(crate) trait Growing: Send {
-    /// Reports to `sink` what has become readable since the last time.
+    /// Reports to `sink` what has become readable since the last call.
     ///
     /// # Errors
-    /// Where the recording is gone, or cannot be read at all.
+    /// If the recording no longer exists or cannot be read at all.
     fn poll(&mut self, sink: &mut dyn Sink) -> Result<Growth>;
 
     /// The file or folder, which may have been renamed since.
@@ -245,23 +245,23 @@ pub(crate) trait Growing: Send {
 pub struct OpenOptions {
     /// Read everything by the second, independent reader instead (tier `verify`).
     pub verify: bool,
-    /// The way to count by chunks where that is enough; `None` to count message by message.
+    /// How to count by chunks where that suffices; `None` to count message by message.
     pub lumps: Option<Lumps>,
 }
 
-/// The way to count a chunk as a whole if all of it lies in one window: nothing of it is read then.
+/// How to count a chunk that lies in a single window as a whole, without reading it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lumps {
     /// The start of one of the windows.
     pub origin: Stamp,
     /// The length of all windows.
     pub period: Period,
-    /// Only bags of more chunks than this are counted so, ≥ 0.
+    /// Only bags with more chunks than this are counted this way, ≥ 0.
     pub above: usize,
 }
 
 impl Lumps {
-    /// The start of the window in which `at` lies; held at the ends of the range.
+    /// The start of the window that contains `at`; saturates at the ends of the range.
     pub fn window(&self, at: Stamp) -> Stamp {
         let (origin, period) = (i128::from(self.origin.0), i128::from(self.period.nanos()));
         let start = (i128::from(at.0) - origin).div_euclid(period) * period + origin;
@@ -269,10 +269,10 @@ impl Lumps {
     }
 }
 
-/// The longest payload, or connection record, that is held in memory, in bytes.
+/// The longest payload or connection record held in memory, in bytes.
 pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
 
-/// Reports to `sink` that data was lost because of an error of the system.
+/// Reports to `sink` that data was lost because of a system error.
 pub(crate) fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
     sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
 }

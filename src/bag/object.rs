@@ -1,4 +1,4 @@
-//! Bags that are objects in a store: what reads and lists them, or the refusal where the feature `remote` is left out.
+//! Bags in object stores: reading and listing, or an error if the feature `remote` is disabled.
 
 #[cfg(feature = "remote")]
 pub(crate) use super::remote::{list, open, version};

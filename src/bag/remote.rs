@@ -1,4 +1,4 @@
-//! Bags in object stores and on web servers: parts of an object, asked for in few requests, all of the same version.
+//! Bags in object stores and on web servers: parts of an object, fetched in few requests, all of the same version.
 
 mod reader;
 mod store;
@@ -17,24 +17,24 @@ use store::{Object, StoreRefusal};
 pub(crate) use reader::open;
 pub(crate) use store::list;
 
-/// The first request asks for so much, in bytes: it tells size and version, and holds all of a small bag.
+/// The size of the first request in bytes: it returns size and version, and all of a small bag.
 const FIRST: u64 = 64 << 10;
-/// What is not larger is fetched whole: as fast as two requests for its parts.
+/// Objects up to this size are fetched whole, which is as fast as two partial requests.
 const SMALL: u64 = 512 << 10;
-/// The least that is asked for, in bytes: less is not faster.
+/// The smallest request, in bytes: smaller ones are not faster.
 const LEAST: u64 = 4 << 10;
-/// The end of an object is asked for in one piece: a footer is followed by what it points to.
+/// The end of an object is fetched in one piece: after a footer comes what it points to.
 const TAIL: u64 = 32 << 10;
-/// The most that is asked for at once where one part is read after the other, in bytes.
+/// The largest read-ahead of sequential reads, in bytes.
 const MOST_AHEAD: u64 = 4 << 20;
-/// What lies so close, in bytes, is asked for together: reading over it takes less than another answer.
+/// Ranges at most this far apart, in bytes, share a request: reading the gap is faster than another round trip.
 const GAP: u64 = 16 << 10;
-/// How much of an object is held in memory, in bytes.
+/// The most of an object held in memory, in bytes.
 const MOST_HELD: u64 = 32 << 20;
-/// The most requests that are on their way at a time, for each thread that waits.
+/// The most concurrent requests per waiting thread.
 const TOGETHER: usize = 16;
 
-/// An object with the parts of it that were fetched and not yet forgotten.
+/// An object with its cached parts.
 #[derive(Debug)]
 struct Remote {
     object: Arc<Object>,
@@ -46,7 +46,7 @@ struct Remote {
 struct HeldParts {
     held: VecDeque<Arc<ObjectPart>>,
     bytes: u64,
-    /// Where the last part ended that was asked for by itself, and its length.
+    /// The end and the length of the last part that was requested alone.
     last: (u64, u64),
 }
 
@@ -57,14 +57,14 @@ struct ObjectPart {
     bytes: Vec<u8>,
 }
 
-/// An object as a source, and where it says why it could not be read on.
+/// An object as a source, and the place for its first failure.
 struct Opened {
     source: FileSource,
     etag: Option<String>,
     refused: Refused,
 }
 
-/// Whether the store, or the way there, failed while an object was read.
+/// The first failure of the store or the connection while an object was read.
 #[derive(Clone)]
 struct Refused {
     url: String,
@@ -72,7 +72,7 @@ struct Refused {
 }
 
 impl Refused {
-    /// The failure, if there was one: whatever was read besides is not the whole object.
+    /// Returns the failure, if any: what was read then is not the whole object.
     ///
     /// # Errors
     /// [`Error::Remote`](crate::Error::Remote) for the first one.
@@ -84,10 +84,10 @@ impl Refused {
     }
 }
 
-/// Opens the object at `url` in one request, which brings its first bytes too; two where it is small.
+/// Opens the object at `url` in one request, which also returns its first bytes; two if it is small.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if there is none, [`Error::Remote`](crate::Error::Remote) if the store cannot be asked.
+/// [`Error::Io`](crate::Error::Io) if it does not exist, [`Error::Remote`](crate::Error::Remote) if the store fails.
 fn object(url: &str) -> Result<Opened> {
     let told = &told_url(url);
     let (object, first) = Object::open(url, FIRST).map_err(|why| why.error(told))?;
@@ -105,7 +105,7 @@ fn object(url: &str) -> Result<Opened> {
     remote.keep(0, first);
     if len > FIRST && len <= SMALL {
         let rest = FIRST..len;
-        // What went wrong is asked for behind it.
+        // A failure is kept in `refused`.
         let _ = remote.fetch(&[rest]);
         refused.check()?;
     }
@@ -152,12 +152,12 @@ impl Ranges for Remote {
 }
 
 impl Remote {
-    /// Parts are whole or not there, so that a panic elsewhere spoils nothing.
+    /// Parts are complete or absent, so a poisoned lock does no harm.
     fn state(&self) -> MutexGuard<'_, HeldParts> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What to ask for, where `len` bytes from `at` on are wanted.
+    /// The range to request if `len` bytes from `at` on are wanted.
     fn around(&self, at: u64, len: u64) -> Range<u64> {
         let end = self.object.len;
         if at.saturating_add(TAIL) >= end {
@@ -173,7 +173,7 @@ impl Remote {
         range
     }
 
-    /// Fetches all of these at the same time; answers the last one.
+    /// Fetches all ranges concurrently; returns the last one.
     fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<Arc<ObjectPart>> {
         if let Some(why) = self.refused.get() {
             return Err(why.io());
@@ -205,7 +205,7 @@ impl Remote {
 }
 
 impl HeldParts {
-    /// The part that holds the byte at `at`.
+    /// The part that contains the byte at `at`.
     fn part(&self, at: u64) -> Option<Arc<ObjectPart>> {
         let part = self.held.iter().rev().find(|part| part.holds(at));
         part.cloned()
@@ -226,7 +226,7 @@ impl ObjectPart {
         self.start <= at && at < self.end()
     }
 
-    /// Copies what there is from `at` on, which it holds; answers how much that was.
+    /// Copies bytes from `at`, which it contains, to its end; returns their number.
     fn copy(&self, at: u64, into: &mut [u8]) -> usize {
         let from = usize::try_from(at.saturating_sub(self.start)).unwrap_or(usize::MAX);
         let bytes = self.bytes.get(from..).unwrap_or_default();
@@ -236,7 +236,7 @@ impl ObjectPart {
     }
 }
 
-/// Ranges that lie close made one, in order, none past the end.
+/// Sorts the ranges, merges those that lie close, and clips them at the end.
 fn together(mut ranges: Vec<Range<u64>>, end: u64) -> Vec<Range<u64>> {
     ranges.sort_by_key(|range| range.start);
     let mut all: Vec<Range<u64>> = Vec::new();
@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_close_is_asked_for_together() {
+    fn close_ranges_share_a_request() {
         let far = 999 + GAP;
         let ranges = vec![far..far + 10, 0..100, 50..999, 200..300, 9 << 30..10 << 30];
         let one = 0..far + 10;

@@ -107,7 +107,7 @@ impl Grammar for Rosbag1 {
             index.add(raw, entries.filter_map(entry));
             at = end;
         }
-        // One more than the tail says: then the tail lacks a connection.
+        // One more record than the tail states: then the tail lacks a connection.
         let is_all = record_at(bytes, at).is_none();
         (is_all && found == *promised).then_some(index)
     }
@@ -144,7 +144,7 @@ impl Grammar for Rosbag1 {
     }
 }
 
-/// The index record at `at`: its connection, its count, and where its entries begin.
+/// The index record at `at`: its connection, its count, and the start of its entries.
 fn record_at(bytes: &[u8], at: usize) -> Option<(u32, u32, usize)> {
     let len = records::u32_at(bytes, at)? as usize;
     let header = bytes.get(at + 4..)?.get(..len)?;

@@ -51,7 +51,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         });
     };
     let (files, links) = storage_and_links(&path);
-    // Where there are only links out of the folder, the words of this format say so.
+    // A folder with nothing but links out of it is opened too, for this format's error message.
     let is_here = links.is_empty() || !files.is_empty();
     if is_here && !path.join("metadata.yaml").is_file() {
         let only = only_recording(&path)?;
@@ -94,7 +94,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }
 }
 
-/// The storage files in a folder, in the order of their numbers, without links out of it.
+/// The storage files in a folder, ordered by number, without links out of it.
 fn storage(folder: &Path) -> Vec<PathBuf> {
     let (mut files, _) = storage_and_links(folder);
     files.sort_by_cached_key(|p| {
@@ -107,7 +107,7 @@ fn storage(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The storage files in a folder, and links out of it that look like some.
+/// The storage files in a folder, and links out of it that look like storage files.
 fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let Ok(entries) = folder.read_dir() else {
         return (Vec::new(), Vec::new());
@@ -122,7 +122,7 @@ impl BagFolder {
         self.notices.push(Notice::new(kind, text));
     }
 
-    /// The files to read: those that the metadata names; if none of them is there, all that look like storage files.
+    /// The files to read: those that the metadata lists; if none of them exists, all that look like storage files.
     fn files(&mut self, path: &Path) -> Vec<PathBuf> {
         let named = std::mem::take(&mut self.metadata.files);
         let (mut found, mut known) = (Vec::new(), HashSet::new());
@@ -152,7 +152,7 @@ impl BagFolder {
         if instead {
             return there;
         }
-        // Without a file of its own, the error says why there is none.
+        // The error explains why there is no file.
         if found.is_empty() {
             return found;
         }
@@ -200,7 +200,7 @@ impl Reader for BagFolder {
                 Span::new(w.start.min(span.start), w.end.max(span.end))
             }));
         }
-        // A part without a span is empty or must be read; either way the spans of the other parts alone are not enough.
+        // A part without a span is empty or must be read first; either way the other parts' spans are not sufficient.
         Ok(whole.filter(|_| parts == self.parts.len()))
     }
 
@@ -263,14 +263,14 @@ impl BagFolder {
 /// The identity of a connection across the parts of a recording: those with the same key are one.
 type ConnectionKey = (Arc<str>, Arc<str>, Option<NodeName>);
 
-/// A sink that gives the parts' connections ids that are the same in all parts.
+/// A sink that maps the parts' connection ids to ids of the whole recording.
 struct PartsAdapter<'a> {
     metadata: &'a Metadata,
     sink: &'a mut dyn Sink,
     known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
-    /// The ids of this part's connections in the whole.
+    /// The ids of this part's connections in the whole recording.
     part: Vec<ConnectionId>,
-    /// The bytes of the parts before this one, of this part, and of all.
+    /// The sizes in bytes of the parts before this one, of this part, and of all parts.
     sizes: (u64, u64, u64),
 }
 
@@ -303,7 +303,7 @@ impl<'a> PartsAdapter<'a> {
         (id, want)
     }
 
-    /// Announces the topics that only the metadata names: they have no messages.
+    /// Announces the topics that only the metadata lists: they have no messages.
     fn silent(&mut self) {
         let known: BTreeSet<Arc<str>> = self.known.keys().map(|key| Arc::clone(&key.0)).collect();
         for (name, topic) in &self.metadata.topics {

@@ -1,4 +1,4 @@
-//! Sources of bytes: files and objects read at any place, and streams that can be peeked into and skipped through.
+//! Sources of bytes: files and objects with random access, and streams that support peeking and skipping.
 
 use std::fmt::Debug;
 use std::fs::File;
@@ -11,25 +11,24 @@ use crate::bag::checksum::Checksum;
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// A source of bytes that several threads read at any place at once.
+/// A source of bytes with random access, shared by several threads.
 pub(crate) trait Ranges: Debug + Send + Sync {
-    /// Reads some of the bytes from `at` on; 0 bytes only at the end.
+    /// Reads some bytes from `at` on; 0 bytes only at the end.
     fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize>;
 
-    /// Announces the ranges that will be asked for next, so that a source that waits for each answer can ask for all of
-    /// them at once.
+    /// Announces the ranges that will be read next, so that a source with high latency can request all of them at
+    /// once.
     fn expect(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
         Ok(())
     }
 
-    /// Whether each answer is waited for so long that asking for much at a time is worth it.
+    /// Whether latency is so high that few large requests are better than many small ones.
     fn is_far(&self) -> bool {
         false
     }
 }
 
-/// A regular file, or an object somewhere else, that several threads read at any place at once. It counts the bytes it
-/// hands out.
+/// A local file or a remote object with random access, shared by several threads. It counts the bytes it reads.
 #[derive(Debug)]
 pub(crate) struct FileSource {
     path: PathBuf,
@@ -49,7 +48,7 @@ impl FileSource {
         Ok(Self::of(path, len, file))
     }
 
-    /// A source of the `len` bytes that `from` gives, called `path`.
+    /// A source of `len` bytes from `from`, named `path`.
     pub(crate) fn of(path: &Path, len: u64, from: impl Ranges + 'static) -> Self {
         Self {
             path: path.to_owned(),
@@ -123,7 +122,7 @@ fn read_once(file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, into, at)
 }
 
-/// Reads at a place on systems where threads share the position, so one thread at a time.
+/// Reads at a position on systems where threads share the file position: one thread at a time.
 #[cfg(not(any(unix, windows)))]
 fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     use std::io::{Seek as _, SeekFrom};
@@ -133,7 +132,7 @@ fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     file.read(into)
 }
 
-/// A temporary folder of ours, removed when this is dropped.
+/// A temporary folder, removed on drop.
 pub(crate) struct Temporary {
     folder: tempfile::TempDir,
     _left: Leftover,
@@ -146,7 +145,7 @@ impl Temporary {
     /// An error of the system.
     pub(crate) fn new() -> Result<Self> {
         let mut builder = tempfile::Builder::new();
-        // What is copied here may be private where it comes from.
+        // The originals may be private.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
         let folder = builder.tempdir();
@@ -166,31 +165,31 @@ impl Temporary {
 enum From<'a> {
     /// Part of a file, up to byte `end`.
     File { source: &'a FileSource, end: u64 },
-    /// Any reader that can only be read on.
+    /// Any sequential reader.
     Reader(Box<dyn Read + Send + 'a>),
 }
 
-/// A stream of bytes in order, with a look ahead; skipping costs nothing in a file.
+/// A sequential stream of bytes with look-ahead; skipping is free in a file.
 pub(crate) struct ByteStream<'a> {
     from: From<'a>,
     /// The position of `buffer[used]`.
     at: u64,
-    /// Of which `used..filled` has been read ahead. It keeps its length, so that it is not cleared at every step.
+    /// Its part `used..filled` has been read ahead. It keeps its length, so that it is not cleared at every step.
     buffer: Vec<u8>,
     used: usize,
     filled: usize,
     /// The number of bytes read at a time.
     step: usize,
-    /// The CRC-32 of all bytes taken but for those of `buffer[summed..used]`, if it is asked for.
+    /// The CRC-32 of all bytes taken except `buffer[summed..used]`, if requested.
     sum: Option<Checksum>,
     summed: usize,
 }
 
-/// The step for reading through.
+/// The step for sequential reading.
 pub(crate) const FAR: usize = 256 * 1024;
 /// The step for picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
-/// The step for the heads of records in a source that is far away.
+/// The step for record heads in a remote source.
 pub(crate) const GLANCE: usize = 512;
 
 impl<'a> ByteStream<'a> {
@@ -218,7 +217,7 @@ impl<'a> ByteStream<'a> {
         }
     }
 
-    /// Sums up all bytes that are taken from here on, so that what is passed over in a file is read too.
+    /// Starts a checksum of all bytes taken from here on; skipped bytes of a file are then read too.
     pub(crate) fn sum_up(&mut self) {
         self.sum = Some(Checksum::default());
         self.summed = self.used;
@@ -230,7 +229,7 @@ impl<'a> ByteStream<'a> {
         self.sum.as_ref().map(Checksum::crc)
     }
 
-    /// Adds the bytes taken since the last time, many at once.
+    /// Adds the bytes taken since the last call, many at once.
     fn settle_sum(&mut self) {
         if let Some(sum) = &mut self.sum {
             sum.add(&self.buffer[self.summed..self.used]);
@@ -243,7 +242,7 @@ impl<'a> ByteStream<'a> {
         self.at
     }
 
-    /// The next `n` bytes without taking them; fewer only where the stream ends. `n` must be bounded by the caller.
+    /// The next `n` bytes without taking them; fewer only at the end. `n` must be bounded by the caller.
     ///
     /// # Errors
     /// An error of the system, or of a decompressor.
@@ -255,7 +254,7 @@ impl<'a> ByteStream<'a> {
         Ok(&self.buffer[self.used..end])
     }
 
-    /// The number of bytes that follow, if known without reading on.
+    /// The number of remaining bytes, if known without reading.
     pub(crate) fn left(&self) -> Option<u64> {
         match self.from {
             From::File { end, .. } => Some(end.saturating_sub(self.at)),
@@ -268,7 +267,7 @@ impl<'a> ByteStream<'a> {
         self.filled - self.used
     }
 
-    /// Reads on until `n` bytes are ahead or the stream ends.
+    /// Reads until `n` bytes are buffered or the stream ends.
     fn fill(&mut self, n: usize) -> io::Result<()> {
         self.settle_sum();
         self.summed = 0;
@@ -306,8 +305,8 @@ impl<'a> ByteStream<'a> {
         self.at += n as u64;
     }
 
-    /// Passes over `n` bytes; returns their number, fewer only at the end. Past the end of a file the number is right
-    /// without reading.
+    /// Skips `n` bytes; returns their number, fewer only at the end. At the end of a file the number is right without
+    /// reading.
     ///
     /// # Errors
     /// As [`ByteStream::peek`].
@@ -363,7 +362,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn what_is_unpacked_is_for_its_owner_alone() {
+    fn temporary_folders_are_private() {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = Temporary::new().unwrap();
         let mode = folder.path().metadata().unwrap().permissions().mode();
@@ -371,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_peeks_takes_and_skips_the_same_from_a_file_and_a_reader() {
+    fn streams_of_files_and_readers_behave_the_same() {
         let bytes: Vec<u8> = (0..=255).cycle().take(10_000).collect();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("bytes");

@@ -1,6 +1,6 @@
-//! ROS 2 bags in SQLite, schema versions 1 to 4: two columns of every row, payloads only of wanted topics.
+//! ROS 2 bags in SQLite, schema versions 1 to 4: two columns of every row, and payloads of wanted topics only.
 //!
-//! The tables: `sqlite_storage.cpp` of `rosbag2_storage_sqlite3`. The files `sqlite3_*.rs` are parts of this one.
+//! The tables: `sqlite_storage.cpp` of `rosbag2_storage_sqlite3`.
 
 mod db;
 mod growing;
@@ -68,7 +68,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     bag(ready, &source, options).map(|bag| Box::new(bag) as Box<dyn Reader>)
 }
 
-/// The topics of a database, and what it says about itself.
+/// The topics of a database and its metadata.
 fn bag(mut ready: Ready, source: &FileSource, options: &OpenOptions) -> Result<Sqlite3Bag> {
     let path = source.path().to_owned();
     let mut notices = Vec::new();
@@ -126,7 +126,7 @@ fn cut(source: &FileSource) -> Option<String> {
         1 => 65_536,
         size => u64::from(size),
     };
-    // The count of pages is only right if the last writer knew of it.
+    // The page count is only valid if the last writer maintained it.
     let pages = number(28).filter(|_| number(24) == number(92))?;
     let whole = page * u64::from(pages);
     let is = source.len();
@@ -247,7 +247,7 @@ fn definitions(db: &Db) -> Result<BTreeMap<Arc<str>, Arc<str>>, Refusal> {
     Ok(found)
 }
 
-/// The facts that the database holds about itself (schema 3 and later).
+/// The facts that the database states about itself (schema 3 and later).
 fn facts(db: &Db) -> Vec<(String, String)> {
     let columns = db.columns("schema").unwrap_or_default();
     let names = ["schema_version", "ros_distro"];
@@ -261,7 +261,7 @@ fn facts(db: &Db) -> Vec<(String, String)> {
         .collect()
 }
 
-/// Whether the first payload is a Zstandard frame; a CDR payload never begins so.
+/// Whether the first payload is a Zstandard frame; a CDR payload never begins like one.
 fn is_packed(db: &Db) -> bool {
     let sql = "SELECT substr(data, 1, 4) FROM messages WHERE octet_length(data) BETWEEN 4 AND 1000000 LIMIT 1";
     let first = db.first(sql, &[], |row| Some(row.bytes(0)? == ZSTD));
@@ -274,7 +274,7 @@ const BIG: u64 = 128 << 20;
 const PARTS: i64 = 64;
 
 impl Sqlite3Bag {
-    /// The rows in parts: one unless the bag is big. With a range SQLite's own index finds the rows.
+    /// The rows in parts: one unless the bag is big. For a range, SQLite's own index finds the rows.
     fn parts(&self, db: &Db, range: Option<Span>) -> Vec<RowRange> {
         let whole = vec![(i64::MIN, i64::MAX)];
         if self.file_bytes < BIG || range.is_some() || self.verify {
@@ -295,7 +295,7 @@ impl Sqlite3Bag {
     }
 }
 
-/// Lets SQLite look for damage in the whole file.
+/// Has SQLite check the whole file for damage.
 fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA quick_check(1)", &[], |row| row.text(0));
     let said = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
@@ -309,7 +309,7 @@ fn check(db: &Db, sink: &mut dyn Sink) {
 
 impl Reader for Sqlite3Bag {
     fn span(&mut self) -> Result<Option<Span>> {
-        // What cannot be reported now shows when the rows are read.
+        // An error that is ignored here recurs when the rows are read.
         Ok(self.ends().unwrap_or(None))
     }
 

@@ -1,33 +1,33 @@
-//! Bags whose recorder's clock was set back, or whose simulation began again: such a bag holds several runs, one behind
-//! the other in the file, whose times overlap.
+//! Bags whose recorder's clock was set back, or whose simulation restarted: such a bag contains several runs, one
+//! after the other in the file, whose times overlap.
 //!
-//! The first reading watches for the places where time falls, in the order of the file; where there are any, a second
-//! one moves each run behind the one before.
+//! The first reading detects where time goes back, in file order; if it does, a second reading shifts each run to
+//! after the previous one.
 
 use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::rhythm::{OUT_OF_ORDER_NS, RUN_FEWEST, RUN_SHARE};
 use crate::base::time::Stamp;
 
-/// The longest fall of the clock that makes a run: a longer one is a clock that was not set yet.
+/// The longest step back that begins a run: a longer one means that the clock was not set yet.
 const LONGEST_NS: i64 = 365 * 86_400_000_000_000;
 
-/// The place in a bag where another run begins.
+/// The place in a bag where a new run begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Seam {
-    /// The last time of the run before, and the first one of this run, as recorded.
+    /// The last time of the previous run and the first of this run, as recorded.
     pub(crate) before: Stamp,
     pub(crate) after: Stamp,
     /// The number of messages before it, by connection.
     counts: Vec<u64>,
 }
 
-/// A connection on its way through the bag.
+/// The state of a connection.
 #[derive(Clone, Debug, Default)]
 struct Line {
     count: u64,
-    /// The number of messages before the part of the file that is being read.
+    /// The number of messages before the current part of the file.
     before_part: u64,
-    /// The last time in this run, and in the one that may have begun.
+    /// The last time in this run, and in the possible new run.
     last: Option<Stamp>,
     next: Option<Stamp>,
 }
@@ -35,15 +35,15 @@ struct Line {
 /// A run that may have begun.
 struct Suspect {
     seam: Seam,
-    /// The numbers of connections whose time fell, and of those whose time went on.
+    /// The numbers of connections whose time went back, and of those whose time continued.
     fell: u64,
     went_on: u64,
     messages: u64,
-    /// Whether time has come to where it fell.
+    /// Whether time has passed the point from which it went back.
     is_past: bool,
 }
 
-/// A sink that watches for seams.
+/// A sink that detects seams.
 pub(crate) struct Watched<'a> {
     sink: &'a mut dyn Sink,
     lines: Vec<Line>,
@@ -65,7 +65,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// The seams of the bag that was read, in the order of the file.
+    /// The seams of the bag, in file order.
     pub(crate) fn seams(mut self) -> Vec<Seam> {
         self.decide(true);
         self.seams
@@ -79,7 +79,7 @@ impl<'a> Watched<'a> {
                 suspect.seam.after = suspect.seam.after.min(time);
             }
             if let (Some(last), None) = (line.last, line.next) {
-                // Others than those that spoke lately may speak after the fall as if nothing had been.
+                // Connections that were silent lately may continue after the step as if nothing had happened.
                 let would_fall = last.since(suspect.seam.after) > OUT_OF_ORDER_NS;
                 let fell = last.since(time) > OUT_OF_ORDER_NS;
                 suspect.fell += u64::from(would_fall && fell);
@@ -111,8 +111,8 @@ impl<'a> Watched<'a> {
         self.last = self.last.max(time);
     }
 
-    /// Decides whether a run has begun, once enough of it is known: most connections that speak again have fallen back,
-    /// and not only one of several.
+    /// Decides whether a run has begun, once enough of it is known: of the connections that publish again, most have
+    /// gone back in time, and not only one of several.
     fn decide(&mut self, is_end: bool) {
         let spoke = self.lines.iter().filter(|line| line.last.is_some()).count();
         let fewest = spoke.min(2) as u64;
@@ -167,28 +167,28 @@ impl Sink for Watched<'_> {
 /// A place where a recorder's clock was set back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ClockFall {
-    /// The last time of the run before.
+    /// The last time of the previous run.
     pub(crate) time: Stamp,
-    /// The time by which the clock went back, in nanoseconds.
+    /// How far the clock went back, in nanoseconds.
     pub(crate) length: i64,
 }
 
-/// A sink that moves each run behind the one before.
+/// A sink that shifts each run to after the previous one.
 pub(crate) struct Straightened<'a> {
     sink: &'a mut dyn Sink,
     seams: &'a [Seam],
-    /// The time by which each run is moved, in nanoseconds; the first run is not.
+    /// The shift of each run in nanoseconds; 0 for the first.
     shifts: Vec<i64>,
-    /// The numbers of stamps and of messages of each connection so far.
+    /// The number of stamps and of messages per connection so far.
     counts: Vec<[u64; 2]>,
 }
 
-/// The times by which runs are moved, the first of them by 0.
+/// The shifts of all runs; 0 for the first.
 fn shifts(seams: &[Seam]) -> Vec<i64> {
     let mut shifts = vec![0_i64];
     for seam in seams {
         let before = shifts[shifts.len() - 1];
-        // The next nanosecond: how much time really went by is not known.
+        // The next nanosecond: the real time between the runs is unknown.
         let shift = seam
             .before
             .since(seam.after)
@@ -218,7 +218,7 @@ impl<'a> Straightened<'a> {
         }
     }
 
-    /// The time of the next stamp, or message, of a connection.
+    /// The shifted time of a connection's next stamp or message.
     fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
         let at = connection.0 as usize;
         let count = self.counts[at][kind];
@@ -257,7 +257,7 @@ mod tests {
 
     const SECOND: i64 = 1_000_000_000;
 
-    /// A sink that keeps the stamps of each connection, in seconds.
+    /// A sink that collects the stamps of each connection, in seconds.
     #[derive(Default)]
     struct Kept(Vec<Vec<i64>>);
 
@@ -273,7 +273,7 @@ mod tests {
         }
     }
 
-    /// Parts of a file: of each the connections with their seconds.
+    /// Parts of a file: for each, the connections with their seconds.
     type Parts<'a> = &'a [&'a [(u32, Vec<i64>)]];
 
     fn tell(parts: Parts<'_>, sink: &mut dyn Sink) {
@@ -295,10 +295,10 @@ mod tests {
     }
 
     #[test]
-    fn a_run_is_moved_behind_the_one_before() {
+    fn a_run_is_shifted_behind_the_previous_one() {
         let parts: Parts<'_> = &[
             &[(0, (0..60).collect()), (1, vec![0, 30]), (2, vec![50])],
-            // The second connection speaks as if nothing had been.
+            // The second connection continues as if nothing had happened.
             &[(1, vec![58]), (0, (40..90).collect()), (2, vec![45])],
         ];
         let found = seams(parts);
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn topics_behind_each_other_are_one_run() {
+    fn topics_written_one_after_the_other_are_one_run() {
         let topic = |id| [(id, (0..60).collect())];
         assert_eq!(seams(&[&topic(0), &topic(1), &topic(2)]), []);
     }
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_was_not_set_is_no_run() {
+    fn a_clock_set_for_the_first_time_begins_no_run() {
         let year = 366 * 86_400;
         let parts: Parts<'_> = &[
             &[(0, (year..year + 60).collect())],

@@ -21,7 +21,7 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     }
 }
 
-/// The error for an object where a file is needed, or where objects cannot be read at all.
+/// The error for an object where a file is required, or where objects are not supported.
 pub(crate) fn elsewhere(url: &str) -> Error {
     let hint = if cfg!(feature = "remote") {
         "only files can be read: download the bag"

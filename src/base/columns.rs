@@ -1,28 +1,29 @@
-//! Text fitted to a terminal: tables with heads whose columns give way to its width, and lines with a hanging indent.
+//! Text fitted to a terminal: tables whose columns shrink to its width, and lines with a hanging indent.
 
 /// A column of a table for people.
 pub(crate) struct Column {
-    /// Its head; empty where the cells speak for themselves.
+    /// Its header; empty if the cells need none.
     pub(crate) head: &'static str,
-    /// Whether its cells end at its right side, as numbers do.
+    /// Whether its cells are right-aligned, as for numbers.
     pub(crate) is_right: bool,
-    /// The least width to which it shrinks, in characters; [`WHOLE`] where it does not.
+    /// The minimum width in characters; [`WHOLE`] if it does not shrink.
     pub(crate) least: usize,
-    /// When it shrinks, and when it is left out, where the table is too wide: 1 is the first. Those with 0 shrink last and
-    /// are never left out.
+    /// The order in which columns shrink and in which they are dropped if the table is too wide: 1 is first. Those with
+    /// 0
+    /// shrink last and are never dropped.
     pub(crate) gives: (u8, u8),
 }
 
-/// The least width of a column that does not shrink.
+/// The minimum width of a column that does not shrink.
 pub(crate) const WHOLE: usize = usize::MAX;
 
 /// A cell of a table.
 pub(crate) enum Cell {
-    /// Text without control characters; cut in its middle where it does not fit.
+    /// Text without control characters; cut in the middle if too long.
     Text(String),
-    /// A message type, which gives up its package first.
+    /// A message type; its package is dropped first.
     Type(String),
-    /// Numbers over time, drawn as bars in as many characters as there is room for.
+    /// Numbers over time, drawn as bars in the available width.
     Bars(Vec<u64>),
 }
 
@@ -52,7 +53,7 @@ impl Cell {
     }
 }
 
-/// A table with a head, at most `width` characters wide if columns can give way that far; lines end without spaces.
+/// A table with a header, at most `width` characters wide if columns can shrink that far; no trailing spaces.
 pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>) -> String {
     let natural = |at: usize| {
         let cells = rows.iter().filter_map(|row| row.get(at)).map(Cell::width);
@@ -63,7 +64,7 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
     };
     let mut widths: Vec<usize> = (0..columns.len()).map(natural).collect();
     if let Some(width) = width {
-        give_way(columns, &mut widths, width);
+        shrink(columns, &mut widths, width);
     }
     let heads = columns.iter().map(|c| Cell::Text(c.head.to_owned()));
     let heads: Vec<Cell> = heads.collect();
@@ -91,8 +92,8 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
     out
 }
 
-/// Leaves out columns, in their order, until the least widths of the others fit; then shrinks these, in theirs.
-fn give_way(columns: &[Column], widths: &mut [usize], room: usize) {
+/// Drops columns in their order until the minimum widths of the others fit; then shrinks those in their order.
+fn shrink(columns: &[Column], widths: &mut [usize], room: usize) {
     let excess = |widths: &[usize]| {
         let shown = widths.iter().filter(|width| **width > 0);
         let taken = shown.map(|width| width + GAP).sum::<usize>();
@@ -116,7 +117,7 @@ fn give_way(columns: &[Column], widths: &mut [usize], room: usize) {
     }
 }
 
-/// `text` in at most `width` characters, cut in its middle: the end of a name says more than its beginning.
+/// `text` in at most `width` characters, cut in the middle: the end of a name is more informative than its beginning.
 fn middle(text: &str, width: usize) -> String {
     let length = text.chars().count();
     if length <= width {
@@ -152,7 +153,7 @@ fn bars(numbers: &[u64], width: usize) -> String {
 }
 
 /// `lead` and `text` on lines of at most `width` characters, broken at spaces; all lines but the first are indented by
-/// `indent`. A word that is longer than a line has one for itself. Ends in a new line.
+/// `indent`. A word longer than a line gets its own. Ends with a newline.
 pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) -> String {
     let mut out = lead.to_owned();
     let mut used = lead.chars().count();
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_shrink_and_vanish_in_their_order() {
+    fn columns_shrink_and_are_dropped_in_order() {
         let columns = [
             Column {
                 head: "topic",
@@ -232,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn long_lines_hang_below_their_lead() {
+    fn long_lines_have_a_hanging_indent() {
         let at = |width| hang("00:01  ", "/a started: publishes b", 7, width);
         assert_eq!(at(None), "00:01  /a started: publishes b\n");
         assert_eq!(at(Some(18)), "00:01  /a started:\n       publishes b\n");

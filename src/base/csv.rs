@@ -8,8 +8,8 @@ use csv::{ReaderBuilder, Terminator, WriterBuilder};
 use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, span};
 use super::words::visible;
 
-/// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
-/// `Infinity` as Python's and JavaScript's readers take them; an unknown value is empty.
+/// Writes a table: the column names, then one row per line. Lists are written as JSON with `NaN` and `Infinity`, which
+/// Python and JavaScript accept; unknown values are empty.
 pub(crate) struct CsvRows<W: Write> {
     writer: csv::Writer<W>,
     field: Vec<u8>,
@@ -52,7 +52,7 @@ impl<W: Write> CsvRows<W> {
     }
 }
 
-/// The system's error inside one of the writer's, so that a closed pipe is known as one.
+/// The I/O error inside a writer's error, so that a closed pipe is recognized.
 fn cause(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(cause) => cause,
@@ -93,13 +93,13 @@ fn value(column: &TableColumn, at: usize, in_list: bool, to: &mut Vec<u8>) -> io
         ColumnValues::F64(v) if v[at].is_finite() => number(v[at], to),
         ColumnValues::F64(v) => odd(v[at], in_list, to),
         ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => bytes(v.get(at), to),
-        // Columns in which nothing is unknown are a message's fields.
+        // Columns without unknown values are message fields.
         ColumnValues::Texts(v) => text(v.get(at), in_list, column.valid.is_none(), to),
         ColumnValues::Words(v) => text(v.get(at), in_list, column.valid.is_none(), to),
     }
 }
 
-/// The shortest digits that give the number back; very large and very small ones with an exponent.
+/// The shortest digits that round-trip; very large and very small numbers with an exponent.
 fn number(value: f64, to: &mut Vec<u8>) -> io::Result<()> {
     let size = value.abs();
     if value == 0.0 || (1e-5..1e17).contains(&size) {
@@ -146,12 +146,12 @@ fn text(text: &[u8], in_list: bool, is_data: bool, to: &mut Vec<u8>) -> io::Resu
     Ok(())
 }
 
-/// A small table of texts as text: the names of the columns, then a row a line.
+/// A small table of texts as CSV: the column names, then one row per line.
 pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = WriterBuilder::new()
         .terminator(Terminator::Any(b'\n'))
         .from_writer(Vec::new());
-    // Writing to memory cannot fail, and rows are as long as the head.
+    // Writing to memory cannot fail, and rows are as long as the header.
     let _ = writer.write_record(columns);
     for row in rows {
         let _ = writer.write_record(row.iter().map(|text| cell(text, false).into_owned()));
@@ -160,9 +160,9 @@ pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// A text as it may stand in a cell: control characters are shown, not obeyed, unless it is a message's own `data`, and
-/// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none
-/// of these signs.
+/// A text that is safe in a cell: control characters are escaped unless it is a message's own `data`, and what a
+/// spreadsheet would interpret as a formula is prefixed with `'` (OWASP, *CSV Injection*). ROS names begin with none of
+/// these characters.
 pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
     let signs = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
     let is_number = || !text.starts_with('+') && text.parse::<f64>().is_ok();
@@ -178,7 +178,8 @@ pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
 /// A row with its line, ≥ 1.
 pub(crate) type CsvRow = (usize, Vec<String>);
 
-/// Every row of a text with its line, ≥ 1, the head among them; rows may differ in length, and empty lines are skipped.
+/// Every row of a text, including the header, with its line, ≥ 1; rows may differ in length, and empty lines are
+/// skipped.
 ///
 /// # Errors
 /// The line, and what is wrong there.
@@ -212,7 +213,7 @@ mod tests {
     use crate::base::table::TableCell;
 
     #[test]
-    fn no_cell_is_a_formula() {
+    fn formulas_in_cells_are_escaped() {
         for (text, shown) in [
             ("=cmd|'/c calc'!A1", "'=cmd|'/c calc'!A1"),
             ("@SUM(A1)", "'@SUM(A1)"),
@@ -231,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_quoted_where_they_must_be() {
+    fn cells_are_quoted_if_necessary() {
         let mut batch = Batch::new(&[
             ("a", ColumnKind::Text),
             ("b", ColumnKind::Text),

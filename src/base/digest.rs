@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_policy_names_the_digest() {
+    fn a_policy_contains_the_digest() {
         // The digest of nothing, from FIPS 180-4's examples.
         assert_eq!(
             policy(""),
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     #[cfg(any(feature = "cli", feature = "parquet"))]
-    fn hex_begins_where_the_digest_does() {
+    fn hex_is_a_prefix_of_the_digest() {
         assert_eq!(hex("", 12), "e3b0c44298fc");
     }
 

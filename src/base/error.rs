@@ -1,10 +1,10 @@
-//! The error type of the crate: the cause, with the path, the value, and the way out.
+//! The error type of the crate: the cause, with the path, the value, and advice.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The reason why a command failed. `Display` is one sentence without a period; [`Error::hint`] is the way out, printed
+/// The reason why a command failed. `Display` is one sentence without a period; [`Error::hint`] is advice printed
 /// after it.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -18,8 +18,8 @@ pub enum Error {
         /// The system's error.
         source: io::Error,
     },
-    /// A store or a server refused to give an object, or could not be reached: nothing is wrong with the bag, and what
-    /// was read of it does not count.
+    /// A store or server refused an object or could not be reached: the bag may be intact, and partial results are
+    /// discarded.
     Remote {
         /// The object.
         url: String,
@@ -32,7 +32,7 @@ pub enum Error {
     UnknownBag {
         /// The file or folder.
         path: PathBuf,
-        /// The kind of file that it is instead, as far as known: `empty`, `a git-LFS pointer`, …
+        /// What the file is instead, if known: `empty`, `a git-LFS pointer`, …
         looks_like: String,
         /// Advice for the user.
         hint: String,
@@ -43,7 +43,7 @@ pub enum Error {
         path: PathBuf,
         /// The place of the damage, in bytes from the file's start.
         offset: u64,
-        /// The content that should be there.
+        /// The expected content.
         expected: String,
         /// Advice for the user.
         hint: String,
@@ -57,7 +57,7 @@ pub enum Error {
         /// Advice for the user.
         hint: String,
     },
-    /// A bag, or the part of it that was asked for, holds no message.
+    /// A bag, or the requested part of it, contains no message.
     NoMessages {
         /// The bag.
         path: PathBuf,
@@ -68,7 +68,7 @@ pub enum Error {
     BadFile {
         /// The file.
         path: PathBuf,
-        /// The line, ≥ 1; 0 where none can be named.
+        /// The line, ≥ 1; 0 if unknown.
         line: usize,
         /// The mistake.
         reason: String,
@@ -79,7 +79,7 @@ pub enum Error {
     BadExpectation {
         /// The file.
         path: PathBuf,
-        /// The line, ≥ 1; 0 where none can be named.
+        /// The line, ≥ 1; 0 if unknown.
         line: usize,
         /// The character in the line, ≥ 1.
         column: usize,
@@ -88,7 +88,7 @@ pub enum Error {
         /// Advice for the user.
         hint: String,
     },
-    /// A requested value that makes no sense. Exit code 2.
+    /// An invalid request. Exit code 2.
     Usage {
         /// The mistake, with the value.
         what: String,
@@ -99,7 +99,7 @@ pub enum Error {
     Interrupted,
     /// Something could not be drawn or written.
     Output {
-        /// The file that was to be written, or the thing that was to be made.
+        /// The file or object that was to be written.
         path: PathBuf,
         /// The reason for the failure.
         reason: String,
@@ -122,7 +122,7 @@ impl Error {
         }
     }
 
-    /// An [`Error::Usage`] for a value that makes no sense.
+    /// An [`Error::Usage`] for an invalid value.
     pub fn usage(what: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Usage {
             what: what.into(),
@@ -130,7 +130,7 @@ impl Error {
         }
     }
 
-    /// Advice for the user; empty where nothing helps.
+    /// Advice for the user; empty if there is none.
     pub fn hint(&self) -> String {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),

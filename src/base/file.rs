@@ -1,4 +1,4 @@
-//! Reads files of the user's within a limit: a device or a pipe has no known length and may never end.
+//! Reads the user's files up to a limit: a device or a pipe has no known length and may never end.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -6,13 +6,13 @@ use std::path::Path;
 
 use super::error::{Error, Result};
 
-/// The number of bytes by which a file is told to be no text, before the rest is read.
+/// The number of first bytes checked for text before the rest is read.
 const HEAD: u64 = 4096;
 
 /// The bytes of a file of at most `limit` bytes.
 ///
 /// # Errors
-/// [`Error::Io`] where it cannot be read, [`Error::BadFile`] where it is longer.
+/// [`Error::Io`] if it cannot be read, [`Error::BadFile`] if it is longer.
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     read_if(path, limit, |_| Ok(()))
 }
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_without_an_end_is_too_long() {
+    fn an_endless_file_is_too_long() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("style.toml");
         std::fs::write(&path, "1234").unwrap();
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_is_told() {
+    fn binary_files_are_rejected_early() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("latin1.toml");
         std::fs::write(&path, b"t = 'gr\xfc\xdfe'").unwrap();
@@ -100,7 +100,7 @@ mod tests {
             error.contains("latin1.toml") && error.contains("UTF-8"),
             "{error}"
         );
-        // Gigabytes are allowed for a mission, and not read for what is none.
+        // A mission may have gigabytes, but other files are rejected early.
         #[cfg(unix)]
         assert!(read_text(Path::new("/dev/zero"), u64::MAX).is_err());
     }

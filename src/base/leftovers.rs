@@ -1,5 +1,5 @@
-//! The register of files and folders with temporary names, which are removed should a signal end the process before
-//! their owners do.
+//! The register of temporary files and folders, which are removed if a signal ends the process before their owners
+//! remove them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The paths to remove, also after a panic elsewhere: a set of paths is never half-changed.
+/// The paths to remove; a panic elsewhere cannot leave the set inconsistent.
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file or folder with a temporary name, registered from before it is made until its owner has removed or renamed it.
+/// A temporary file or folder, registered from before its creation until its owner has removed or renamed it.
 #[derive(Debug)]
 pub(crate) struct Leftover(PathBuf);
 
 impl Leftover {
-    /// Remembers `path`.
+    /// Registers `path`.
     pub(crate) fn at(path: &Path) -> Self {
         all().insert(path.to_owned());
         Self(path.to_owned())
@@ -31,10 +31,10 @@ impl Drop for Leftover {
 }
 
 #[cfg(feature = "cli")]
-/// Removes all that are registered, just before the process ends.
+/// Removes all registered paths just before the process ends.
 pub(crate) fn remove() {
     for path in all().iter() {
-        // Nothing more can be done about a path that is gone or cannot be removed.
+        // Nothing can be done about a path that cannot be removed.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
 }
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_still_remembered_is_removed() {
+    fn registered_paths_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let place = |name: &str| folder.path().join(name);
         std::fs::write(place("half"), "").unwrap();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// The node that writes `graph.mcap`: its topics are about the robot and not part of it.
 pub(crate) const OWN_NODE: &str = "/_bagreel";
-/// The node that stands for all unknown publishers and subscribers in `graph.mcap`.
+/// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
 pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
 
 macro_rules! name {
@@ -15,7 +15,7 @@ macro_rules! name {
         pub struct $type(Arc<str>);
 
         impl $type {
-            /// The name as recorded; may hold anything, so escape it where it is written.
+            /// The name as recorded; may contain any characters, so escape it in output.
             pub fn as_str(&self) -> &str {
                 &self.0
             }
@@ -61,7 +61,7 @@ name! {
     TopicName
 }
 
-/// The namespace of a resolved name: all before its last slash, `/` for a name at the root.
+/// The namespace of a resolved name: the part before its last slash, `/` for a name at the root.
 pub fn namespace(name: &str) -> &str {
     match name.rfind('/') {
         Some(0) | None => "/",
@@ -92,7 +92,7 @@ pub fn is_recorder(node: &str) -> bool {
         || last.starts_with("_ros2cli_")
 }
 
-/// Whether a node or topic is left out by default: log, clock, parameters, statistics, recorder events.
+/// Whether a node or topic is hidden by default: log, clock, parameters, statistics, recorder events.
 pub fn is_quiet(name: &str) -> bool {
     const EXACT: [&str; 5] = [
         "/rosout",
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn players_and_recorders_are_known_by_their_names() {
+    fn players_and_recorders_are_recognized_by_name() {
         assert!(is_player("/play_1795170682045") && is_player("/rosbag2_player"));
         assert!(!is_player("/play_music"));
         assert!(is_recorder("/record_1795170682045") && is_recorder("/rosbag2_recorder"));
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn names_split_at_their_last_slash() {
+    fn names_split_at_the_last_slash() {
         assert_eq!((namespace("/a/b/c"), last_part("/a/b/c")), ("/a/b", "c"));
         assert_eq!((namespace("/a"), last_part("/a")), ("/", "a"));
         assert_eq!((namespace("a"), last_part("a")), ("/", "a"));

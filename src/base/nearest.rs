@@ -1,15 +1,15 @@
-//! The name that somebody may have meant: the nearest by letters inserted, left out or exchanged.
+//! Suggestions for misspelled names: the nearest by edit distance.
 
-/// The most letters in which two names may differ: names that differ in more mean something else.
+/// The largest edit distance of a suggestion: names that differ in more mean something else.
 const MOST: usize = 2;
 /// The most characters of a name that are compared.
 const LONGEST: usize = 200;
 
-/// The known name nearest to `name`, the first of several; `None` if it is known itself or none comes close.
+/// The known name nearest to `name`, the first of several; `None` if it is known itself or none is close.
 pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let apart = known.map(|other| (distance(name, other), other));
     let (distance, other) = apart.min()?;
-    // Of a short name two letters are too much.
+    // In a short name, two letters are too many.
     let most = MOST.min(name.chars().count().div_ceil(3));
     (1..=most).contains(&distance).then_some(other)
 }
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slip_of_the_keyboard_is_found() {
+    fn typos_are_matched() {
         let known = ["/robot1/scan", "/robot1/odom", "/tf"];
         assert_eq!(
             nearest("/robot1/scna", known.into_iter()),

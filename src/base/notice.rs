@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::budget::NOTICES;
 
-/// The subject of a notice. The word in JSON is [`NoticeKind::word`].
+/// The kind of a notice. Its name in JSON is [`NoticeKind::word`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum NoticeKind {
@@ -12,23 +12,23 @@ pub enum NoticeKind {
     Damaged,
     /// The bag's end is missing. The command exits 3.
     Truncated,
-    /// The bag was read another way than by its index, for the reason given; nothing was lost.
+    /// The bag was not read by its index, for the reason given; nothing was lost.
     Downgraded,
-    /// A bag that a tool rewrote, so that its headers name false publishers.
+    /// A tool rewrote the bag, so its headers name wrong publishers.
     Rewritten,
-    /// A bag that was recorded while another was played back.
+    /// The bag was recorded while another was played back.
     Playback,
-    /// A payload that does not have the layout its type promises.
+    /// A payload without the layout that its type defines.
     Undecodable,
-    /// Messages set aside because their time is impossible. The command exits 3: they are in no count.
+    /// Messages with an impossible time, excluded from all counts. The command exits 3.
     ImpossibleTime,
-    /// Something that the picture leaves out or collapses, and how to see it.
+    /// Something that the picture hides or collapses, and how to show it.
     Hidden,
     /// A choice made for the user, such as the period.
     Chosen,
     /// A character that the bundled font lacks.
     Glyph,
-    /// Anything else worth saying.
+    /// Any other note.
     Note,
 }
 
@@ -38,7 +38,7 @@ impl NoticeKind {
         matches!(self, Self::Damaged | Self::Truncated | Self::ImpossibleTime)
     }
 
-    /// Whether it belongs to a normal run: what the picture leaves out, what was chosen for the user.
+    /// Whether it belongs to a normal run: hidden elements and automatic choices.
     pub fn is_routine(self) -> bool {
         matches!(self, Self::Hidden | Self::Chosen | Self::Glyph)
     }
@@ -57,12 +57,12 @@ impl NoticeKind {
         Self::Note,
     ];
 
-    /// The kind of this word in JSON.
+    /// The kind with this name in JSON.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 
-    /// The word of a kind in JSON.
+    /// The kind's name in JSON.
     pub fn word(self) -> &'static str {
         match self {
             Self::Damaged => "damaged",
@@ -83,11 +83,11 @@ impl NoticeKind {
 /// One message to the user about a bag or the output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice {
-    /// The subject.
+    /// The kind.
     pub kind: NoticeKind,
-    /// The number of times that it happened, ≥ 1.
+    /// The number of occurrences, ≥ 1.
     pub count: u64,
-    /// One sentence, lower case, no period; names in it are as recorded, so escape it where it is written.
+    /// One sentence, lower case, no period; names in it are as recorded, so escape it in output.
     pub text: String,
 }
 
@@ -102,7 +102,7 @@ impl Notice {
     }
 }
 
-/// Notices in order of kind and text, equal ones counted. Bounded: a hostile bag cannot fill memory with them.
+/// Notices sorted by kind and text, equal ones counted. Bounded, so a hostile bag cannot exhaust memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Notices(BTreeMap<(NoticeKind, String), u64>);
 
@@ -112,7 +112,7 @@ impl Notices {
         Self::default()
     }
 
-    /// Adds a notice; an equal one only counts up.
+    /// Adds a notice, or increases the count of an equal one.
     pub fn add(&mut self, notice: Notice) {
         let full = self.0.len() >= NOTICES;
         let key = (notice.kind, notice.text);
@@ -138,7 +138,7 @@ impl Notices {
         })
     }
 
-    /// All notices but those of one kind.
+    /// All notices except those of one kind.
     #[must_use]
     pub fn without(&self, kind: NoticeKind) -> Self {
         let mut rest = self.clone();
@@ -146,7 +146,7 @@ impl Notices {
         rest
     }
 
-    /// Whether any notice says that data was skipped.
+    /// Whether any notice reports skipped data.
     pub fn any_loss(&self) -> bool {
         self.0.keys().any(|(kind, _)| kind.is_loss())
     }

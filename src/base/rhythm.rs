@@ -1,18 +1,18 @@
-//! Every threshold of time by which lives, silences, rates and hand-overs are found, each with its reason.
+//! All time thresholds for detecting lifetimes, silences, rates and hand-overs, each with its reason.
 //!
-//! Times are nanoseconds. What decides that something happened stands here; where a drawing needs room, and how long a
-//! window is, does not.
+//! Times are in nanoseconds. Only thresholds that decide whether something happened belong here, not drawing sizes or
+//! window lengths.
 
 /// A second.
 const SECOND: i64 = 1_000_000_000;
 
 // ---- A rhythm, and its end.
 
-/// The fewest messages, or signs, that show a rhythm: with fewer, one late message is half of what is known.
+/// The fewest messages that establish a rhythm: with fewer, one late message is half of the evidence.
 pub(crate) const FEWEST: u64 = 5;
 /// The number of usual intervals of silence that break a rhythm; one or two messages are lost now and then.
 pub(crate) const BREAK: i64 = 5;
-/// The shortest silence that breaks a rhythm: a recorder that starts or stops writes its topics up to a second apart.
+/// The shortest silence that breaks a rhythm: at its start and end a recorder writes topics up to a second apart.
 pub(crate) const BREAK_NS: i64 = 2 * SECOND;
 /// The silence that breaks a rhythm with pauses, as a multiple of the longest of them.
 pub(crate) const UNUSUAL: i64 = 3;
@@ -40,17 +40,17 @@ pub(crate) fn broken_after(usual: i64) -> i64 {
 
 // ---- The clock of the recorder.
 
-/// The longest time by which a message is recorded out of order; 374 of 1,586 public bags have such messages, by
-/// milliseconds.
+/// The longest time by which a message is recorded out of order; 374 of 1,586 public bags have such messages,
+/// milliseconds late.
 pub(crate) const OUT_OF_ORDER_NS: i64 = SECOND;
-/// The share, in per cent, of the connections that speak again whose time falls when a clock is set back. Where a script
-/// wrote one topic behind the other, or by the messages' own stamps, few do.
+/// The percentage of connections that publish again whose time goes back when a clock is set back. If a script wrote
+/// one topic after the other, or by header stamps, few do.
 pub(crate) const RUN_SHARE: u64 = 80;
-/// The fewest messages behind the fall: fewer are records out of order.
+/// The fewest messages after the step back: fewer are records out of order.
 pub(crate) const RUN_FEWEST: u64 = 10;
 
-/// The share, in per cent, of the senders that should send which fall silent together when nothing is recorded, and the
-/// fewest of them: fewer may have one cause on the robot.
+/// The percentage of active senders that fall silent together when recording pauses, and the fewest of them: fewer may
+/// have a common cause on the robot.
 pub(crate) const PAUSE_SHARE: u64 = 80;
 pub(crate) const PAUSE_FEWEST: u64 = 3;
 
@@ -74,18 +74,19 @@ pub(crate) const DISCOVERY_NS: i64 = 2 * SECOND + SECOND / 2;
 pub(crate) const REGISTRATION_NS: i64 = SECOND;
 /// The longest time from a node's start to its first message on a topic that counts as advertised at the start.
 pub(crate) const ADVERTISED_NS: i64 = 5 * SECOND;
-/// The longest time for which a node that was asked to end may still send.
+/// The longest time for which a node may still send after a shutdown request.
 pub(crate) const SHUTDOWN_NS: i64 = SECOND / 2;
-/// The last part of a mission: what ends in it ended because the robot was switched off, node by node.
+/// The last part of a mission, in which elements end because the robot is shut down node by node.
 pub(crate) const CLOSING_NS: i64 = 5 * SECOND;
 
 // ---- Gaps, and steps of a rate.
 
 /// The fewest intervals that show a rate.
 pub(crate) const FEWEST_INTERVALS: usize = 5;
-/// The length of a gap as a multiple of the usual interval on both of its sides; one or two lost messages are no gap.
+/// The length of a gap as a multiple of the usual interval on both of its sides; one or two lost messages are not a
+/// gap.
 pub(crate) const GAP: i64 = 5;
-/// The shortest gap: shorter pauses are the scheduler's.
+/// The shortest gap: shorter pauses are scheduling jitter.
 pub(crate) const GAP_NS: i64 = SECOND;
 /// The ratio of medians below which rates are the same: the least that `--rate-change` can usefully show.
 pub(crate) const SAME_RATE: f64 = 1.1;
@@ -93,22 +94,22 @@ pub(crate) const SAME_RATE: f64 = 1.1;
 pub(crate) const EVEN: f64 = 1.8;
 /// The fewest messages of a rate that is an event: five intervals.
 pub(crate) const FEWEST_OF_RATE: u64 = 6;
-/// The shortest time for which a rate holds that is an event.
+/// The shortest duration of a rate that is an event.
 pub(crate) const RATE_HOLDS_NS: i64 = 3 * SECOND;
-/// The longest pause of a sender while it takes another rate.
+/// The longest pause of a sender while it changes its rate.
 pub(crate) const RATE_PAUSE_NS: i64 = 5 * SECOND;
 
 // ---- Hand-overs.
 
-/// The fewest messages of a sender: one that sends less takes nothing over.
+/// The fewest messages of a sender that can take over a topic.
 pub(crate) const FEWEST_OF_SENDER: u64 = 3;
 /// The longest time for which a new sender begins before the old one stops.
 pub(crate) const OVERLAP_NS: i64 = 5 * SECOND;
-/// The longest time for which it begins after; any time later if the old one never sends again.
+/// The longest time by which it begins after that; unlimited if the old one never sends again.
 pub(crate) const TAKEN_NS: i64 = 60 * SECOND;
 /// The shortest time before the old one comes back.
 pub(crate) const BACK_NS: i64 = 5 * SECOND;
-/// The shortest time for which a larger share of a topic's messages holds.
+/// The shortest duration of a larger share of a topic's messages.
 pub(crate) const SHARE_HOLDS_NS: i64 = 5 * SECOND;
 
 // ---- What belongs together.

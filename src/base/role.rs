@@ -14,8 +14,9 @@ const NUMBERED: [&str; 4] = [
     "/_ros2cli_daemon",
 ];
 
-/// The name without an anonymous suffix: `/x_1234_1611234567890` (rospy), `/x_1611234567890123456` (roscpp) and
-/// `/launch_ros_1234` (ROS 2) are `/x` and `/launch_ros`.
+/// The name without an anonymous suffix: `/x` for `/x_1234_1611234567890` (rospy) and `/x_1611234567890123456`
+/// (roscpp),
+/// `/launch_ros` for `/launch_ros_1234` (ROS 2).
 pub(crate) fn role(name: &str) -> &str {
     let Some((rest, last)) = name.rsplit_once('_') else {
         return name;
@@ -38,12 +39,12 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
 }
 
-/// Whether the rest of a name, without its suffix, is a name by itself.
+/// Whether a name without its suffix is still a valid name.
 fn ends_well(name: &str) -> bool {
     !name.is_empty() && !name.ends_with('/')
 }
 
-/// The time of the start in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
+/// The start time in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
 pub(crate) fn start(name: &str) -> Option<Stamp> {
     let (rest, number) = name.rsplit_once('_')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
@@ -62,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn anonymous_suffixes_are_folded() {
+    fn anonymous_suffixes_are_removed() {
         assert_eq!(role("/probe_9665_1795171273454"), "/probe");
         assert_eq!(role("/record_1795170682045487216"), "/record");
         assert_eq!(role("/r1/launch_ros_4711"), "/r1/launch_ros");
@@ -86,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn anonymous_names_hold_their_start() {
+    fn anonymous_names_contain_their_start() {
         let at = |name| start(name).map(|t| t.0);
         assert_eq!(
             at("/probe_9665_1795171273454"),

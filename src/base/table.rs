@@ -1,4 +1,4 @@
-//! A table in columns: every table that is written, whatever it holds and in whatever format.
+//! A columnar table, used for all tables in all output formats.
 
 use std::borrow::Cow;
 
@@ -44,12 +44,12 @@ pub(crate) use columns;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TextColumn {
     pub(crate) bytes: Vec<u8>,
-    /// The place behind the last byte of each text.
+    /// The end of each text.
     pub(crate) ends: Vec<i32>,
 }
 
 impl TextColumn {
-    /// Adds a text. More than 2 GB in all would not fit; a batch is written long before.
+    /// Adds a text. At most 2 GB fit; a batch is written long before.
     pub(crate) fn push(&mut self, text: &[u8]) {
         self.bytes.extend_from_slice(text);
         self.ends.push(length(self.bytes.len()));
@@ -67,7 +67,7 @@ impl TextColumn {
     }
 }
 
-/// Texts of which many are equal: each by its number among the different ones.
+/// Dictionary-encoded texts: each is stored by its number among the distinct ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct WordColumn {
     pub(crate) words: TextColumn,
@@ -174,14 +174,14 @@ impl ColumnValues {
     }
 }
 
-/// Behind the name of a list in a path of names.
+/// The suffix of a list's name in a path of names.
 pub(crate) const LIST: &str = "[]";
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
-    /// Whether the name is a path of structures with dots between them, where [`LIST`] stands behind lists.
+    /// Whether the name is a dotted path of structures, with [`LIST`] after the names of lists.
     pub(crate) is_nested: bool,
     pub(crate) kind: ColumnKind,
     pub(crate) values: ColumnValues,
@@ -237,7 +237,7 @@ impl TableColumn {
         ends.push(before.saturating_add(length(count)));
     }
 
-    /// Forgets all rows from `rows` on, the last one half-filled or not.
+    /// Removes all rows from `rows` on, including an incomplete last one.
     fn truncate(&mut self, rows: usize) {
         let mut len = rows;
         for ends in &mut self.lists {
@@ -255,7 +255,7 @@ impl TableColumn {
         ends + self.values.bytes() + self.valid.as_ref().map_or(0, Vec::len)
     }
 
-    /// Adds a cell, unknown where it is of another kind than the column.
+    /// Adds a cell; a cell of another kind than the column becomes unknown.
     pub(crate) fn push(&mut self, cell: &TableCell<'_>) {
         let is_known = match (&mut self.values, cell) {
             (ColumnValues::Flag(to), TableCell::Flag(value)) => {
@@ -309,12 +309,12 @@ impl<'a> TableCell<'a> {
         Self::Text(text.into())
     }
 
-    /// A number of things; `i64::MAX` if it is larger.
+    /// A count, saturating at `i64::MAX`.
     pub(crate) fn count(count: impl TryInto<i64>) -> Self {
         Self::Int(count.try_into().unwrap_or(i64::MAX))
     }
 
-    /// The cell that `cell` makes of a value, or an unknown cell.
+    /// The cell for a value, or an unknown cell.
     pub(crate) fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Self) -> Self {
         value.map_or(Self::Null, cell)
     }
@@ -372,7 +372,7 @@ impl Batch {
         self.rows += 1;
     }
 
-    /// The memory that its values take, in bytes.
+    /// The memory used by its values, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.columns.iter().map(TableColumn::bytes).sum()
     }
@@ -390,7 +390,7 @@ impl Batch {
     }
 }
 
-/// The places of the elements of list `at` in the level below.
+/// The range of the elements of list `at` in the level below.
 pub(crate) fn span(ends: &[i32], at: usize) -> std::ops::Range<usize> {
     let start = at.checked_sub(1).map_or(0, |before| place(ends[before]));
     start..place(ends[at])

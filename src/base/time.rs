@@ -9,18 +9,18 @@ use super::words;
 
 /// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
 ///
-/// Bags hold any value: 0, simulated time near 0, negative numbers. All of `i64` is allowed.
+/// Bags contain any value: 0, simulated time near 0, negative numbers. All of `i64` is allowed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Stamp(pub i64);
 
 const SECOND: i64 = 1_000_000_000;
 
 impl Stamp {
-    /// The earliest stamp that can be held.
+    /// The earliest stamp.
     pub const MIN: Self = Self(i64::MIN);
-    /// The latest stamp that can be held.
+    /// The latest stamp.
     pub const MAX: Self = Self(i64::MAX);
-    /// The latest stamp of a message: a half-open interval can still end behind it.
+    /// The latest stamp of a message: a half-open interval can still end after it.
     pub const LAST: Self = Self(i64::MAX - 1);
 
     /// The stamp of a ROS time, `secs` since 1970 and `nanos` on top (≥ 0; values of a second or more carry over).
@@ -28,18 +28,18 @@ impl Stamp {
         Self(secs as i64 * SECOND + nanos as i64)
     }
 
-    /// The stamp of an unsigned nanosecond count as MCAP writes it; past the year 2262 it stays at [`Stamp::LAST`].
+    /// The stamp of an unsigned nanosecond count as in MCAP; saturates at [`Stamp::LAST`] in the year 2262.
     pub fn from_nanos(nanos: u64) -> Self {
         Self(i64::try_from(nanos).unwrap_or(i64::MAX)).min(Self::LAST)
     }
 
-    /// `nanos` later (earlier if negative), held at the ends of the range.
+    /// `nanos` later (earlier if negative); saturates.
     #[must_use]
     pub const fn plus(self, nanos: i64) -> Self {
         Self(self.0.saturating_add(nanos))
     }
 
-    /// Nanoseconds from `earlier` to here, held at the ends of the range.
+    /// Nanoseconds since `earlier`; saturates.
     pub const fn since(self, earlier: Self) -> i64 {
         self.0.saturating_sub(earlier.0)
     }
@@ -63,9 +63,9 @@ impl fmt::Display for Stamp {
 /// A half-open interval `[start, end)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
-    /// The first moment inside.
+    /// The start, inclusive.
     pub start: Stamp,
-    /// The first moment after it; never before `start`.
+    /// The end, exclusive; never before `start`.
     pub end: Stamp,
 }
 
@@ -75,12 +75,12 @@ impl Span {
         Self { start, end }
     }
 
-    /// The time that two intervals share, in nanoseconds; 0 or less where they share none.
+    /// The overlap of two intervals in nanoseconds; 0 or less if there is none.
     pub(crate) fn shared(&self, other: Self) -> i64 {
         self.end.min(other.end).since(self.start.max(other.start))
     }
 
-    /// Some intervals, sorted, with those joined that overlap or are at most `gap` nanoseconds apart.
+    /// Sorts intervals and joins those that overlap or are at most `gap` nanoseconds apart.
     pub(crate) fn joined(mut spans: Vec<Self>, gap: i64) -> Vec<Self> {
         spans.sort_unstable_by_key(|span| (span.start, span.end));
         let mut all: Vec<Self> = Vec::new();
@@ -176,8 +176,7 @@ fn to_nanos(secs: f64) -> Option<i64> {
     (nanos.is_finite() && nanos < 9.2e18).then_some(nanos as i64)
 }
 
-/// The smallest length of time that people count in and that is at least `least` nanoseconds: 1 ms, 2 ms, … 6 h, and whole
-/// days.
+/// The smallest round length of time that is at least `least` nanoseconds: 1 ms, 2 ms, … 6 h, and whole days.
 pub(crate) fn round_length(least: i64) -> i64 {
     const STEPS: [i64; 24] = [
         SECOND / 1000,
@@ -210,7 +209,7 @@ pub(crate) fn round_length(least: i64) -> i64 {
     found.unwrap_or_else(|| ((least - 1) / DAY + 1).saturating_mul(DAY))
 }
 
-/// A moment on the axis of a bag, as `--start` and `--end` take it.
+/// A point in time relative to a bag, as in `--start` and `--end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
     /// Nanoseconds after the bag's start.
@@ -234,7 +233,7 @@ impl Moment {
         }
     }
 
-    /// The point in time that it means in a bag that covers `bag`.
+    /// The point in time that it denotes in a bag that covers `bag`.
     pub fn on(self, bag: Span) -> Stamp {
         match self {
             Self::AfterStart(n) => bag.start.plus(n),
@@ -249,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn periods_are_read_as_people_write_them() {
+    fn periods_are_parsed_in_all_forms() {
         let nanos = |t| Period::parse(t).map(Period::nanos);
         assert_eq!(nanos("60"), Some(60 * SECOND));
         assert_eq!(nanos("500ms"), Some(500_000_000));

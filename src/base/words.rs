@@ -1,6 +1,6 @@
-//! Spelling of numbers, times and names for people: everything that formats for a reader goes through here.
+//! Formatting of numbers, times and names for people: all human-readable output goes through here.
 //!
-//! Data files (JSON, CSV, Parquet) hold plain numbers instead.
+//! Data files (JSON, CSV, Parquet) contain plain numbers instead.
 
 use std::borrow::Cow;
 
@@ -69,7 +69,7 @@ pub fn significant(value: f64, digits: u8) -> f64 {
     }
     let power = f64::from(digits) - 1.0 - libm::floor(libm::log10(libm::fabs(value)));
     let scale = libm::pow(10.0, libm::fabs(power));
-    // Dividing by a power of ten keeps 0.3 what it is, where multiplying by 0.1 would not.
+    // Dividing by a power of ten keeps 0.3 exact, multiplying by 0.1 would not.
     if power >= 0.0 {
         libm::round(value * scale) / scale
     } else {
@@ -128,7 +128,7 @@ pub fn bytes(n: u64) -> String {
     }
 }
 
-/// A length of time as short as it can be said exactly: `10 s`, `1.5 s`, `2 min`, `500 ms`, `1 d`. For periods.
+/// An exact length of time in its shortest form: `10 s`, `1.5 s`, `2 min`, `500 ms`, `1 d`. For periods.
 pub fn period(nanos: i64) -> String {
     const DAY: i64 = 86_400 * SECOND;
     const HOUR: i64 = 3600 * SECOND;
@@ -143,7 +143,7 @@ pub fn period(nanos: i64) -> String {
     }
 }
 
-/// A measured length of time, rounded as people say it: `350 ms`, `5.3 s`, `5 min 26 s`, `2 h 5 min`, `3 d 4 h`.
+/// A measured length of time, rounded for people: `350 ms`, `5.3 s`, `5 min 26 s`, `2 h 5 min`, `3 d 4 h`.
 pub fn duration(nanos: i64) -> String {
     let two = |big: i64, unit: &str, small: i64, part: &str| match small {
         0 => format!("{big} {unit}"),
@@ -242,8 +242,8 @@ pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
     }
 }
 
-/// `text` with line ends, other control characters, invisible and direction marks written as `\u{…}`, so that it can
-/// neither steer a terminal nor hide or reverse the text beside it.
+/// `text` with line ends, other control characters, invisible and direction marks escaped as `\u{…}`, so that it can
+/// neither control a terminal nor hide or reverse adjacent text.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if !text.contains(is_invisible) {
         return Cow::Borrowed(text);
@@ -259,8 +259,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// JSON with the invisible characters of its texts as `\uXXXX`, for printing; JSON has such characters only inside
-/// texts.
+/// JSON with the invisible characters of its strings escaped as `\uXXXX`, for printing; they only occur in strings.
 pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     let is_plain = |byte: u8| matches!(byte, b' '..=b'~' | b'\n');
     if json.bytes().all(is_plain) || !json.contains(|c: char| c != '\n' && is_invisible(c)) {
@@ -279,8 +278,8 @@ pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Control characters, spaces other than the plain one, marks that change the text direction or join the characters
-/// around them, and numbers that are no character, which YAML and XML refuse.
+/// Control characters, spaces other than the plain one, direction marks, joiners, and noncharacters, which YAML and
+/// XML reject.
 pub fn is_invisible(c: char) -> bool {
     if (' '..='~').contains(&c) {
         return false;
@@ -297,7 +296,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_means_the_same_when_it_is_visible() {
+    fn visible_json_is_equivalent() {
         let name = "/a\u{9b}2J\u{202e}\u{e0001}ß\u{1b}";
         let json = serde_json::to_string_pretty(&[name]).unwrap();
         let shown = visible_json(&json);
@@ -306,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_is_spelled_in_one_way() {
+    fn formatting_is_consistent() {
         let minute = 60 * SECOND;
         let table = [
             (rate(0.0), "0 Hz"),

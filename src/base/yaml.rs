@@ -1,4 +1,4 @@
-//! YAML text as plain data, bounded against documents whose aliases unfold to far more than their size.
+//! YAML text as plain data, protected against documents whose aliases expand to far more than their size.
 
 #[cfg(feature = "cli")]
 mod placed;
@@ -15,11 +15,11 @@ pub(crate) use serde_json::Value;
 /// A mistake in a YAML document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct BadYaml {
-    /// The line, ≥ 1; 0 where none can be named.
+    /// The line, ≥ 1; 0 if unknown.
     pub(crate) line: usize,
-    /// The character in the line, ≥ 1; 0 where none can be named.
+    /// The character in the line, ≥ 1; 0 if unknown.
     pub(crate) column: usize,
-    /// The mistake, in the parser's words, one line.
+    /// The mistake, as reported by the parser, on one line.
     pub(crate) reason: String,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct BadYaml {
 ///
 /// # Errors
 /// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB or 250,000 values, or
-/// aliases that unfold past 100,000 of them.
+/// aliases that expand to more than 100,000 of them.
 pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
     read(text)
 }
@@ -58,12 +58,12 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
     })
 }
 
-/// A place in a document.
+/// A position in a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct YamlPlace {
-    /// The line, ≥ 1; 0 where none can be named.
+    /// The line, ≥ 1; 0 if unknown.
     pub(crate) line: usize,
-    /// The character in the line, ≥ 1; 0 where no line can be named.
+    /// The character in the line, ≥ 1; 0 if unknown.
     pub(crate) column: usize,
 }
 
@@ -76,7 +76,7 @@ impl From<Location> for YamlPlace {
     }
 }
 
-/// What the parser says, and what a user can do about it. What names Rust or the parser's options is never shown.
+/// The parser's messages and what a user can do about them. Messages about Rust or parser options are never shown.
 const MISTAKES: [(&str, &str); 12] = [
     ("budget", "it holds too many values, or nests them too deep"),
     (
@@ -119,14 +119,14 @@ const MISTAKES: [(&str, &str); 12] = [
     ("recursion", "it nests values too deep"),
 ];
 
-/// The mistake in words that a user can act on.
+/// The mistake as advice that a user can act on.
 fn reason(error: &serde_saphyr::Error) -> String {
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
     if let Some((_, words)) = MISTAKES.iter().find(|(said, _)| first.contains(said)) {
         return (*words).to_owned();
     }
-    // The place is shown already: `error: line 2 column 2: …`.
+    // The position is shown already: `error: line 2 column 2: …`.
     let plain = match first
         .strip_prefix("error: line ")
         .and_then(|rest| rest.split_once(": "))
@@ -153,7 +153,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn documents_become_plain_data() {
+    fn documents_are_parsed_to_plain_data() {
         let text = "a: 1\nb: [x, 2.5, true, null]\nc:\n  - d: 'yes'\n    e: \"0x10\"\n";
         let data = json!({"a": 1, "b": ["x", 2.5, true, null], "c": [{"d": "yes", "e": "0x10"}]});
         assert_eq!(parse(text), Ok(data));
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_in_words_that_help() {
+    fn mistakes_are_reported_with_advice() {
         let table = [
             ("a:\n\tb: 1\n", "a tab indents the line"),
             ("a: 1\na: 2\n", "the key `a` stands there twice"),
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_document_names_its_line() {
+    fn syntax_errors_have_a_line() {
         let bad = parse("a: 1\nb: [1, 2\nc: 3\n").unwrap_err();
         assert!(bad.line >= 2 && !bad.reason.is_empty(), "{bad:?}");
     }
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_document_past_the_limits_is_refused_in_words_of_ours() {
+    fn a_document_over_the_limits_is_refused_with_our_message() {
         let many = parse(&format!("[{}]", "a, ".repeat(400_000))).unwrap_err();
         assert!(many.reason.contains("too many values"), "{many:?}");
     }

@@ -1,14 +1,14 @@
-//! The messages found in a chunk, held until the index behind it has been read.
+//! The messages found in a chunk, held until the index that follows it has been read.
 
 use crate::bag::adapters::Gather;
 use crate::bag::model::{ConnectionId, Sink};
 use crate::base::time::Stamp;
 
-/// An index record behind a chunk.
+/// An index record after a chunk.
 pub(super) struct Behind {
     pub(super) id: ConnectionId,
     pub(super) count: u32,
-    /// The times of the messages, if they were asked for.
+    /// The times of the messages, if requested.
     pub(super) stamps: Vec<Stamp>,
 }
 
@@ -16,16 +16,16 @@ pub(super) struct Behind {
 #[derive(Default)]
 pub(super) struct ToldMessages {
     gather: Gather,
-    /// The number of messages of the bag that have been reported, or will be.
+    /// The number of messages of the bag that have been or will be reported.
     pub(super) messages: u64,
-    /// Whether the chunk is damaged, so that its index is believed instead.
+    /// Whether the chunk is damaged, so that its index is used instead.
     doubtful: bool,
-    /// Whether another record stood behind the chunk: it may have been a chunk, and the index records after it may be
-    /// its own.
+    /// Whether another record followed the chunk: it may have been a chunk, and the index records after it may be its
+    /// own.
     interrupted: bool,
-    /// Index records that disagree with the chunk.
+    /// Index records that contradict the chunk.
     behind: Vec<Behind>,
-    /// The number of messages that the index has and the chunk lacks; `surplus` is the number the other way round.
+    /// The number of messages in the index but not in the chunk; `surplus` is the converse.
     missing: u64,
     surplus: u64,
 }
@@ -45,7 +45,7 @@ impl ToldMessages {
         }
     }
 
-    /// Notes that a record behind the chunk is not part of its index.
+    /// Records that another record than its index followed the chunk.
     pub(super) fn interrupt(&mut self) {
         self.interrupted = true;
     }
@@ -62,7 +62,7 @@ impl ToldMessages {
         self.interrupted && !self.gather.holds(id, stamps)
     }
 
-    /// Notes an index record.
+    /// Adds an index record.
     pub(super) fn behind(&mut self, record: Behind) {
         let (found, count) = (self.gather.count(record.id), u64::from(record.count));
         self.missing += count.saturating_sub(found);
@@ -72,14 +72,13 @@ impl ToldMessages {
         }
     }
 
-    /// Reports all messages to `sink`; returns the number of those that only the index has, and of those that only the
-    /// chunk has. Where chunk and index disagree, the index is believed if the chunk is damaged or has lost more messages
-    /// than it has in excess.
+    /// Reports all messages to `sink`; returns how many were only in the index, and how many only in the chunk. If the
+    /// two disagree, the index is used if the chunk is damaged or lacks more messages than it has in excess.
     pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> (u64, u64) {
         let believed = self.doubtful || self.missing > self.surplus;
         let mut witnessed = 0;
         for record in self.behind.drain(..).filter(|_| believed) {
-            // What has been handed over already cannot be taken back.
+            // Messages that were already passed on cannot be taken back.
             let Some(found) = self.gather.take(record.id) else {
                 continue;
             };

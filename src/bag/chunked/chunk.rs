@@ -1,4 +1,4 @@
-//! One chunk of an indexed bag: by the index behind it, or record by record if that is missing or wrong.
+//! Reads one chunk of an indexed bag: by its index, or record by record if that is missing or wrong.
 
 use std::io;
 
@@ -17,7 +17,7 @@ use crate::base::time::Stamp;
 impl<G: Grammar> Query<'_, G> {
     /// Reports all stamps of `chunk` and the wanted parts of its messages to `sink`.
     pub(super) fn read(&self, chunk: &Chunk, sink: &mut dyn Sink) {
-        // Without an index here the bag has said elsewhere that the chunk is empty.
+        // A chunk without an index was stated to be empty elsewhere.
         let Some(promised) = &chunk.promised else {
             return;
         };
@@ -32,7 +32,7 @@ impl<G: Grammar> Query<'_, G> {
             let text = "chunks were read whole, since their index is missing or wrong";
             sink.notice(Notice::new(NoticeKind::Damaged, text));
             let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
-            self.told(&mut stream, Share::Whole, sink);
+            self.walked(&mut stream, Share::Whole, sink);
             return self.unnamed(chunk, sink);
         };
         let body = found.body.or_else(|| self.moved(chunk));
@@ -49,7 +49,7 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
-    /// Reads the chunks that stand behind `chunk` though the tail does not name them.
+    /// Reads the chunks after `chunk` that the tail does not list.
     fn unnamed(&self, chunk: &Chunk, sink: &mut dyn Sink) {
         let Ok(Some(body)) = self.body(chunk) else {
             return;
@@ -67,22 +67,22 @@ impl<G: Grammar> Query<'_, G> {
             };
             let body = self.body(&here).ok().flatten();
             if chunk.end < self.tail && body.is_some_and(|body| body.range.end > chunk.end) {
-                // The next chunk of the tail, named at a wrong place: there its index is found, and here its messages.
+                // The next listed chunk, listed at a wrong position: its index is found there, its messages here.
                 let mut stream = ByteStream::of_file(self.source, here.start, here.end, FAR);
-                return self.told(&mut stream, Share::Payloads, sink);
+                return self.walked(&mut stream, Share::Payloads, sink);
             }
-            self.told(&mut stream, Share::Whole, sink);
+            self.walked(&mut stream, Share::Whole, sink);
         }
     }
 
-    /// The index of a chunk that is far away, if it agrees with all that the tail says and no more is wanted: there the
-    /// head of the chunk would cost a request of its own.
+    /// The index of a remote chunk, if it agrees with the tail and no more is wanted: reading the head of the chunk
+    /// would cost another request.
     fn sufficient(&self, chunk: &Chunk, promised: &IndexSum) -> Option<Index> {
         let len = chunk.index.end - chunk.index.start;
         if !self.source.is_far() || len == 0 || len > LONGEST_INDEX {
             return None;
         }
-        // What cannot be had now is asked for again, and told then.
+        // What fails here is requested again later, and reported then.
         let index = self.index_at(chunk.index.start, len, promised).ok()??;
         let is_all = index.spans(chunk.first, chunk.last) && !self.wants_messages(&index);
         is_all.then_some(index)
@@ -97,14 +97,14 @@ impl<G: Grammar> Query<'_, G> {
         let body = self.body(chunk)?;
         let behind = body.as_ref().map(|body| body.range.end);
         let expected = || self.index_at(chunk.index.start, len, promised);
-        // What stands between a chunk and its index is no part of either.
+        // Bytes between a chunk and its index belong to neither.
         let mut place = Place::Expected;
         let mut index = None;
         if behind == Some(chunk.index.start) {
             index = expected()?;
         }
         if let (None, Some(behind)) = (&index, behind) {
-            // Behind a chunk there may be a gap, and headers may be longer than usual.
+            // After a chunk there may be a gap, and headers may be longer than usual.
             let most = (len * 2 + 4096).min(LONGEST_INDEX);
             let len = chunk.end.saturating_sub(behind).min(most);
             index = self.index_at(behind, len, promised)?;
@@ -117,7 +117,7 @@ impl<G: Grammar> Query<'_, G> {
         Ok(index.map(|index| Found { index, body, place }))
     }
 
-    /// Whether an index begins at `start`, if not the stated one.
+    /// Whether an index begins at `start`, even if not the stated one.
     fn is_index(&self, start: u64, end: u64) -> bool {
         let mut stream = ByteStream::of_file(self.source, start, end, GLANCE);
         matches!(G::next(&mut stream), Ok(RecordHead::Index { .. }))
@@ -130,7 +130,7 @@ impl<G: Grammar> Query<'_, G> {
         Ok(G::index(&bytes[..got], promised))
     }
 
-    /// The chunk's compression and the place of its body.
+    /// The chunk's compression and the position of its body.
     pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, GLANCE);
         let head = match G::next(&mut stream) {
@@ -144,7 +144,7 @@ impl<G: Grammar> Query<'_, G> {
         Ok(how.map(|how| ChunkBody { how, range }))
     }
 
-    /// The body of a chunk for which the tail names a place too early.
+    /// The body of a chunk whose position in the tail is too early.
     fn moved(&self, chunk: &Chunk) -> Option<ChunkBody> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
         let start = next_chunk::<G>(&mut stream, chunk.start).then(|| stream.position())?;
@@ -156,7 +156,7 @@ impl<G: Grammar> Query<'_, G> {
     }
 
     /// Reports the chunk at the position of `stream` to `sink`, record by record, and damage in it.
-    fn told(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
+    fn walked(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
         if let Err(why) = self.walk(stream, what, sink) {
             let text = format!("a chunk is damaged inside: {why}");
             sink.notice(Notice::new(NoticeKind::Damaged, text));
@@ -178,9 +178,9 @@ impl<G: Grammar> Query<'_, G> {
             gather: Gather::default(),
             sink,
         };
-        let told = unpack(stream, &head, &self.allowance, &mut walk);
+        let walked = unpack(stream, &head, &self.allowance, &mut walk);
         walk.gather.flush(walk.sink);
-        match told {
+        match walked {
             Ok(None) => Ok(()),
             Ok(Some(why)) => Err(why),
             Err(stop) => Err(stop.to_string()),
@@ -202,11 +202,11 @@ struct Found {
 /// The place of a chunk's index.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
-    /// Where the tail says, right behind the chunk.
+    /// At the stated position, right after the chunk.
     Expected,
-    /// Behind the chunk, and not where the tail says.
+    /// After the chunk, but not at the stated position.
     Behind,
-    /// Where the tail says, and not behind the chunk: the chunk has another length, or lies elsewhere.
+    /// At the stated position, but not after the chunk: the chunk has another length or position.
     Apart,
 }
 
@@ -214,7 +214,7 @@ enum Place {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Share {
     Whole,
-    /// Only the wanted payloads: the stamps are reported by an index elsewhere.
+    /// Only the wanted payloads: an index elsewhere reports the stamps.
     Payloads,
 }
 

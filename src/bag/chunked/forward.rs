@@ -21,7 +21,7 @@ const STRIDE: usize = 64 * 1024;
 #[derive(Debug, Default)]
 pub(super) struct ForwardScan {
     pub(super) compression: BTreeSet<Compression>,
-    /// Whether the bag has its end and nothing was skipped.
+    /// Whether the bag is not cut and nothing was skipped.
     pub(super) complete: bool,
 }
 
@@ -48,13 +48,13 @@ struct Forward<'s, G> {
     allowance: Arc<Allowance>,
     /// The number of messages that the bag states.
     total: Option<u64>,
-    /// Whether the end of the data was met.
+    /// Whether the end of the data was reached.
     ended: bool,
-    /// Whether messages stand in chunks: a chunk that was closed came before.
+    /// Whether messages are stored in chunks: a closed chunk was found.
     is_chunked: bool,
 }
 
-/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if it is not known.
+/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if unknown.
 pub(super) fn read<G: Grammar>(
     stream: &mut ByteStream<'_>,
     size: u64,
@@ -160,7 +160,7 @@ impl<G: Grammar> Forward<'_, G> {
         Ok(())
     }
 
-    /// Skips bytes that are not a record, from behind byte `from` up to the next chunk; returns whether there is one.
+    /// Skips bytes that are not a record, after byte `from` up to the next chunk; returns whether there is one.
     fn resume(&mut self, stream: &mut ByteStream<'_>, from: u64) -> bool {
         let found = next_chunk::<G>(stream, from);
         if found {
@@ -227,7 +227,7 @@ impl<G: Grammar> Forward<'_, G> {
         pass(stream, len)
     }
 
-    /// Reports the messages of the last chunk, once everything behind it has been read.
+    /// Reports the messages of the last chunk, once everything after it has been read.
     fn settle(&mut self) {
         let (mended, surplus) = self.told.settle(self.sink);
         if mended > 0 {
@@ -266,7 +266,7 @@ impl<G: Grammar> Forward<'_, G> {
         }
         let (kind, text) = match stop {
             NoRecord::End if self.ended || !G::HAS_END => return self.found,
-            // What is cut is the index, of which nothing was asked.
+            // Only the index is cut, which is not needed.
             NoRecord::End | NoRecord::Cut | NoRecord::Broken if self.ended => return self.found,
             NoRecord::End => (
                 NoticeKind::Truncated,
@@ -345,7 +345,7 @@ pub(super) fn peek_whole<'s>(
     Ok(bytes)
 }
 
-/// Goes to the beginning of the next chunk behind byte `from`; false if there is none before the end of the stream.
+/// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.
 pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>, from: u64) -> bool {
     if stream.position() <= from && !matches!(stream.skip(1), Ok(1)) {
         return false;

@@ -1,4 +1,4 @@
-//! A chunked bag that is still being written: each record once, as soon as all of it is there.
+//! A chunked bag that is still being written: each record once, as soon as it is complete.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
-/// The place in a growing bag up to which it has been read, and what was described before.
+/// The position up to which a growing bag has been read, and the connections described so far.
 struct GrowingChunks<G> {
     path: PathBuf,
     /// The first byte that has not been reported.
     at: u64,
     /// The size of the bag when it was last read.
     len: u64,
-    /// Whether the bag had its end and an index then.
+    /// Whether the bag had its end and an index at that time.
     is_closed: bool,
     grammar: G,
     connections: Connections,
@@ -87,14 +87,14 @@ impl<G: Grammar> GrowingChunks<G> {
         }
     }
 
-    /// Reports the records that have become whole.
+    /// Reports the records that have become complete.
     fn records(&mut self, source: &FileSource, sink: &mut dyn Sink) {
         let mut stream = ByteStream::of_file(source, self.at, self.len, FAR);
         if self.at == 0 {
             G::begin(&mut stream);
         }
         let mut gather = Gather::default();
-        // The reason why none follows is that it is not there yet; what is damaged is told when the bag is read whole.
+        // No record follows because it is not complete yet; damage is reported when the closed bag is read.
         let _ = walk(&mut stream, u64::MAX, |stream| {
             let mut records = Records {
                 bag: self,
@@ -117,11 +117,11 @@ struct Records<'a, G> {
 }
 
 impl<G: Grammar> Records<'_, G> {
-    /// Takes the next record, if all of it is there.
+    /// Takes the next record, if it is complete.
     fn next(&mut self, stream: &mut ByteStream<'_>) -> Result<(), NoRecord> {
         match G::next(stream)? {
-            // The chunk that is being written has no length yet: its records follow, and those of a compressed one cannot be
-            // read before it is closed.
+            // The open chunk has no length yet: its records follow, and if compressed they cannot be read before it is
+            // closed.
             RecordHead::Chunk(head) if head.unclosed => Err(NoRecord::Cut),
             RecordHead::Chunk(head) if head.packed == 0 && head.how == Some(Compression::None) => {
                 Ok(())

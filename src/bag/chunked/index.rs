@@ -1,4 +1,4 @@
-//! The index behind a chunk, reported to a sink; and wanted messages, picked out of the chunk's bytes.
+//! The index of a chunk, reported to a sink, and the wanted messages, picked from the chunk's bytes.
 
 use std::io;
 use std::marker::PhantomData;
@@ -15,7 +15,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 
-/// The sum that the index of a chunk should have, whatever the order of its entries.
+/// The expected checksum of a chunk's index, independent of the order of its entries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct IndexSum {
     pub(crate) connections: u32,
@@ -26,7 +26,7 @@ pub(crate) struct IndexSum {
 impl IndexSum {
     /// Adds `count` messages of the connection that the bag calls `raw`.
     pub(crate) fn add(&mut self, raw: u32, count: u32) {
-        // A multiplication by an odd number loses nothing; folding in its high bits tells sums of pairs apart.
+        // Multiplying by an odd number is invertible; folding in the high bits distinguishes sums of pairs.
         let pair = u64::from(raw) << 32 | u64::from(count);
         let spread = pair.wrapping_mul(0x9E37_79B9_7F4A_7C15);
         self.mix = self.mix.wrapping_add(spread ^ spread >> 29);
@@ -35,19 +35,19 @@ impl IndexSum {
     }
 }
 
-/// The step for picking records that lie close to each other: stays in a processor's cache.
+/// The step for picking records that lie close together: fits a processor's cache.
 const CLOSE: usize = 64 * 1024;
 
-/// A longer index, in bytes, is not held in memory; its chunk is walked instead.
+/// An index longer than this, in bytes, is not loaded; its chunk is walked instead.
 pub(crate) const LONGEST_INDEX: u64 = 16 << 20;
 
 /// The entries of a chunk's index.
 #[derive(Default)]
 pub(crate) struct Index {
-    /// The bag's own number for a connection, and the place of its entries.
+    /// A connection's number in the bag, and the range of its entries.
     runs: Vec<(u32, Range<usize>)>,
     stamps: Vec<Stamp>,
-    /// The place of each message, from the start of the chunk's plain bytes.
+    /// The position of each message, from the start of the chunk's plain bytes.
     offsets: Vec<u64>,
 }
 
@@ -59,7 +59,7 @@ impl Index {
             self.stamps.push(time);
             self.offsets.push(offset);
         }
-        // Recorders write the entries of a connection by time.
+        // Recorders sort the entries of a connection by time.
         if !self.offsets[start..].is_sorted() {
             let stamps = self.stamps.drain(start..).zip(self.offsets.drain(start..));
             let mut pairs: Vec<(Stamp, u64)> = stamps.collect();
@@ -71,7 +71,7 @@ impl Index {
         self.runs.push((raw, start..self.stamps.len()));
     }
 
-    /// The places in the chunk where time falls, in order.
+    /// The positions in the chunk where time goes back, in order.
     fn falls(&self) -> impl Iterator<Item = u64> + use<> {
         let mut falls = Vec::new();
         for (_, entries) in &self.runs {
@@ -136,7 +136,7 @@ impl ChunkBody {
     }
 }
 
-/// The parts of a bag that are asked for: the same for all of its chunks.
+/// The requested parts of a bag: the same for all of its chunks.
 pub(super) struct Query<'a, G> {
     pub(super) source: &'a FileSource,
     pub(super) allowance: Arc<Allowance>,
@@ -144,7 +144,7 @@ pub(super) struct Query<'a, G> {
     /// The wanted part of each message, by connection.
     pub(super) wants: &'a [Want],
     pub(super) range: Option<Span>,
-    /// The place behind the last chunk and its index.
+    /// The position after the last chunk and its index.
     pub(super) tail: u64,
     pub(super) grammar: PhantomData<fn() -> G>,
 }
@@ -170,7 +170,7 @@ impl<G: Grammar> Query<'_, G> {
                     nameless(sink, entries.len() as u64);
                     continue;
                 };
-                // Of entries outside the range they are not looked up, and no sink is reported of those.
+                // Sizes of entries outside the range are not looked up, and such entries are not reported.
                 let known = self.wants[id.0 as usize] > Want::Stamps;
                 let sizes = sizes.as_ref().filter(|_| known);
                 let sizes = sizes.map(|s| &s[entries.clone()]);
@@ -201,7 +201,7 @@ impl<G: Grammar> Query<'_, G> {
                 run,
             }));
         }
-        // A stable sort merges what is in order already: the entries of each connection.
+        // A stable sort merges sorted runs: the entries of each connection.
         all.sort_by_key(|w| w.offset);
         all
     }
@@ -218,7 +218,7 @@ impl<G: Grammar> Query<'_, G> {
         let mut missing = 0;
         let step = self.step(index, wanted);
         if let Some(body) = body.as_ref().filter(|_| self.source.is_far()) {
-            // What cannot be had now is asked for again, and told then.
+            // What fails here is requested again later, and reported then.
             let _ = self.source.expect(&ahead(body, wanted, step));
         }
         let plain = body.and_then(|b| b.plain(self.source, step, &self.allowance).ok());
@@ -252,7 +252,7 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
-    /// Reports one wanted message to `sink`; returns its size, or `None` if it is not there.
+    /// Reports one wanted message to `sink`; returns its size, or `None` if it is missing.
     fn pick(
         &self,
         stream: &mut ByteStream<'_>,
@@ -288,15 +288,15 @@ impl<G: Grammar> Query<'_, G> {
 /// A message to be fetched.
 struct Wanted {
     offset: u64,
-    /// The place of its entry in the index, and of the run that the entry is in.
+    /// The positions of its entry and of the entry's run in the index.
     entry: usize,
     run: usize,
 }
 
-/// The most messages of a chunk whose places are asked for at once.
+/// The most messages of a chunk that are prefetched at once.
 const MOST_AHEAD: usize = 256;
 
-/// The places of the beginnings of these messages, or of the whole chunk where they are packed.
+/// The ranges of the beginnings of these messages, or of the whole chunk if it is compressed.
 fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
     let Range { start, end } = body.range;
     let place = |offset: u64, length: u64| {
@@ -310,7 +310,7 @@ fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
     places.map(|one| place(one.offset, step as u64)).collect()
 }
 
-/// The most packed bytes that are asked for at once.
+/// The most compressed bytes that are prefetched at once.
 const MOST_PACKED: u64 = 4 << 20;
 
 /// The number of bytes to read at a time for these messages, in order: far if the next one lies in the next few pages.
@@ -340,7 +340,7 @@ pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
     });
 }
 
-/// Hands over the wanted part of the message at the position of `stream`, and passes over it.
+/// Passes on the wanted part of the message at the position of `stream`, and skips it.
 pub(super) fn hand_over(
     stream: &mut ByteStream<'_>,
     (connection, time, size): (ConnectionId, Stamp, u32),
@@ -358,7 +358,7 @@ pub(super) fn hand_over(
     super::record::pass(stream, u64::from(size))
 }
 
-/// Hands over the wanted part of a message that another reader holds.
+/// Passes on the wanted part of a message from another reader.
 pub(crate) fn hand_over_slice(
     whole: &[u8],
     (connection, time): (ConnectionId, Stamp),

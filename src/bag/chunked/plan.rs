@@ -37,9 +37,9 @@ impl Chunk {
 #[derive(Debug, Default)]
 pub(crate) struct ChunkPlan {
     pub(crate) connections: Connections,
-    /// The chunks in the order of the file, none twice, none over another.
+    /// The chunks in file order, without duplicates or overlaps.
     pub(crate) chunks: Vec<Chunk>,
-    /// The stated number of messages of each connection, by the bag's own number for it, chunk after chunk.
+    /// The stated message count per connection, by its number in the bag, chunk after chunk.
     pub(crate) counts: Vec<(u32, u32)>,
     /// The part of the file that holds the chunks.
     pub(crate) body: Range<u64>,
@@ -50,7 +50,7 @@ pub(crate) struct ChunkPlan {
 /// The most chunks that are planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
 pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 
-/// The most chunks that are all looked into to know the time that they cover.
+/// The most chunks that are all inspected to determine the covered time.
 pub(super) const MOST_LOOKED_INTO: usize = 512;
 
 /// The most message counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
@@ -66,8 +66,8 @@ impl ChunkPlan {
         start..self.counts.len()
     }
 
-    /// The messages that a chunk is stated to hold, per connection; `None` if a connection is not described or the
-    /// counts do not add up.
+    /// The stated message count of a chunk per connection; `None` if a connection is not described or the counts are
+    /// inconsistent.
     pub(super) fn lump(&self, chunk: &Chunk) -> Option<Vec<(ConnectionId, u64)>> {
         let counts = self.counts.get(chunk.counts.clone())?;
         let known = |(raw, count): &(u32, u32)| {
@@ -79,7 +79,7 @@ impl ChunkPlan {
         (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(lump)
     }
 
-    /// Whether `chunk` is stated to hold messages of a wanted connection; `false` if its counts are not kept.
+    /// Whether `chunk` is stated to contain messages of a wanted connection; `false` if its counts are not kept.
     pub(super) fn holds(&self, chunk: &Chunk, is_wanted: impl Fn(ConnectionId) -> bool) -> bool {
         let counts = self.counts.get(chunk.counts.clone());
         let mut counts = counts.into_iter().flatten();
@@ -92,8 +92,7 @@ impl ChunkPlan {
         self.chunks.iter().map(len).max().unwrap_or(0)
     }
 
-    /// The time covered: `read` looks into the chunks that are stated to be first and last, or into all if they are
-    /// few.
+    /// The covered time: `read` inspects the chunks stated to be first and last, or all of them if they are few.
     pub(super) fn span(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Option<Span> {
         let mut seen = Extremes::default();
         let full: Vec<&Chunk> = self.chunks.iter().filter(|c| c.holds_messages()).collect();
@@ -116,12 +115,12 @@ pub(crate) struct Unindexed {
     pub(crate) fault: Fault,
 }
 
-/// What the lack of an index says about the bag.
+/// What a missing or wrong index implies about the bag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
-    /// Nothing: it was never written.
+    /// No damage: the index was never written.
     Missing,
-    /// The head says that there was more.
+    /// The head states that the bag was longer.
     Cut,
     /// The index contradicts itself or the bag.
     Wrong,
@@ -143,10 +142,10 @@ impl Unindexed {
     }
 }
 
-/// The numbers of the connections that chunks are stated to hold messages of.
+/// The numbers of the connections that chunks are stated to contain.
 #[derive(Default)]
 pub(crate) struct Used {
-    /// Flags by number, up to the largest one of those that real bags use.
+    /// Flags by number, up to the largest that real bags use.
     small: Vec<bool>,
     large: BTreeSet<u32>,
 }

@@ -1,5 +1,5 @@
-//! The records of a chunked bag as a grammar reads them, the reasons why none follows, and the connections they
-//! describe.
+//! The records of a chunked bag as a grammar parses them, the reasons why no record follows, and the described
+//! connections.
 
 use std::collections::HashMap;
 use std::{fmt, io};
@@ -10,30 +10,30 @@ use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
 
-/// The head of a record; the stream stands behind it. `len` is the number of bytes that follow.
+/// The head of a record; the stream is positioned after it. `len` is the number of bytes that follow.
 #[derive(Debug)]
 pub(crate) enum RecordHead<D> {
     /// A chunk, whose body follows.
     Chunk(ChunkHead),
-    /// A message of the connection that the bag calls `raw`; its payload follows.
+    /// A message of the connection with the number `raw`; its payload follows.
     Message { raw: u32, time: Stamp, size: u32 },
     /// A description of connections.
     Description { what: D, len: u64 },
-    /// The number of messages of a connection that the chunk before it holds; their entries follow.
+    /// The number of messages of a connection in the previous chunk; their entries follow.
     Index { raw: u32, count: u32, len: u64 },
     /// The number of messages that the bag states.
     Total { messages: u64, len: u64 },
-    /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if it
-    /// is stated.
+    /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if
+    /// it is stated.
     DataEnd { len: u64, crc: Option<u32> },
     /// The end of the file: only the closing bytes of the bag follow.
     FileEnd { len: u64 },
-    /// A record that does not concern us.
+    /// A record that is ignored.
     Other { len: u64 },
-    /// A record that stands only behind the end of the data, and does not concern us.
+    /// An ignored record that only occurs after the end of the data.
     Tail { len: u64 },
-    /// A record of no kind that the format defines, or that cannot be of the kind that it states. An `extension` is of
-    /// a kind that the format leaves to its users.
+    /// A record of an undefined kind, or that cannot be of its stated kind. The format leaves `extension` kinds to its
+    /// users.
     Unknown { len: u64, extension: bool },
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct ChunkHead {
     pub(crate) how: Option<Compression>,
     /// The bytes of its body in the file.
     pub(crate) packed: u64,
-    /// The bytes behind the body that belong to the chunk.
+    /// The bytes after the body that belong to the chunk.
     pub(crate) padding: u64,
     /// The stated number of bytes of its records.
     pub(crate) plain: u64,
@@ -72,7 +72,7 @@ pub(crate) struct ChunkHead {
     pub(crate) times: Option<(Stamp, Stamp)>,
     /// Whether it is marked as a record of another kind.
     pub(crate) misnamed: bool,
-    /// Whether the recorder was killed before it wrote the lengths; the body goes on to the end.
+    /// Whether the recorder was killed before it wrote the lengths; the body extends to the end.
     pub(crate) unclosed: bool,
 }
 
@@ -109,8 +109,8 @@ impl fmt::Display for NoRecord {
     }
 }
 
-/// Takes records up to byte `end` of `stream`, one at each step; returns why they end. A step that takes no byte ends the
-/// walk too: whatever a bag says, no walk through it has more steps than the bag has bytes.
+/// Takes records up to byte `end` of `stream`, one per step; returns why they end. A step that consumes no byte ends
+/// the walk too, so no walk through a bag has more steps than the bag has bytes.
 pub(crate) fn walk<'a>(
     stream: &mut ByteStream<'a>,
     end: u64,
@@ -127,7 +127,7 @@ pub(crate) fn walk<'a>(
     NoRecord::End
 }
 
-/// Passes over `len` bytes, which must be there: if the length leads out of the file, nothing is passed.
+/// Skips `len` bytes, which must exist: if the length exceeds the file, nothing is skipped.
 pub(crate) fn pass(stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
     if stream.left().is_some_and(|left| left < len) {
         return Err(NoRecord::Cut);
@@ -146,7 +146,7 @@ pub(crate) struct Connections {
 }
 
 impl Connections {
-    /// The connection that the bag calls `raw`.
+    /// The connection with the number `raw`.
     pub(crate) fn get(&self, raw: u32) -> Option<ConnectionId> {
         self.ids.get(&raw).copied()
     }
@@ -156,8 +156,8 @@ impl Connections {
         &self.list
     }
 
-    /// Adds a connection under the next free id; returns it if it is new. A second one of the same number is passed
-    /// over, as every reader does.
+    /// Adds a connection under the next free id; returns it if it is new. A second one with the same number is ignored,
+    /// as in every reader.
     pub(crate) fn add(&mut self, raw: u32, connection: Connection) -> Option<&Connection> {
         if self.ids.contains_key(&raw) || self.list.len() >= CONNECTIONS {
             return None;

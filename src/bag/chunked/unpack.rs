@@ -30,12 +30,12 @@ pub(super) trait Visitor<G: Grammar> {
     }
 }
 
-/// Hands over the records of the chunk whose body is next in `stream`, and goes to its end. Returns what is wrong with
+/// Visits the records of the chunk whose body is next in `stream`, and goes to its end. Returns what is wrong with
 /// them, if anything.
 ///
 /// # Errors
-/// Fails where the file ends first or cannot be read on. If a chunk is stated to go on beyond the file, the stream then
-/// stands where its records end.
+/// Fails if the file ends first or cannot be read. If a chunk is stated to exceed the file, the stream is then at the
+/// end of its records.
 pub(super) fn unpack<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
@@ -61,7 +61,7 @@ pub(super) fn unpack<G: Grammar>(
 
 const NOT_AS_LONG: &str = "its length is wrong";
 
-/// Hands over the records of a chunk that is compressed or has a checksum, which means reading all of it.
+/// Visits the records of a chunk that is compressed or has a checksum, which requires reading all of it.
 fn summed<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
@@ -91,7 +91,7 @@ fn summed<G: Grammar>(
     }
 }
 
-/// Hands over all records in `from`, and returns how many bytes there are.
+/// Visits all records in `from`, and returns the number of bytes.
 fn all_records<G: Grammar>(
     from: &mut (impl Read + Send),
     visitor: &mut dyn Visitor<G>,
@@ -101,10 +101,10 @@ fn all_records<G: Grammar>(
     (told, plain.position())
 }
 
-/// Hands over the records of a chunk up to position `end` of `stream`, or to its end.
+/// Visits the records of a chunk up to position `end` of `stream`, or to its end.
 ///
 /// # Errors
-/// The reason why they end before. Records that do not belong into a chunk are passed over, and the reason at the end.
+/// The reason why they end earlier. Records that do not belong in a chunk are skipped and reported at the end.
 pub(super) fn records<G: Grammar>(
     stream: &mut ByteStream<'_>,
     end: u64,
@@ -114,7 +114,7 @@ pub(super) fn records<G: Grammar>(
     let stop = walk(stream, end, |stream| {
         let record = G::next(stream)?;
         if record.len() > end.saturating_sub(stream.position()) {
-            // A length that leaves the chunk is none.
+            // A length that exceeds the chunk is invalid.
             return Err(NoRecord::Broken);
         }
         match record {

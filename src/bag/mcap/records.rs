@@ -1,7 +1,7 @@
 //! The records of an MCAP file, read with bounds, and the channels they describe.
 //!
-//! They are parsed here, from a stream and without copies, and no length in them sizes memory; text that is not UTF-8 is
-//! replaced where the crate `mcap` refuses the record.
+//! They are parsed here, from a stream and without copies, and no length in them determines memory use; invalid UTF-8
+//! is replaced where the crate `mcap` rejects the record.
 
 use std::sync::Arc;
 
@@ -23,15 +23,14 @@ pub(super) const HEAD: u64 = 9;
 const MESSAGE_HEAD: usize = 22;
 /// The number of bytes of an entry of a message index: time and offset.
 pub(super) const ENTRY: usize = 16;
-/// The number of bytes of a footer, and of the record that ends the data, which tells them from records with a damaged
-/// kind.
+/// The lengths of a footer and of a data end record, which distinguish them from records with a damaged kind.
 pub(super) const FOOTER: u64 = 20;
 pub(super) const DATA_END: u64 = 4;
 /// The number of bytes of statistics before the counts of channels.
 pub(super) const STATISTICS: u64 = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
-/// The bytes of a record that are looked at for the lengths in it; names are shorter.
+/// The bytes of a record that are inspected for the lengths in it; names are shorter.
 const MOST_LOOKED_AT: usize = 1024;
-/// The first of the kinds of records that the format leaves to its users.
+/// The first of the record kinds that the format leaves to its users.
 const FIRST_EXTENSION: u8 = 0x80;
 
 /// Takes the head of the next record.
@@ -95,8 +94,8 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     })
 }
 
-/// The CRC-32 of all bytes before the content of the record that ends the data: what that states, 0 for nothing, is of the
-/// bytes before the record, whose head is always the same.
+/// The CRC-32 of all bytes before the content of the data end record. The stated one (0 for none) covers the bytes
+/// before the record, whose head is constant.
 fn data_crc(content: &[u8]) -> Option<u32> {
     let stated = FieldCursor(content).u32().filter(|crc| *crc != 0)?;
     let mut sum = Checksum::of(stated);
@@ -105,7 +104,7 @@ fn data_crc(content: &[u8]) -> Option<u32> {
     Some(sum.crc())
 }
 
-/// The length of a record as the lengths in it add up; `None` if they are not in these first bytes of it.
+/// The length of a record according to the lengths in it; `None` if these first bytes do not contain them.
 fn content_len(kind: u8, content: &[u8]) -> Option<u64> {
     let mut cursor = FieldCursor(content);
     if kind == op::ATTACHMENT {
@@ -116,7 +115,7 @@ fn content_len(kind: u8, content: &[u8]) -> Option<u64> {
     let last = match kind {
         op::ATTACHMENT => {
             len += 4 + cursor.bytes()?.len();
-            // The length of the data, and a checksum behind them.
+            // The length of the data, and the checksum after it.
             cursor.u64()?.checked_add(8 + 4)?
         }
         _ => 4 + u64::from(cursor.u32()?),
@@ -157,7 +156,7 @@ fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described
     })
 }
 
-/// Looks at the head of a message index, whose entries fill the rest of it.
+/// Parses the head of a message index, whose entries fill the rest of it.
 fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
     let mut cursor = FieldCursor(stream.peek(6)?);
     let (channel, entries) = (cursor.u16(), cursor.u32().map(u64::from));
@@ -175,7 +174,7 @@ fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>,
     })
 }
 
-/// The most bytes behind a chunk's records that may belong to it; with more, one of the two lengths is damaged.
+/// The most padding after a chunk's records, in bytes; with more, one of the two lengths is damaged.
 const MOST_PADDING: u64 = 4096;
 
 /// The number of bytes of a chunk before the name of its compression.
@@ -190,7 +189,7 @@ pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, 
         let (first, last, plain) = (cursor.u64()?, cursor.u64()?, cursor.u64()?);
         let crc = cursor.u32()?;
         let name = cursor.bytes()?;
-        // A record with an unknown name of a compression is not a chunk.
+        // A record without a plausible compression name is not a chunk.
         let is_word = name.len() <= 16 && name.iter().all(u8::is_ascii_graphic);
         let how = Compression::named(name);
         let packed = cursor.u64().filter(|_| is_word)?;
@@ -273,7 +272,7 @@ impl<'a> FieldCursor<'a> {
         self.take().map(u64::from_le_bytes)
     }
 
-    /// A byte string that follows its length.
+    /// A length-prefixed byte string.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let len = usize::try_from(self.u32()?).ok()?;
         let (bytes, rest) = self.0.split_at_checked(len)?;
@@ -281,7 +280,7 @@ impl<'a> FieldCursor<'a> {
         Some(bytes)
     }
 
-    /// A text that follows its length; bytes that are not UTF-8 are replaced.
+    /// A length-prefixed text; invalid UTF-8 is replaced.
     pub(super) fn text(&mut self) -> Option<String> {
         Some(String::from_utf8_lossy(self.bytes()?).into_owned())
     }
@@ -293,7 +292,7 @@ pub(super) struct SchemaRecord {
     definition: Option<Arc<str>>,
 }
 
-/// Adds the schema of a record, `None` if it is damaged. A second one of the same id is passed over.
+/// Adds the schema of a record; `None` if it is damaged. A second one with the same id is ignored.
 pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     let mut cursor = FieldCursor(record);
     let id = cursor.u16()?;
@@ -318,7 +317,7 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
 /// The connection that a channel record describes, if it is new.
 ///
 /// # Errors
-/// Where the record is damaged, or describes another channel than one of its number before.
+/// If the record is damaged or contradicts an earlier one with the same id.
 pub(super) fn channel(
     grammar: &Mcap,
     record: &[u8],
@@ -358,7 +357,7 @@ pub(super) fn channel(
     Ok(Some((id, connection)))
 }
 
-/// Adds the fields that ROS keeps in a channel's metadata.
+/// Adds the fields that ROS stores in a channel's metadata.
 fn describe(connection: &mut Connection, metadata: &[u8]) {
     let mut cursor = FieldCursor(metadata);
     while let (Some(key), Some(value)) = (cursor.text(), cursor.text()) {
@@ -376,8 +375,8 @@ fn describe(connection: &mut Connection, metadata: &[u8]) {
     }
 }
 
-/// Whether a key of a channel's metadata has the node that publishes it as its value: recorders have no common word for
-/// it, but a node's full name begins with a slash and has no blanks.
+/// Whether an entry of a channel's metadata names the publishing node: recorders have no common key for it, but a
+/// node's full name begins with a slash and has no blanks.
 fn names_publisher(key: &str, value: &str) -> bool {
     let key = key.to_lowercase();
     let is_about = ["node", "publisher", "caller"]

@@ -44,10 +44,10 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
 /// The number of bytes of a footer record and of the closing bytes of the file.
 const END: usize = 9 + 20 + 8;
 
-/// The number of bytes from the checksum of the summary to the end of the file: all that it does not sum up.
+/// The number of bytes from the checksum of the summary to the end of the file, which the checksum does not cover.
 const CRC_AND_CLOSING: u64 = 4 + 8;
 
-/// The place where the summary begins, and its checksum, 0 for none.
+/// The position of the summary and its checksum, 0 for none.
 fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
     let mut bytes = [0; END];
     let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
@@ -75,8 +75,8 @@ fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
 /// The number of bytes of the record that ends the data.
 const DATA_END_RECORD: usize = 9 + 4;
 
-/// The CRC-32 that the record before the summary, or the footer, states of all data before it, 0 for none; `None` if that
-/// is not there.
+/// The CRC-32 of all data as stated by the record before the summary or the footer, 0 for none; `None` if that record
+/// is missing.
 pub(super) fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
     let end = match footer(source)? {
         Ok((start, _)) => start,
@@ -97,7 +97,7 @@ struct Summary {
     grammar: Mcap,
     used: Used,
     statistics: Option<Statistics>,
-    /// Whether a chunk holds records and has no message index.
+    /// Whether a chunk has records but no message index.
     blind: bool,
 }
 
@@ -108,7 +108,7 @@ impl Summary {
         let stop = walk(stream, u64::MAX, |stream| {
             let (kind, len) = records::head(stream)?;
             if kind == op::FOOTER {
-                // To the end of what the checksum sums up.
+                // Up to the end of the bytes that the checksum covers.
                 stream.skip(FOOTER)?;
                 return Err(NoRecord::End);
             }
@@ -122,7 +122,7 @@ impl Summary {
             }
             match kind {
                 op::SCHEMA => records::schema(&mut self.grammar, record).ok_or(NoRecord::Broken)?,
-                // A channel may stand before its schema.
+                // A channel may precede its schema.
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
                 op::CHUNK_INDEX => {
@@ -163,7 +163,7 @@ impl Summary {
         Ok(())
     }
 
-    /// Orders the chunks and decides whether they hold all messages.
+    /// Sorts the chunks and decides whether they contain all messages.
     fn settle(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
         let chunks = &mut self.plan.chunks;
         chunks.sort_by_key(|c| c.start);
@@ -194,8 +194,7 @@ impl Summary {
     }
 }
 
-/// Checks between the chunks, where other records may stand, that there are no messages that the summary does not know
-/// of.
+/// Checks that between the chunks, where other records may occur, there are no messages missing from the summary.
 fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let mut free = plan.body.start;
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
@@ -205,7 +204,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
         }
         let mut stream = ByteStream::of_file(source, free, start, NEAR);
         let mut hidden = false;
-        // Bytes that are not a record hide no message that could be read.
+        // Bytes that are not a record contain no readable message.
         walk(&mut stream, start, |stream| {
             let record = Mcap::next(stream)?;
             hidden |= matches!(
@@ -277,8 +276,8 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
     })
 }
 
-/// The message counts, computed from the places where the message indexes of a chunk's channels begin: they stand one
-/// behind the other, 15 bytes and 16 for each message. `None` if they do not stand so, or if there are none.
+/// The message counts, computed from the offsets of the message indexes of a chunk's channels, which are contiguous:
+/// 15 bytes, plus 16 per message. `None` if they are not contiguous, or if there are none.
 fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
     let mut places = Vec::with_capacity(offsets.len() / 10);
     let mut cursor = FieldCursor(offsets);

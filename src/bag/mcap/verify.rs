@@ -16,10 +16,10 @@ use crate::bag::model::{Sink, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
-/// The longest record that is looked into, in bytes.
+/// The longest record that is parsed, in bytes.
 const LONGEST_RECORD: usize = 256 << 20;
 
-/// The crate's findings on their way to a sink.
+/// Passes on the crate's findings to a sink.
 struct Crate<'s> {
     sink: &'s mut dyn Sink,
     grammar: Mcap,
@@ -31,7 +31,7 @@ struct Crate<'s> {
 /// Reports everything that the crate finds to `sink`.
 ///
 /// # Errors
-/// The reason why it did not get to the end: a wrong checksum, a cut, or another breach of the format.
+/// The reason why it did not reach the end: a wrong checksum, a cut, or another violation of the format.
 pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), String> {
     bound(source)?;
     let mut from = ByteStream::of_file(source, 0, source.len(), FAR);
@@ -53,8 +53,8 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
     told
 }
 
-/// Walks the plain chunks as the crate will, and refuses a file that it could not bear: it subtracts the length of a
-/// record from what is left of the chunk, its head included, before it compares them.
+/// Walks the plain chunks as the crate will, and rejects a file that would make it underflow: it subtracts a record's
+/// length, head included, from what is left of the chunk before it compares them.
 fn bound(source: &FileSource) -> Result<(), String> {
     let mut stream = ByteStream::of_file(source, 0, source.len(), FAR);
     Mcap::begin(&mut stream);
@@ -97,7 +97,7 @@ impl Crate<'_> {
         while let Some(event) = reader.next_event() {
             match event.map_err(|e| e.to_string())? {
                 LinearReadEvent::ReadRequest(n) => {
-                    // Memory follows what came, not what was asked for.
+                    // Memory grows with the bytes received, not with the bytes requested.
                     let got = read_some(from, reader.insert(n.min(1 << 20)))
                         .map_err(|e| e.to_string())?;
                     reader.notify_read(got);
@@ -108,7 +108,7 @@ impl Crate<'_> {
         Ok(())
     }
 
-    /// Only these kinds are given to the crate's parser: it panics on a short attachment.
+    /// Passes only these kinds to the crate's parser: it panics on a short attachment.
     fn record(&mut self, kind: u8, data: &[u8]) -> Result<(), String> {
         match kind {
             op::SCHEMA => self.describe(Described::Schema, data),

@@ -1,4 +1,4 @@
-//! A bag in an object, read in parts where its format can be; else a copy of it.
+//! A bag in an object store, read in parts if its format allows it, otherwise via a local copy.
 
 use std::fs::File;
 use std::io::{self, Write as _};
@@ -15,7 +15,7 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Span;
 use crate::base::words;
 
-/// A reader of an object: what could not be fetched is an error, and no damage of the bag.
+/// A reader of an object, for which a failed request is an error and not damage of the bag.
 struct Watched {
     inner: Box<dyn Reader>,
     refused: Refused,
@@ -70,7 +70,7 @@ fn inner(
     Ok(((row.open)(BagPlace::File(source), options)?, Some(copy)))
 }
 
-/// A copy of what cannot be read in parts.
+/// A local copy of an object that cannot be read in parts.
 fn local(row: &FormatRow, source: &FileSource) -> Result<(FileSource, Temporary)> {
     let path = source.path();
     if source.len() > UNPACKED_COPY {
@@ -85,7 +85,7 @@ fn local(row: &FormatRow, source: &FileSource) -> Result<(FileSource, Temporary)
         });
     }
     let copy = Temporary::new()?;
-    // Its own name, which the reader tells; never a path.
+    // Its own name, which the reader reports; never a path.
     let name = path.file_name().unwrap_or("bag".as_ref());
     let to = copy.path().join(name);
     download(source, &to).map_err(Error::io("copy", path))?;

@@ -1,4 +1,4 @@
-//! The stores behind URLs, and what they refuse; the only file that waits for futures.
+//! The stores behind URLs, and their errors; the only file that waits for futures.
 
 use std::io;
 use std::ops::Range;
@@ -24,17 +24,17 @@ use url::Url;
 
 use crate::base::error::Error;
 
-/// A request that fails for a passing reason (429, 5xx, a broken connection) is sent again so many times, within this
-/// many seconds.
+/// A request that fails for a transient reason (429, 5xx, a broken connection) is retried this many times, within
+/// [`RETRY_SECONDS`].
 const RETRIES: usize = 5;
 /// See [`RETRIES`].
 const RETRY_SECONDS: u64 = 60;
-/// The most requests under way at a time, whoever asks: each is an open connection, of which a process may have few.
+/// The most concurrent requests of the process: each is an open connection, of which a process may have few.
 const MOST_ASKED: usize = 128;
-/// The most objects below one prefix.
+/// The most objects listed below one prefix.
 const MOST_LISTED: usize = 1 << 20;
 
-/// Why a store gives nothing.
+/// Why a store refused a request.
 #[derive(Clone, Debug)]
 pub(super) struct StoreRefusal {
     kind: io::ErrorKind,
@@ -108,7 +108,7 @@ impl StoreRefusal {
     }
 }
 
-/// Whether it was the service that gives credentials to machines of a cloud that did not answer: the last one asked.
+/// Whether the cloud's instance metadata service, the last source of credentials tried, did not answer.
 fn is_instance(error: &StoreError) -> bool {
     let said = error.to_string();
     let places = [
@@ -119,23 +119,23 @@ fn is_instance(error: &StoreError) -> bool {
     places.iter().any(|place| said.contains(place))
 }
 
-/// The most characters that are reported of what a server says.
-const MOST_SAID: usize = 200;
+/// The most characters of a server's answer that are reported.
+const MOST_REASON: usize = 200;
 
-/// What is at the bottom of an error. What stands above it may name a URL with a signature in it.
+/// The innermost cause of an error: outer ones may contain a URL with a signature.
 fn innermost(error: &StoreError) -> String {
     let mut inner: &dyn std::error::Error = error;
     while let Some(deeper) = inner.source() {
         inner = deeper;
     }
-    inner.to_string().chars().take(MOST_SAID).collect()
+    inner.to_string().chars().take(MOST_REASON).collect()
 }
 
 static ASKED: Semaphore = Semaphore::const_new(MOST_ASKED);
 
 type StoreResult<T> = Result<T, StoreRefusal>;
 
-/// Waits for an answer, on threads of our own: whoever asks may be in another program's event loop.
+/// Waits for an answer on separate threads: the caller may be inside another program's event loop.
 fn wait<T: Send + 'static>(
     answer: impl Future<Output = StoreResult<T>> + Send + 'static,
 ) -> StoreResult<T> {
@@ -146,7 +146,7 @@ fn wait<T: Send + 'static>(
     from.recv().map_err(given_up)?
 }
 
-/// What waits for answers: two threads, however many ask.
+/// The runtime for all requests: two threads, however many callers.
 fn runtime() -> StoreResult<&'static Runtime> {
     static ONE: OnceLock<io::Result<Runtime>> = OnceLock::new();
     let made = ONE.get_or_init(|| {
@@ -157,7 +157,7 @@ fn runtime() -> StoreResult<&'static Runtime> {
     made.as_ref().map_err(failed)
 }
 
-/// The store of `url`, and the place in it.
+/// The store of `url`, and the path in it.
 fn store(url: &str) -> StoreResult<(Arc<dyn ObjectStore>, Path)> {
     if url.starts_with("http") {
         return web(url);
@@ -188,19 +188,19 @@ fn store(url: &str) -> StoreResult<(Arc<dyn ObjectStore>, Path)> {
                 .map(|s| Arc::new(s) as _)
         }
     };
-    // The key as it is: `%`, `?` and `#` mean nothing in it.
+    // The key verbatim: `%`, `?` and `#` have no meaning in it.
     let path = Path::parse(key).map_err(|e| bad_url(&e))?;
     Ok((made.map_err(|e| StoreRefusal::of(&e))?, path))
 }
 
-/// A web server, asked as a browser would: what stands behind `?` may be a signature that opens the file.
+/// A web server; the query is sent too, as it may be a signature that grants access.
 fn web(url: &str) -> StoreResult<(Arc<dyn ObjectStore>, Path)> {
     let parsed = Url::parse(url).map_err(|e| bad_url(&e))?;
     let path = Path::from_url_path(parsed.path()).map_err(|e| bad_url(&e))?;
     let mut root = parsed.clone();
     root.set_path("/");
     root.set_fragment(None);
-    // What began safely is not continued in the open.
+    // HTTPS is never downgraded to HTTP.
     let options = ClientOptions::new().with_allow_http(parsed.scheme() == "http");
     let builder = HttpBuilder::new().with_url(root.as_str());
     let made = builder
@@ -237,7 +237,7 @@ pub(super) struct Object {
 }
 
 impl Object {
-    /// The object at `url` and its first bytes, `first` at most.
+    /// Opens the object at `url` and returns its first bytes, at most `first`.
     pub(super) fn open(url: &str, first: u64) -> StoreResult<(Self, Vec<u8>)> {
         let (store, path) = store(url)?;
         let (asked, at) = (Arc::clone(&store), path.clone());
@@ -260,7 +260,7 @@ impl Object {
         Ok((object, bytes))
     }
 
-    /// These parts, asked for at the same time; each whole and of the version that was opened.
+    /// Fetches these parts concurrently; each complete and of the opened version.
     pub(super) fn get(self: &Arc<Self>, ranges: &[Range<u64>]) -> StoreResult<Vec<Vec<u8>>> {
         let parts = ranges.iter().cloned().map(|range| {
             let object = Arc::clone(self);
@@ -271,7 +271,7 @@ impl Object {
     }
 
     async fn part(&self, range: Range<u64>) -> StoreResult<Vec<u8>> {
-        // It is never closed.
+        // The semaphore is never closed.
         let _turn = ASKED.acquire().await;
         let is_strong = |etag: &&String| !etag.starts_with("W/");
         let is_dated = self.etag.is_none() && self.meta.last_modified.timestamp() > 0;
@@ -289,14 +289,14 @@ impl Object {
         taken(got, range.end - range.start).await
     }
 
-    /// Servers that do not know `If-Match` give the new version, and say which.
+    /// Checks the version: servers without `If-Match` return a new version and its tag.
     fn is_version(&self, meta: &ObjectMeta) -> bool {
         let is_dated = meta.last_modified == self.meta.last_modified;
         meta.size == self.len && meta.e_tag == self.etag && is_dated
     }
 }
 
-/// The first bytes of an object, `first` at most, and what is said of it.
+/// The first bytes of an object, at most `first`, and its metadata.
 async fn begin(
     store: &dyn ObjectStore,
     path: &Path,
@@ -311,7 +311,7 @@ async fn begin(
             let (meta, len) = (got.meta.clone(), got.range.end - got.range.start);
             Ok((meta, taken(got, len).await?))
         }
-        // An empty object has no first bytes that could be asked for.
+        // An empty object has no first bytes to request.
         Err(error @ (StoreError::Generic { .. } | StoreError::NotSupported { .. })) => {
             let meta = store.head(path).await.ok().filter(|meta| meta.size == 0);
             let meta = meta.ok_or_else(|| StoreRefusal::of(&error))?;
@@ -321,7 +321,7 @@ async fn begin(
     }
 }
 
-/// The `len` bytes of an answer, whatever the server goes on to send.
+/// The first `len` bytes of an answer, however much the server sends.
 async fn taken(got: GetResult, len: u64) -> StoreResult<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut stream = got.into_stream();
@@ -341,7 +341,7 @@ async fn taken(got: GetResult, len: u64) -> StoreResult<Vec<u8>> {
 /// Every object below the prefix `url`, which ends in a slash; sorted by URL.
 ///
 /// # Errors
-/// [`Error::Remote`] if the store cannot be asked.
+/// [`Error::Remote`] if the store fails.
 pub(crate) fn list(url: &str) -> Result<Vec<String>, Error> {
     let mut all = listed(url).map_err(|why| why.error(url))?;
     all.sort();

@@ -61,7 +61,7 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             what: Described { raw, topic },
             len,
         },
-        // Its length comes from its count: writers of 2010 put a wrong one.
+        // Its length is computed from its count: writers of 2010 stored a wrong one.
         Header::Index { raw, count } => RecordHead::Index {
             raw,
             count,
@@ -97,7 +97,7 @@ pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRec
         return Err(NoRecord::End);
     }
     let header_len = u32_at(head, 0).ok_or(NoRecord::Cut)? as usize;
-    // No record is without fields; where the disk was full, zeros stand.
+    // Every record has fields; a full disk leaves zeros.
     if header_len == 0 || header_len > LONGEST_HEADER {
         return Err(NoRecord::Broken);
     }
@@ -126,7 +126,7 @@ pub(super) fn parse(header: &[u8]) -> Option<Header> {
     Some(fields.record().unwrap_or(Header::Unknown))
 }
 
-/// The values of a header's fields, of two of one name the first. There is a header before every message.
+/// The values of a header's fields; the first of duplicates counts. There is a header before every message.
 #[derive(Default)]
 struct HeaderFields<'a> {
     chunk_count: Option<&'a [u8]>,
@@ -147,7 +147,7 @@ struct HeaderFields<'a> {
 }
 
 impl<'a> HeaderFields<'a> {
-    /// The place of the value of this field; `None` for one that does not concern us.
+    /// The slot for the value of this field; `None` for an ignored one.
     fn known(&mut self, name: &[u8]) -> Option<&mut Option<&'a [u8]>> {
         Some(match name {
             b"chunk_count" => &mut self.chunk_count,
@@ -221,13 +221,13 @@ fn field(header: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     Some((&field[..equals], &field[equals + 1..], rest))
 }
 
-/// The number at `at`, if there are four bytes.
+/// The number at `at`, if four bytes are available.
 pub(super) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     let four = bytes.get(at..at.checked_add(4)?)?;
     four.try_into().ok().map(u32::from_le_bytes)
 }
 
-/// The time at `at`, if there are eight bytes.
+/// The time at `at`, if eight bytes are available.
 pub(super) fn time_at(bytes: &[u8], at: usize) -> Option<Stamp> {
     Some(Stamp::from_ros(u32_at(bytes, at)?, u32_at(bytes, at + 4)?))
 }
@@ -256,7 +256,7 @@ pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -
     connection
 }
 
-/// The text of a definition, shared with equal ones.
+/// The text of a definition; equal texts are shared.
 fn definition(grammar: &mut Rosbag1, value: &[u8]) -> Option<Arc<str>> {
     let text = String::from_utf8_lossy(value);
     if let Some(known) = grammar.definitions.get(text.as_ref()) {
@@ -291,7 +291,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_two_fields_of_one_name_the_first_counts() {
+    fn the_first_of_duplicate_fields_counts() {
         let mut header = Vec::new();
         for (name, value) in [
             ("op", 2),

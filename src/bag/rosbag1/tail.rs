@@ -51,7 +51,7 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     }
 }
 
-/// Refuses an index that is not inside the bag.
+/// Rejects an index outside the bag.
 fn placed(index_pos: u64, body: u64, len: u64) -> Result<(), Unindexed> {
     if index_pos == 0 {
         Unindexed::missing("it was never closed and has no index")
@@ -189,7 +189,7 @@ impl Tail {
         Ok((sum, counts))
     }
 
-    /// Orders the chunks and sets the end of each.
+    /// Sorts the chunks and sets the end of each.
     fn settle(mut self) -> Result<ChunkPlan, Unindexed> {
         let body = self.plan.body.clone();
         let chunks = &mut self.plan.chunks;
@@ -216,7 +216,7 @@ impl Tail {
     }
 }
 
-/// The expected length of the index records, with headers as every writer makes them: 47 bytes.
+/// The expected length of the index records, with headers as all writers make them: 47 bytes.
 fn index_len(promised: &IndexSum) -> u64 {
     let entries = promised.messages.saturating_mul(u64::from(ENTRY));
     entries.saturating_add(u64::from(promised.connections) * (4 + 47 + 4))

@@ -1,5 +1,4 @@
-//! A ROS 1 bag read a second time by an independent reader, the crate `rosbag`, once every chunk is known to be
-//! bounded.
+//! Reads a ROS 1 bag again with an independent reader, the crate `rosbag`, after checking the bounds of every chunk.
 
 use std::io;
 use std::sync::Arc;
@@ -21,13 +20,13 @@ use crate::base::time::Stamp;
 /// The largest chunk that the crate may unpack into memory, in bytes.
 const LARGEST_CHUNK: u32 = 256 << 20;
 
-/// Reports everything that the crate finds to `sink`. `plan` holds the place of the index: without one the crate does
-/// not read.
+/// Reports everything that the crate finds to `sink`. `plan` has the position of the index, without which the crate
+/// does not read.
 pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -> SecondReading {
     let mut verified = SecondReading::default();
     let bag = bound(source, plan, &mut verified).and_then(|()| {
         let bag = RosBag::new(source.path()).map_err(|e| e.to_string())?;
-        // An iterator of the crate answers an error for ever, so the first one ends the walk.
+        // The crate's iterators repeat an error forever, so the first one ends the walk.
         let bad = bag.index_records().find_map(Result::err);
         bad.map_or(Ok(bag), |e| Err(e.to_string()))
     });
@@ -46,8 +45,7 @@ pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -
     verified
 }
 
-/// Walks the chunks as the crate will, and refuses a file that it could not bear: it unpacks a chunk before it looks at
-/// its size.
+/// Walks the chunks as the crate will, and rejects oversized ones: it decompresses a chunk before it checks its size.
 fn bound(
     source: &FileSource,
     plan: &ChunkPlan,
@@ -82,7 +80,7 @@ fn bound(
     }
 }
 
-/// Refuses a chunk whose length is not the stated one, or too large.
+/// Rejects a chunk whose length differs from the stated one or is too large.
 fn bound_chunk(
     source: &FileSource,
     body: &ChunkBody,
@@ -111,7 +109,7 @@ fn unpacked_len(
     Ok(plain.position() - base)
 }
 
-/// The crate's findings on their way to a sink.
+/// Passes on the crate's findings to a sink.
 struct Crate<'s> {
     sink: &'s mut dyn Sink,
     grammar: Rosbag1,

@@ -1,4 +1,4 @@
-//! A rosbag2 folder that is still being written: its storage files, also those that a split adds.
+//! A rosbag2 folder that is still being written: its storage files, including those added by splits.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,15 +9,15 @@ use crate::bag::{self, Input};
 use crate::base::budget::FILES;
 use crate::base::error::Result;
 
-/// The looks in which nothing grows after which a recording that has its metadata is over: two seconds, in which a
-/// recorder closes its last file.
+/// The number of polls without growth after which a recording with metadata is over: two seconds, in which a recorder
+/// closes its last file.
 const QUIET: u32 = 8;
 
-/// A folder's storage files, each up to where it has been read.
+/// A folder's storage files, each with its read position.
 struct GrowingFolder {
     path: PathBuf,
     parts: Vec<Part>,
-    /// The files that were found, also those that cannot be followed.
+    /// The files found so far, including those that cannot be followed.
     seen: BTreeSet<PathBuf>,
     known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
     quiet: u32,
@@ -26,7 +26,7 @@ struct GrowingFolder {
 /// A storage file.
 struct Part {
     file: Box<dyn Growing>,
-    /// The ids of its connections in the whole.
+    /// The ids of its connections in the whole recording.
     ids: Vec<ConnectionId>,
     is_over: bool,
 }
@@ -55,7 +55,7 @@ impl Growing for GrowingFolder {
             let growth = part.file.poll(&mut joined);
             (self.known, part.ids) = (joined.known, joined.part);
             grew |= matches!(growth, Ok(Growth::More));
-            // A file that is gone was compressed when it was full, and holds what was read of it.
+            // A file that disappeared was full and has been compressed; its content was read before.
             part.is_over = matches!(growth, Ok(Growth::Ended) | Err(_));
         }
         self.quiet = if grew { 0 } else { self.quiet + 1 };
@@ -74,7 +74,7 @@ impl Growing for GrowingFolder {
 }
 
 impl GrowingFolder {
-    /// Looks for new storage files. One that cannot be followed yet is tried again.
+    /// Finds new storage files. One that cannot be followed yet is retried.
     fn find(&mut self) {
         for file in storage(&self.path) {
             if self.seen.contains(&file) || self.seen.len() >= FILES {
@@ -91,7 +91,7 @@ impl GrowingFolder {
         }
     }
 
-    /// Whether the metadata, which is written at the end, names all files.
+    /// Whether the metadata, which is written at the end, lists all files.
     fn is_closed(&self) -> bool {
         let named = metadata::read(&self.path).ok().flatten();
         named.is_some_and(|named| named.files.len() >= storage(&self.path).len())

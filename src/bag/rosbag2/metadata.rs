@@ -89,7 +89,7 @@ fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Top
         type_name: text("type").into(),
         encoding: text("serialization_format").to_owned(),
         qos: match topic.get("offered_qos_profiles") {
-            // Up to version 8 the profiles are text, from 9 on they are data.
+            // Up to version 8 the profiles are text, from version 9 on data.
             Some(Value::Array(all)) if !all.is_empty() => {
                 some(&Value::from(all.clone()).to_string())
             }
@@ -100,8 +100,8 @@ fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Top
     }
 }
 
-/// The file in `folder` that `name` means, if it is a plain name of a regular file there. Up to version 3 the folder's
-/// own name stands before it.
+/// The file in `folder` with this `name`, which must be a plain name of a regular file. Up to version 3 it is prefixed
+/// by the folder's own name.
 ///
 /// # Errors
 /// A sentence with the reason why not.
@@ -133,7 +133,7 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Whether a file lies in a folder after all links are followed.
+/// Whether a file lies in a folder after links are resolved.
 pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
     let real = file.canonicalize().ok().zip(folder.canonicalize().ok());
     real.is_some_and(|(file, folder)| file.starts_with(folder))
@@ -150,7 +150,7 @@ fn with_end(path: &Path, end: &str) -> PathBuf {
     name.into()
 }
 
-/// Whether a file is named like the storage of a recording.
+/// Whether a file has the name of a storage file.
 pub(super) fn is_storage(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.strip_suffix(".zstd").unwrap_or(&name);

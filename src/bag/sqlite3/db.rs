@@ -1,4 +1,4 @@
-//! SQLite, opened so that nothing in a database can run, write or grow. The one file that knows `rusqlite`.
+//! SQLite, opened so that nothing in a database can run, write or grow. The only file that uses `rusqlite`.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -29,14 +29,14 @@ impl From<rusqlite::Error> for Refusal {
     }
 }
 
-/// The longest value that SQLite may make for us, in bytes.
+/// The longest value that SQLite may produce, in bytes.
 const LONGEST_VALUE: i32 = 64 << 20;
 
 /// A row of a query; columns count from 0. SQLite does not enforce the types of columns.
 pub(super) struct QueryRow<'r>(&'r rusqlite::Row<'r>);
 
 impl QueryRow<'_> {
-    /// A column's whole number; `None` if it does not hold one.
+    /// A column's integer; `None` if it has another type.
     pub(super) fn integer(&self, column: usize) -> Option<i64> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Integer(n) => Some(n),
@@ -44,7 +44,7 @@ impl QueryRow<'_> {
         }
     }
 
-    /// A column's text, with bytes that are not UTF-8 replaced; `None` if it does not hold text.
+    /// A column's text, with invalid UTF-8 replaced; `None` if it has another type.
     pub(super) fn text(&self, column: usize) -> Option<String> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Text(bytes) => Some(String::from_utf8_lossy(bytes).into_owned()),
@@ -52,7 +52,7 @@ impl QueryRow<'_> {
         }
     }
 
-    /// A column's bytes, of text or not; `None` if it holds neither.
+    /// A column's bytes, of text or a blob; `None` if it has another type.
     pub(super) fn bytes(&self, column: usize) -> Option<&[u8]> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Blob(bytes) | ValueRef::Text(bytes) => Some(bytes),
@@ -71,8 +71,8 @@ impl Db {
         };
         let flags = access | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let db = Connection::open_with_flags(address(ready), flags)?;
-        // Of a damaged database SQLite reads on only where it could be mended as well; nothing can be written all the
-        // same, neither to a file opened for reading nor by a connection that may only query.
+        // SQLite reads past damage only with a writable schema; still nothing can be written, as the file is opened
+        // read-only and the connection is query-only.
         if ready.damaged {
             db.pragma_update(None, "writable_schema", 1)?;
         } else {
@@ -88,7 +88,7 @@ impl Db {
         Ok(Self(db))
     }
 
-    /// The columns of a table that hold stored values; empty if it is not a table.
+    /// The columns of a table with stored values; empty if it is not a table.
     pub(super) fn columns(&self, table: &str) -> Result<Vec<String>, Refusal> {
         let is_table = "SELECT count(*) FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE AND type = 'table' AND rootpage > 0";
         let count: i64 = self.0.query_row(is_table, [table], |row| row.get(0))?;
@@ -97,7 +97,7 @@ impl Db {
             return Ok(columns);
         }
         self.each(&format!("PRAGMA table_xinfo({table})"), &[], |row| {
-            // Generated columns compute what they like when they are read.
+            // Generated columns run arbitrary expressions when they are read.
             if row.integer(6) == Some(0) && columns.len() < 100 {
                 columns.extend(row.text(1));
             }

@@ -1,8 +1,8 @@
 //! A database that is still being written: its new rows, read without a lock.
 //!
-//! rosbag2 writes with `journal_mode=MEMORY` and ends where the database is locked, so SQLite is told that nobody writes,
-//! and takes no lock; a page that is half written ends the look, and the next one goes on from there. With a log beside
-//! it (`-wal`) a reader never stands in a writer's way, and a short transaction reads both.
+//! rosbag2 writes with `journal_mode=MEMORY` and aborts if the database is locked, so SQLite opens it as immutable and
+//! takes no lock; a half-written page ends a poll, and the next one continues there. With a log beside it (`-wal`) a
+//! reader never blocks the writer, and a short transaction reads both.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -14,15 +14,15 @@ use crate::bag::model::{Growing, Growth, OpenOptions, Sink, Want};
 use crate::bag::source::FileSource;
 use crate::base::error::Result;
 
-/// The number of looks between two that open the database: a look is cheap, SQLite's own start is not.
+/// The database is opened at every this many polls: polling is cheap, starting SQLite is not.
 const EVERY: u32 = 4;
 
-/// A database up to the row that was reported last.
+/// A database, read up to the last reported row.
 struct GrowingDb {
     path: PathBuf,
     /// The sizes and times of change of the database and its log when it was last read.
     seen: Vec<(u64, Option<SystemTime>)>,
-    /// The looks since then.
+    /// The polls since then.
     looks: u32,
     /// The first row that has not been reported.
     next: i64,
@@ -60,7 +60,7 @@ impl Growing for GrowingDb {
         (self.seen, self.looks) = (now, 0);
         let has_log = wal.metadata().is_ok_and(|log| log.len() > 0);
         let ready = Ready::growing(&self.path, has_log);
-        // A table that is not there yet will be.
+        // The table may not exist yet.
         let Ok(bag) = bag(ready, &source, &OpenOptions::default()) else {
             return Ok(Growth::Same);
         };

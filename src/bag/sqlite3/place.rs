@@ -1,4 +1,4 @@
-//! The place where a database can be opened so that no row is lost and no file is made beside the user's.
+//! Where a database can be opened so that no row is lost and no file is created beside the user's.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,18 @@ use crate::base::error::{Error, Result};
 /// A database ready to be opened.
 pub(super) struct Ready {
     pub(super) path: PathBuf,
-    /// Whether the database is cut or damaged, and read as far as possible.
+    /// Whether the database is cut or damaged, and is read as far as possible.
     pub(super) damaged: bool,
     /// Whether rows are ignored because the copy would be too large.
     pub(super) left_behind: bool,
     /// The copy, removed when the bag has been read.
     copy: Option<Temporary>,
-    /// Whether a recorder writes to a log beside the database, which is read with it.
+    /// Whether a recorder writes to a log beside the database, which is read too.
     is_shared: bool,
 }
 
 impl Ready {
-    /// A database that is read where it is, with the log beside it if it has one.
+    /// A database that is read in place, with its log if it has one.
     pub(super) fn growing(path: &Path, has_log: bool) -> Self {
         Self {
             path: path.to_owned(),
@@ -31,7 +31,7 @@ impl Ready {
         }
     }
 
-    /// Whether it is a copy of ours, which SQLite may bring up to date; otherwise it must not touch the file.
+    /// Whether it is our own copy, which SQLite may recover; otherwise it must not modify the file.
     pub(super) fn is_copy(&self) -> bool {
         self.copy.is_some()
     }
@@ -40,7 +40,7 @@ impl Ready {
 /// The largest database that is copied, in bytes: 16 GiB.
 const LARGEST_COPY: u64 = 16 << 30;
 
-/// Copies a database whose newest rows lie beside it, in a log or a journal that was never merged.
+/// Copies a database whose newest rows are in a log or journal beside it that was never merged.
 pub(super) fn ready(path: &Path) -> Result<Ready> {
     let beside: Vec<PathBuf> = ["-wal", "-journal"]
         .iter()
@@ -73,7 +73,7 @@ pub(super) fn with_suffix(path: &Path, end: &str) -> PathBuf {
     name.into()
 }
 
-/// The address under which SQLite opens the file.
+/// The URI under which SQLite opens the file.
 pub(super) fn address(ready: &Ready) -> String {
     let mut address = "file:".to_owned();
     for byte in bytes(&ready.path) {

@@ -26,13 +26,13 @@ pub(super) struct RowReader<'a> {
     wants: &'a [Want],
     /// Whether the sizes of all payloads are reported.
     sized: bool,
-    /// Whether rows come in the order of their ids: not by the index of times, which a range may use.
+    /// Whether rows are returned in id order: not if a range uses the index of times.
     in_order: bool,
     /// The allowance for payloads that are compressed one by one.
     allowance: Arc<Allowance>,
 }
 
-/// The numbers of rows that could not be reported, or not fully.
+/// The numbers of rows that could not be reported completely.
 #[derive(Default)]
 struct LostRows {
     orphans: u64,
@@ -52,21 +52,21 @@ struct RowReading<'a, 's> {
     rows: &'a RowReader<'a>,
     /// The rows that have not been reported.
     left: RowRange,
-    /// Whether a row came that had been reported: the pages of a damaged table can form a ring.
+    /// Whether a row was returned twice: the pages of a damaged table can form a cycle.
     repeated: bool,
     lost: LostRows,
     gather: Gather,
     sink: &'s mut dyn Sink,
 }
 
-/// The most unreadable payloads that are passed over, one by one.
+/// The most unreadable payloads that are skipped, one by one.
 const MOST_RETRIES: u64 = 1000;
 
 impl RowReading<'_, '_> {
-    /// Reports the remaining rows, starting from one end. Of a row whose payload is damaged the time is reported.
+    /// Reports the remaining rows, starting from one end. For a row with a damaged payload, only the time is reported.
     fn on(&mut self, way: Direction) -> Result<(), String> {
         let order = match way {
-            // SQLite goes through the rows in their order unless there is a range, which has an index.
+            // SQLite returns the rows in id order unless a range uses the index of times.
             Direction::Up if !self.rows.bag.ready.damaged => "",
             Direction::Up => " ORDER BY rowid",
             Direction::Down => " ORDER BY rowid DESC",
@@ -138,7 +138,7 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Reports the rows of a part to `sink`. Where a page is damaged, the rows behind it are read from the other end.
+    /// Reports the rows of a part to `sink`. Rows after a damaged page are read from the other end.
     pub(super) fn read(&self, part: RowRange, sink: &mut dyn Sink) {
         let mut gather = Gather::default();
         gather.sizeless = !self.sized;
@@ -173,7 +173,7 @@ impl<'a> RowReader<'a> {
             sink,
         };
         reading.gather.sizeless = !self.sized;
-        // What cannot be read is not there yet.
+        // Rows that cannot be read yet follow at the next poll.
         let _ = reading.some(db, &format!("{} ORDER BY rowid", self.sql), Direction::Up);
         reading.gather.flush(reading.sink);
         reading.left.0
@@ -197,7 +197,7 @@ impl<'a> RowReader<'a> {
         }
         let data = row.bytes(4);
         let size =
-            data.and_then(|data| tell_payload(data, (id, time), want, &self.allowance, sink));
+            data.and_then(|data| report_payload(data, (id, time), want, &self.allowance, sink));
         if size.is_none() {
             let text =
                 "payloads larger than 16 MiB or badly compressed were counted and not looked into";
@@ -223,10 +223,10 @@ fn wanted(bag: &Sqlite3Bag, wants: &[Want]) -> String {
     }
 }
 
-/// The query for a part's rows: id, topic, time, length, and the payload where `which` says so. SQLite does not read
-/// payloads that are not asked for.
+/// The query for a part's rows: id, topic, time, length, and the payload if `which` selects it. SQLite does not read
+/// payloads that are not selected.
 fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
-    // The index of times may be damaged where the rows are not; the sign keeps SQLite from it.
+    // The index of times may be damaged although the rows are not; the unary plus keeps SQLite from using it.
     let time = if bag.ready.damaged {
         "+timestamp"
     } else {
@@ -242,8 +242,8 @@ fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
     )
 }
 
-/// Reports a payload to `sink`, unpacked if it is packed; returns its length.
-fn tell_payload(
+/// Reports a payload to `sink`, decompressed if necessary; returns its length.
+fn report_payload(
     data: &[u8],
     (connection, time): (ConnectionId, Stamp),
     want: Want,

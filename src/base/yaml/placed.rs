@@ -1,4 +1,4 @@
-//! YAML as data with a place for every part, for files whose mistakes are reported with line and column.
+//! YAML as data with a position for every part, for files whose mistakes are reported with line and column.
 
 use std::fmt;
 
@@ -7,15 +7,15 @@ use serde_saphyr::Spanned;
 
 use super::{BadYaml, YamlPlace, read};
 
-/// The document as data with a place for every part, with the limits of [`super::parse`].
+/// The document as data with a position for every part, with the limits of [`super::parse`].
 ///
 /// # Errors
-/// As for [`super::parse`], and for keys that are not text or stand twice in one mapping.
+/// As for [`super::parse`], and for keys that are not text or occur twice in one mapping.
 pub(crate) fn parse_placed(text: &str) -> Result<YamlPart, BadYaml> {
     read::<Spanned<Plain>>(text).map(YamlPart::from)
 }
 
-/// A part of a document, with its place.
+/// A part of a document, with its position.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct YamlPart {
     pub(crate) at: YamlPlace,
@@ -28,7 +28,7 @@ pub(crate) enum YamlData {
     /// A scalar as text: `true`, `2.5`, `/scan`; empty for null.
     Scalar(String),
     List(Vec<YamlPart>),
-    /// A mapping in the document's order: the key, its place, the value.
+    /// A mapping in the document's order: the key, its position, the value.
     Map(Vec<(String, YamlPlace, YamlPart)>),
 }
 
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_part_knows_its_place() {
+    fn every_part_has_its_position() {
         let parts = parse_placed("a:\n  - {b: 1.5, c: ''}\n").unwrap();
         let YamlData::Map(map) = parts.data else {
             panic!()
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_refused_here_too() {
+    fn an_alias_bomb_is_refused_too() {
         let mut text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
         for i in 1..12 {
             let one = format!("*a{}, ", i - 1).repeat(10);
