@@ -1,4 +1,4 @@
-//! The command line, turned into work; the only file (with its folder) that uses clap and the environment.
+//! The command line; only this file and its folder use clap and the environment.
 
 mod applies;
 mod args;
@@ -40,7 +40,7 @@ const SKIPPED: u8 = 3;
 /// but data was skipped.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     hush();
-    // A mistake of ours is a failure, and has been reported by now.
+    // A panic is a failure; it has already been reported.
     catch_unwind(AssertUnwindSafe(|| command(args))).unwrap_or(FAILED)
 }
 
@@ -89,7 +89,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
             installed::manual(command.as_deref(), &mut terminal).map(|()| DONE)
         }
     };
-    // Whatever was still done, a script must not go on as if nobody had stopped it.
+    // Even if the work was done, a script must not continue as if it had not been interrupted.
     let outcome = match terminal.stopped_by() {
         Some(_) => Err(Error::Interrupted),
         None => outcome,
@@ -107,7 +107,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     })
 }
 
-/// Whether whoever read our standard output has had enough of it.
+/// Whether the reader of our standard output has closed it.
 fn is_closed_pipe(error: &Error) -> bool {
     let Error::Io { path, source, .. } = error else {
         return false;
@@ -115,7 +115,7 @@ fn is_closed_pipe(error: &Error) -> bool {
     path == Path::new("-") && source.kind() == std::io::ErrorKind::BrokenPipe
 }
 
-/// The command line, parsed: the names of the options that were typed, and all options with defaults.
+/// Parses the command line: the names of the given options, and all options with defaults.
 fn parsed<T: Into<OsString> + Clone>(
     args: impl IntoIterator<Item = T>,
 ) -> Result<(Given, Typed), clap::Error> {
@@ -123,8 +123,8 @@ fn parsed<T: Into<OsString> + Clone>(
     Ok((Given::of(&matches), Typed::from_arg_matches(&matches)?))
 }
 
-/// Prints the help, the version, or the error of the command line, with all control characters made visible, so that no
-/// argument steers the terminal.
+/// Prints the help, the version, or the error of the command line, with control characters escaped so that no argument
+/// can control the terminal.
 fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     let shown = args
         .iter()
@@ -132,13 +132,13 @@ fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     let error = parsed(shown).err().unwrap_or(error);
     match error.print().and_then(|()| std::io::stdout().flush()) {
         _ if error.use_stderr() => USAGE,
-        // A closed pipe has read enough of the help.
+        // A closed pipe is not an error.
         Err(lost) if lost.kind() != std::io::ErrorKind::BrokenPipe => FAILED,
         _ => DONE,
     }
 }
 
-/// The exit code of a mission that was read.
+/// The exit code for a mission.
 fn code(mission: &Mission) -> u8 {
     if mission.notices.any_loss() {
         SKIPPED

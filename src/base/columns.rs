@@ -8,9 +8,8 @@ pub(crate) struct Column {
     pub(crate) is_right: bool,
     /// The minimum width in characters; [`WHOLE`] if it does not shrink.
     pub(crate) least: usize,
-    /// The order in which columns shrink and in which they are dropped if the table is too wide: 1 is first. Those with
-    /// 0
-    /// shrink last and are never dropped.
+    /// The orders in which columns shrink and are dropped if the table is too wide: 1 is first. Those with 0 shrink
+    /// last and are never dropped.
     pub(crate) gives: (u8, u8),
 }
 

@@ -1,4 +1,4 @@
-//! Options without effect on the outputs and inputs asked for: refused with a hint, never ignored.
+//! Refuses options without effect on the requested inputs and outputs, with a hint.
 
 use std::collections::BTreeSet;
 
@@ -11,11 +11,11 @@ use crate::export::{OneDrawing, Output};
 use crate::graph::window::Length;
 use crate::pipeline::{Reading, mission_file};
 
-/// The names of the options that were typed, without defaults: `style`, `layout-from`.
+/// The names of the given options, without defaults: `style`, `layout-from`.
 pub(super) struct Given(BTreeSet<String>);
 
 impl Given {
-    /// The options of the command that was typed.
+    /// The given options of the command.
     pub(super) fn of(matches: &ArgMatches) -> Self {
         let typed = matches.subcommand().map(|(_, typed)| typed);
         let is_given =
@@ -50,7 +50,7 @@ struct AppliesTo {
     what: &'static str,
 }
 
-/// The rest of the command line, which decides whether an output takes an option.
+/// The rest of the command line, which decides whether an option applies to an output.
 struct Asked<'a> {
     args: &'a RenderArgs,
 }
@@ -73,12 +73,12 @@ pub(super) fn is_figure(args: &RenderArgs, output: &Output) -> bool {
         && output.format.whole != OneDrawing::Never
 }
 
-/// Whether the output is drawn; a report is written, around a chart of its own.
+/// Whether the output is drawn; a report is text around its own chart.
 fn is_picture(output: &Output) -> bool {
     output.format.is_drawn && output.format.word != "md"
 }
 
-/// Whether the output holds the graph itself, all of it unless `--filtered` says otherwise.
+/// Whether the output contains the graph as data, complete unless `--filtered` is given.
 fn is_data(output: &Output) -> bool {
     ["json", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
 }
@@ -183,8 +183,8 @@ const NOT_OF_FIGURES: &str = "style size fit orientation layout layout-from mode
 const OF_FILMS: &str = "period step align skip-unchanged cut frame-ms tween hold-changes max-bytes poster strip figure \
     captions phases format";
 
-/// Whether a mission in which nothing changes may be one picture: the output is left to us, or is one picture already, and
-/// no option asks for a film.
+/// Whether a mission without changes may become a single picture: no output is given, or it is a single picture, and no
+/// option requires an animation.
 pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
     let is_whole = |o: &Output| o.format.whole != OneDrawing::Never && !o.target.is_numbered();
     let is_left = given.any("outputs").is_none();
@@ -248,8 +248,8 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
 /// Options that say how time is cut into windows.
 const OF_WINDOWS: &str = "period step align skip-unchanged cut grace";
 
-/// The note where an option about windows is given for `what`, which tells continuous time; `None` without one. That is
-/// not a mistake: scripts ask for the log and for pictures with the same options.
+/// The note for an option about windows given for `what`, which uses continuous time; `None` without one. It is not an
+/// error: scripts request the log and pictures with the same options.
 pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
     let option = given.any(OF_WINDOWS)?;
     Some(format!(
@@ -257,7 +257,7 @@ pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
     ))
 }
 
-/// Refuses the options of `diff` that do not apply where one of the two is an expectation.
+/// Refuses options of `diff` that do not apply if one of the two is an expectation.
 pub(super) fn check_against(given: &Given) -> Result<()> {
     given.refuse(
         "style size rate-change",
@@ -266,7 +266,7 @@ pub(super) fn check_against(given: &Given) -> Result<()> {
     )
 }
 
-/// Refuses the options of `diff` that only pictures show, where there is none.
+/// Refuses options of `diff` that only affect pictures, if there is none.
 pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> Result<()> {
     check_guesses(infer)?;
     if has_picture {
@@ -284,7 +284,7 @@ pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> 
     )
 }
 
-/// Refuses the options of `baseline` that add elements that it never writes.
+/// Refuses options of `baseline` that add elements it never writes.
 pub(super) fn check_baseline(given: &Given) -> Result<()> {
     given.refuse(
         "source infer",
@@ -293,7 +293,7 @@ pub(super) fn check_baseline(given: &Given) -> Result<()> {
     )
 }
 
-/// Refuses the options of `check` that apply to none of these formats.
+/// Refuses options of `check` that apply to none of these formats.
 pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> Result<()> {
     check_guesses(infer)?;
     if formats.contains(&"markdown") {
@@ -306,7 +306,7 @@ pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> 
     )
 }
 
-/// Refuses to judge by nodes that nothing in the bag names.
+/// Refuses to check against inferred nodes.
 fn check_guesses(infer: &[String]) -> Result<()> {
     if infer.iter().any(|word| word == "source") {
         let what =

@@ -186,7 +186,7 @@ pub(super) enum InfoFormat {
 }
 
 impl InfoFormat {
-    /// The format of a table; CSV for what is none.
+    /// The table format; CSV if the format is not one.
     pub(super) fn of_table(self) -> TableFormat {
         match self {
             #[cfg(feature = "parquet")]
@@ -220,8 +220,8 @@ pub(super) struct Inputs {
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Time")]
 pub(super) struct TimeArgs {
-    /// Length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s, shorter for bags below five
-    /// minutes, longer above ten hours]
+    /// Length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s, shorter for bags below
+    /// five minutes, longer above ten hours]
     #[arg(long, short, value_parser = length)]
     pub(super) period: Option<Length>,
     /// Time from one window's start to the next; windows overlap if it is below `--period`. [default: the period]
@@ -280,8 +280,8 @@ pub(super) struct GraphArgs {
     /// Read the newest commit, another one, or the working tree. [default: the last commit before the recording ended]
     #[arg(long, value_name = "HEAD|COMMIT|worktree", requires = "source")]
     pub(super) source_at: Option<String>,
-    /// Also infer subscriptions from equal header stamps, from equal payloads in bags above 64 MB, or unnamed nodes from
-    /// source code.
+    /// Also infer subscriptions from equal header stamps, from equal payloads in bags above 64 MB, or unnamed nodes
+    /// from source code.
     #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
 }
@@ -298,7 +298,7 @@ const RENDER_ESSENTIALS: &str =
     "bags outputs period start end mode ns_filter topic_filter style size for";
 
 impl Typed {
-    /// The command line's grammar. Its short help keeps to one screen.
+    /// The command line's grammar. Its short help fits one screen.
     pub(super) fn grammar() -> clap::Command {
         Self::command().mut_subcommand("render", |render| {
             render.mut_args(|arg| {

@@ -1,4 +1,4 @@
-//! `bagreel extract`: its arguments, turned into tables of messages.
+//! `bagreel extract`: from arguments to tables of messages.
 
 use crate::bag::Input;
 use crate::base::error::Error;
@@ -71,7 +71,7 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
     })
 }
 
-/// The format that was asked for, by word or by the name's ending.
+/// The requested format, by name or file extension.
 fn format(args: &ExtractArgs, target: &Target) -> Result<TableFormat, Error> {
     match (&args.format, target.extension()) {
         (Some(word), _) => TableFormat::parse(word),

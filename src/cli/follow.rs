@@ -1,4 +1,4 @@
-//! `follow`: looks at a recording again and again, prints what is new, and writes the outputs when it is over.
+//! `follow`: polls a recording, prints what is new, and writes the outputs at the end.
 
 use std::path::Path;
 
@@ -19,23 +19,24 @@ use crate::pipeline::Render;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
 use crate::pipeline::live::Live;
 
-/// The most messages that events are found in, the newest: a tenth of a second of work.
+/// The number of newest messages in which events are detected: a tenth of a second of work.
 const MOST: u64 = 1_000_000;
-/// The seconds between two looks at what is known, as a multiple of the time that one takes: three percent of a core.
+/// The pause between two analyses as a multiple of their duration: three percent of a core.
 const REST: f64 = 33.0;
-/// The least seconds between two, and the same where something new appeared, of which people wait to hear.
+/// The shortest pause in seconds between two, in general and after something new appeared, which people are waiting
+/// for.
 const LEAST: f64 = 1.0;
 const LEAST_NEW: f64 = 0.2;
 
-/// A work that takes time, and the next time at which it may be done.
+/// A recurring task, and the next time at which it may run.
 struct Pace {
     due: f64,
-    /// The time at which it may be done if something new appeared.
+    /// The time at which it may run if something new appeared.
     due_new: f64,
 }
 
 impl Pace {
-    /// Does some work, and puts off the next.
+    /// Runs the task and schedules the next run.
     fn spend<T>(&mut self, terminal: &Terminal, work: impl FnOnce() -> T) -> T {
         let begun = terminal.seconds();
         let done = work();
@@ -53,7 +54,7 @@ impl Pace {
     }
 }
 
-/// Everything that is done with what is known.
+/// The state of a followed recording and its outputs.
 struct Follower<'a> {
     args: &'a FollowArgs,
     follow: Follow,
@@ -147,13 +148,13 @@ impl Follower<'_> {
             let is_new = self.follow.known() > known && now >= self.events.due_new;
             if is_behind && (is_over || is_new || now >= self.events.due) {
                 (known, is_behind) = (self.follow.known(), false);
-                if !self.tell_events(terminal)? {
+                if !self.print_events(terminal)? {
                     break;
                 }
             }
             if is_page_behind && (is_over || now >= self.whole.due) {
                 is_page_behind = false;
-                self.tell_whole(terminal)?;
+                self.update_whole(terminal)?;
             }
             if is_idle && let Some(idle) = self.args.idle {
                 terminal.say(&format!("nothing was written for {idle}"));
@@ -167,8 +168,8 @@ impl Follower<'_> {
         self.end(terminal)
     }
 
-    /// Prints the new events; false if nobody reads them any more.
-    fn tell_events(&mut self, terminal: &mut Terminal) -> Result<bool> {
+    /// Prints the new events; false if standard output was closed.
+    fn print_events(&mut self, terminal: &mut Terminal) -> Result<bool> {
         let (follow, feed, format) = (&self.follow, &mut self.feed, self.format);
         let lines = self.events.spend(terminal, || {
             let known = follow.so_far(MOST, Length::All)?;
@@ -177,8 +178,8 @@ impl Follower<'_> {
         terminal.lines(&lines?)
     }
 
-    /// Prints new findings, and renews the page.
-    fn tell_whole(&mut self, terminal: &mut Terminal) -> Result<()> {
+    /// Prints new findings and updates the page.
+    fn update_whole(&mut self, terminal: &mut Terminal) -> Result<()> {
         if self.expectation.is_none() && self.server.is_none() {
             return Ok(());
         }
@@ -211,7 +212,7 @@ impl Follower<'_> {
         terminal.lines(&lines?).map(drop)
     }
 
-    /// Judges and writes the recording as it lies there now.
+    /// Checks the recording as it is now and writes the outputs.
     fn end(mut self, terminal: &mut Terminal) -> Result<u8> {
         self.live.iter_mut().for_each(Live::finish);
         let job = Render {

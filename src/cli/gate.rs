@@ -1,4 +1,4 @@
-//! The commands that judge: their arguments, turned into work for the pipeline, and its outcome into an exit code.
+//! `diff`, `baseline` and `check`: from arguments to pipeline jobs, and from their outcome to an exit code.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,7 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
     })
 }
 
-/// The names of two missions without their folders, unless the missions differ only in these.
+/// The names of two missions, without folders unless the names differ only in these.
 fn subject(first: &Path, second: &Path) -> DiffSubject {
     let whole = |path: &Path| path.display().to_string();
     let last = |path: &Path| {
@@ -96,7 +96,7 @@ fn subject(first: &Path, second: &Path) -> DiffSubject {
     }
 }
 
-/// A picture of both missions: tables and the like hold times, which are not the same in both.
+/// A picture of both missions; tables contain times, which differ between the two.
 fn picture(output: &OsStr) -> Result<Output> {
     let picture = Output::named(output, None)?;
     if picture.format.is_viewed {
@@ -138,7 +138,7 @@ fn against(
     self::check(&check, given, terminal)
 }
 
-/// Writes an expectation that holds in all of these healthy runs.
+/// Writes an expectation that all of these healthy runs meet.
 pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     applies::check_baseline(given)?;
     let runs = args.bags.iter().map(|bag| {
@@ -185,7 +185,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     Ok(codes.max().unwrap_or(DONE))
 }
 
-/// Holds a mission against an expectation.
+/// Checks a mission against an expectation.
 pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     if let Some(word) = &args.explain {
         let Some(text) = explain(word) else {
@@ -218,7 +218,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
     verdict(&job, Some(args.format), terminal)
 }
 
-/// Checks the closed recording that was followed as `what`; prints the findings where a format is given.
+/// Checks the closed recording that was followed as `what`; prints the findings if a format is given.
 pub(super) fn judge_closed(
     reading: Reading,
     what: &Path,
@@ -239,7 +239,7 @@ pub(super) fn judge_closed(
     verdict(&job, format, terminal)
 }
 
-/// Judges, prints the findings where a format is given, and returns the exit code.
+/// Runs the check, prints the findings if a format is given, and returns the exit code.
 fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Result<u8> {
     let done = gate::check(job, terminal)?;
     let subject = job.subject(&done.mission);
@@ -256,8 +256,8 @@ fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Res
     })
 }
 
-/// A path from the root of its repository, with slashes: the checkout of a job of GitHub's or GitLab's, else the nearest
-/// folder with `.git`. As typed where it is in none of them.
+/// A path relative to the root of its repository, with slashes: the checkout of a GitHub or GitLab job, else the
+/// nearest folder with `.git`. Unchanged outside a repository.
 fn tracked(path: &Path) -> String {
     let typed = || {
         let typed = path.display().to_string();
@@ -290,7 +290,7 @@ fn unknown_kind(word: &str) -> Error {
     )
 }
 
-/// The reading for a judgement. Missions in JSON bring their own windows.
+/// The reading for a check. Missions in JSON have their own windows.
 fn judged(inputs: &Inputs, time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
     let time = TimeArgs {
         period: time.period,
@@ -305,7 +305,7 @@ fn typed(bags: &[PathBuf]) -> Vec<String> {
     bags.iter().map(|bag| bag.display().to_string()).collect()
 }
 
-/// A report to write: its format by the word before a colon, by its ending, or because a job collects its summary there.
+/// A report to write: its format by prefix, by extension, or Markdown if it is a CI job's summary file.
 fn report(output: &OsStr) -> Result<ReportJob> {
     let name = output.to_string_lossy();
     let named = |word: &str| Format::from_word(word);

@@ -1,4 +1,4 @@
-//! What packages install beside the command: completions and manual pages.
+//! Completions and manual pages, which packages install with the command.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ pub(super) fn completions(
 
 /// Prints the manual page of the command `name`, or that of all commands.
 pub(super) fn manual(name: Option<&str>, terminal: &mut Terminal) -> Result<(), Error> {
-    // Not the grammar, whose short help leaves options out. Building it gives the commands their full names, such as
+    // Not the grammar, whose short help omits options. Building it gives the commands their full names, such as
     // `bagreel-render`.
     let mut command = Typed::command().disable_help_subcommand(true);
     command.build();

@@ -1,4 +1,4 @@
-//! The options of the look, from the command line.
+//! The options for the look of pictures, from the command line.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::mission::{Places, read_json};
 use crate::pipeline::{Body, Phases};
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
-/// The options of the view: `rqt_graph`'s defaults or ours, changed by the options that were typed.
+/// The view options: `rqt_graph`'s defaults or ours, modified by the given options.
 pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     let mut view = if args.rqt_defaults {
         ViewOptions::rqt_defaults()
@@ -57,13 +57,13 @@ pub(super) fn style(name: &str) -> Result<Style> {
     Style::from_toml(&text, path)
 }
 
-/// The built-in styles, one a line.
+/// The built-in styles, one per line.
 pub(super) fn styles() -> String {
     let names: Vec<&str> = BUILTIN.iter().map(|row| row.0).collect();
     names.join("\n") + "\n"
 }
 
-/// The bundled font, with a file of the user's for characters that it lacks.
+/// The bundled font, with the user's font file for characters that it lacks.
 pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     let Some(path) = file else {
         return Ok(Fonts::bundled());
@@ -113,7 +113,7 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> 
     })
 }
 
-/// Graph or board: as asked for, or a graph where an option applies to a graph only.
+/// Graph or board: as requested, or a graph if an option only applies to a graph.
 pub(super) fn body(args: &RenderArgs) -> Result<Body> {
     let (view, look) = (&args.view, &args.look);
     let typed = [
@@ -141,7 +141,7 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
     }
 }
 
-/// The figure that was asked for, with its width on paper in millimetres.
+/// The requested figure, with its width on paper in millimetres.
 pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Result<FigureOptions> {
     let kind = FigureKind::parse(word)?;
     let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
@@ -170,7 +170,7 @@ pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Resul
     })
 }
 
-/// The width of the steps that `--strip changes` draws, in millimetres, unless one is asked for.
+/// The default width of the steps that `--strip changes` draws, in millimetres.
 const STEPS_MM: f64 = 181.0;
 
 /// The figure in the options of `render`, which are those of `bagreel figure`; for `--strip changes`, the steps.
@@ -223,7 +223,7 @@ fn link(text: &str) -> Result<(String, String)> {
             "write `--link player=https://…`",
         )
     })?;
-    // Whoever reads a report trusts its links: nothing that a click could run.
+    // Readers trust the links in a report: no scheme that executes code.
     let scheme = url
         .split_once(':')
         .map(|(scheme, _)| scheme.to_ascii_lowercase());
@@ -238,7 +238,7 @@ fn link(text: &str) -> Result<(String, String)> {
     Ok((name.to_owned(), url.to_owned()))
 }
 
-/// The places of an earlier run's JSON.
+/// The positions from an earlier run's JSON.
 pub(super) fn kept(file: Option<&Path>) -> Result<Option<Places>> {
     let Some(path) = file else { return Ok(None) };
     let text = file::read_text(path, budget::MISSION_JSON)?;

@@ -1,4 +1,4 @@
-//! The options that say what is read, turned into a reading.
+//! From input options to a reading.
 
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use crate::bag::Input;

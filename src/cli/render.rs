@@ -1,4 +1,4 @@
-//! `bagreel render`: its arguments, turned into a job, and the report of what was written.
+//! `bagreel render`: from arguments to a job, and the report of what was written.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -79,13 +79,13 @@ pub(super) fn figure(
         terminal.make_room();
     }
     let done = crate::pipeline::render(&job, terminal)?;
-    // A figure shows continuous time, whatever the windows are.
+    // A figure shows continuous time, independent of windows.
     terminal.notices(&done.notices.without(NoticeKind::Chosen));
     terminal.say(&wrote(&done, "", terminal.seconds()));
     Ok(code(&done.mission))
 }
 
-/// The work that `figure` was asked to do.
+/// The job of `figure`.
 fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
     let time = TimeArgs {
         start: args.start,
@@ -188,7 +188,7 @@ fn wrote(done: &Rendered, what: &str, seconds: f64) -> String {
     )
 }
 
-/// The division of the mission in words: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in
+/// The division of the mission as text: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in
 /// length.
 fn division(mission: &Mission) -> String {
     let windows = words::count(mission.windows.len(), "window");
@@ -204,7 +204,7 @@ fn division(mission: &Mission) -> String {
     }
 }
 
-/// The work that `render` was asked to do.
+/// The job of `render`.
 fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
     let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
     let phases = look::phases(&args.phases.phases, args.look.captions.as_deref())?;
@@ -261,7 +261,7 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
     })
 }
 
-/// The files that only a drawing reads. A style or captions may be a name that is not a file, which does no harm.
+/// The files that only a drawing reads. Built-in style names and caption topics are included, which is harmless.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
     let named = [
@@ -275,7 +275,7 @@ fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     all.filter(|path| path.exists()).collect()
 }
 
-/// The file that collects the summary of a job of GitHub's; its name has no extension.
+/// The summary file of a GitHub job; its name has no extension.
 pub(super) fn summary() -> Option<PathBuf> {
     std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
 }
@@ -286,8 +286,8 @@ fn summary_format(output: &OsStr) -> Option<&'static str> {
         .then_some("md")
 }
 
-/// The output where none is given: `out/<bag name>.gif`, of a figure `.pdf`, of a still `.png`; the name is without the
-/// ending of the format.
+/// The default output: `out/<bag name>.gif`, `.pdf` for a figure, `.png` for a still; the bag's name is without its
+/// extension.
 fn default_output(inputs: &[Input], extension: &str) -> String {
     let name = inputs.first().map_or_else(String::new, Input::name);
     let mut stem = name.as_str();

@@ -1,5 +1,5 @@
-//! A page for the browsers of this machine: one page, and an event whenever there is a newer one. It reads nothing but
-//! requests for these two, and writes nothing anywhere.
+//! A local HTTP server: serves one page, and an event whenever there is a newer one. It accepts requests for these two
+//! only, and writes no files.
 
 use std::io::{Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -15,9 +15,9 @@ use crate::base::error::{Error, Result};
 const MOST_REQUEST: usize = 8 << 10;
 /// The most connections at a time: a page keeps one open.
 const MOST_OPEN: usize = 32;
-/// The longest time for a request to come, or for a part of an answer to be taken.
+/// The timeout for reading a request or writing a part of an answer.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// The time after which a silent stream of events says something, so that one whose reader has gone ends.
+/// The keep-alive interval of event streams, so that closed connections are detected.
 const ALIVE: Duration = Duration::from_secs(15);
 
 const WAITING: &str = "<!doctype html><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"1\"><title>bagreel</title>\
@@ -29,7 +29,7 @@ type Newest = (Mutex<(u64, Arc<[u8]>)>, Condvar);
 /// A server that runs until the process ends.
 pub(super) struct Server {
     newest: Arc<Newest>,
-    /// The address, with the port that was found if any would do.
+    /// The address, with the chosen port if any port was allowed.
     pub(super) address: SocketAddr,
 }
 
@@ -37,7 +37,7 @@ impl Server {
     /// Serves at an address.
     ///
     /// # Errors
-    /// Where the address cannot be used.
+    /// If the address cannot be used.
     pub(super) fn start(at: SocketAddr) -> Result<Self> {
         let failed = |source| Error::Io {
             path: PathBuf::from(at.to_string()),
@@ -58,7 +58,7 @@ impl Server {
                 }
                 let (newest, open) = (Arc::clone(&shared), Arc::clone(&open));
                 thread::spawn(move || {
-                    // Whoever does not take the answer does not get it.
+                    // Failed connections are ignored.
                     let _ = answer(stream, &newest);
                     open.fetch_sub(1, Ordering::Relaxed);
                 });
@@ -115,8 +115,8 @@ fn answer(mut stream: TcpStream, newest: &Newest) -> std::io::Result<()> {
     }
 }
 
-/// Whether a request names this machine by an address: a name of a site's own that leads here would let that site read
-/// the page.
+/// Whether a request's host is an IP address or `localhost`: a foreign domain that resolves to this machine could read
+/// the page (DNS rebinding).
 fn is_own(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) => name,
@@ -167,13 +167,13 @@ mod tests {
         let mut stream = TcpStream::connect(server.address).unwrap();
         stream.write_all(request.as_bytes()).unwrap();
         let mut answer = String::new();
-        // What is refused before it was read whole ends in a reset.
+        // A request that is refused before it was read completely ends in a reset.
         let _ = stream.read_to_string(&mut answer);
         answer
     }
 
     #[test]
-    fn only_this_machine_is_answered_and_only_two_paths() {
+    fn only_local_requests_for_two_paths_are_answered() {
         let server = Server::start("127.0.0.1:0".parse().unwrap()).unwrap();
         let get = |path: &str, host: &str| {
             ask(
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn every_newer_page_is_an_event() {
+    fn every_new_page_sends_an_event() {
         let server = Server::start("127.0.0.1:0".parse().unwrap()).unwrap();
         let mut stream = TcpStream::connect(server.address).unwrap();
         write!(stream, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();

@@ -1,4 +1,4 @@
-//! The commands that print what a bag holds: `info`, `events`.
+//! The commands that print the contents of a bag: `info`, `events`.
 
 use super::applies::{self, Given};
 use super::args::{ChangeArgs, EventsArgs, EventsFormat, InfoArgs, InfoFormat, TimeArgs};

@@ -1,4 +1,4 @@
-//! `bagreel tables`: its arguments, turned into the tables of a fleet.
+//! `bagreel tables`: from arguments to the tables of a fleet.
 
 use std::path::Path;
 
@@ -27,12 +27,15 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     job.on_error = args.on_error;
     job.jobs = args.jobs;
     let done = fleet::tables(&job, terminal)?;
-    for (_, why) in done.refused.iter().take(MOST_TOLD) {
+    for (_, why) in done.refused.iter().take(MOST_REPORTED) {
         terminal.failed(why);
     }
     let seconds = terminal.seconds();
     let to = args.output.display();
-    terminal.say(&format!("wrote {to}: {}, in {seconds:.1} s", told(&done)));
+    terminal.say(&format!(
+        "wrote {to}: {}, in {seconds:.1} s",
+        summary(&done)
+    ));
     Ok(match &done {
         done if !done.refused.is_empty() => FAILED,
         done if done.unreadable + done.incomplete > 0 => SKIPPED,
@@ -40,11 +43,11 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     })
 }
 
-/// So many refusals are reported one by one: a store that is down refuses every bag of a fleet.
-const MOST_TOLD: usize = 8;
+/// The most failures reported one by one: a store that is down fails for every bag of a fleet.
+const MOST_REPORTED: usize = 8;
 
 /// `12 bags (1 unreadable, 3 there already), 4711 messages`.
-fn told(done: &Tabled) -> String {
+fn summary(done: &Tabled) -> String {
     let of = [
         (done.unreadable, "unreadable"),
         (done.incomplete, "damaged"),
@@ -66,14 +69,14 @@ fn told(done: &Tabled) -> String {
     format!("{bags}, {}", words::count(messages, "message"))
 }
 
-/// The bags in a list: zero bytes stand between names that may hold line ends.
+/// The bags in a list: names that may contain line ends are separated by zero bytes.
 fn listed(manifest: &Path) -> Result<Vec<String>> {
     let bytes = if manifest == Path::new("-") {
         file::read_from(std::io::stdin(), manifest, budget::MANIFEST)?
     } else {
         file::read(manifest, budget::MANIFEST)?
     };
-    // A name that is no UTF-8 is reported, and found, by what is left of it.
+    // A name that is not UTF-8 is converted lossily.
     let text = String::from_utf8_lossy(&bytes);
     let between = if text.contains('\0') { '\0' } else { '\n' };
     let lines = text.split(between).map(|line| line.trim_end_matches('\r'));

@@ -1,4 +1,4 @@
-//! The output for people: results, notices, errors and hints; the only file that prints.
+//! Terminal output: results, notices, errors and hints; the only file that prints.
 
 mod progress;
 
@@ -17,7 +17,7 @@ use crate::mission::ledger::Kind;
 use crate::pipeline::{Stage, Watch};
 use progress::Progress;
 
-/// Standard error and output, as the user set them up.
+/// Standard error and output, as configured by the user.
 #[derive(Debug)]
 pub(crate) struct Terminal {
     quiet: bool,
@@ -29,8 +29,9 @@ pub(crate) struct Terminal {
 }
 
 impl Terminal {
-    /// A terminal as the options of every command have it. Colours only where the stream is a terminal and `NO_COLOR`
-    /// is not set, unless `--color` says otherwise.
+    /// A terminal as set by the common options. Colours only if the stream is a terminal and `NO_COLOR` is not set,
+    /// unless
+    /// `--color` overrides it.
     pub(super) fn new(typed: &Typed) -> Self {
         let is_asked = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let colour = |is_terminal: bool| match typed.color {
@@ -50,7 +51,7 @@ impl Terminal {
         }
     }
 
-    /// The columns of the terminal that results are printed on; `None` where they go elsewhere.
+    /// The width of the terminal on which results are printed; `None` if they go elsewhere.
     #[expect(
         clippy::unused_self,
         reason = "whoever holds the terminal may measure it"
@@ -70,14 +71,14 @@ impl Terminal {
         }
     }
 
-    /// Prints one of several errors that did not end the run, as only tables have them.
+    /// Prints one of several errors that did not end the run; only `tables` has them.
     #[cfg(feature = "parquet")]
     pub(crate) fn failed(&mut self, why: &str) {
         self.progress.end();
         self.line("31", "error", why);
     }
 
-    /// Prints notices, one line each; several about what was left out or chosen are one line, unless all are asked for.
+    /// Prints notices, one line each; several routine ones are summarized in one line, unless all are requested.
     pub(crate) fn notices(&mut self, notices: &Notices) {
         self.progress.end();
         if self.quiet {
@@ -111,21 +112,21 @@ impl Terminal {
     pub(crate) fn say(&mut self, text: &str) {
         self.progress.end();
         if !self.quiet {
-            // A closed standard error is nobody to tell.
+            // Nothing can be reported if standard error is closed.
             let _ = writeln!(io::stderr(), "{}", visible(text));
         }
     }
 
-    /// Prints results on standard output. A closed pipe is not an error: the reader has what it wanted.
+    /// Prints results on standard output. A closed pipe is not an error.
     ///
     /// # Errors
-    /// [`Error::Io`] where not all of it could be written.
+    /// [`Error::Io`] if not all of it could be written.
     pub(crate) fn results(&mut self, text: &str) -> Result<()> {
         self.progress.end();
         print(printable(text).as_bytes()).map(drop)
     }
 
-    /// As [`Terminal::results`], of a table: bytes that are not text are printed as they are.
+    /// As [`Terminal::results`], for a table: bytes that are not text are printed unchanged.
     ///
     /// # Errors
     /// As [`Terminal::results`].
@@ -137,7 +138,7 @@ impl Terminal {
         }
     }
 
-    /// Prints lines on standard output; false if nobody reads them any more.
+    /// Prints lines on standard output; false if it was closed.
     ///
     /// # Errors
     /// As [`Terminal::results`].
@@ -150,18 +151,18 @@ impl Terminal {
         print(printable(&text).as_bytes())
     }
 
-    /// Whether a signal that comes from now on is only noted, until [`Terminal::take_signal`] asks; a second one still
-    /// ends the process.
+    /// Sets whether the next signal is only recorded, for [`Terminal::take_signal`]; a second one still ends the
+    /// process.
     pub(crate) fn note_signals(&self, on: bool) {
         self.stop.is_noted.store(on, Ordering::Relaxed);
     }
 
-    /// Whether a signal came, which is forgotten: the work ends as asked.
+    /// Whether a signal came; resets it, as the work ends as requested.
     pub(crate) fn take_signal(&self) -> bool {
         self.stop.take()
     }
 
-    /// As [`Terminal::results`], of a log: each line with a hanging indent, in the colour of its kind.
+    /// As [`Terminal::results`], for a log: each line with a hanging indent, in the colour of its kind.
     ///
     /// # Errors
     /// As [`Terminal::results`].
@@ -187,14 +188,14 @@ impl Terminal {
         print(text.as_bytes()).map(drop)
     }
 
-    /// Makes room for results that something else writes to standard output, if that is the terminal: no bar from now on.
+    /// Hides the progress bar if something else writes results to standard output and that is the terminal.
     pub(crate) fn make_room(&mut self) {
         if io::stdout().is_terminal() {
             self.progress.hide();
         }
     }
 
-    /// The exit code for the signal that asked us to stop; `None` if none did.
+    /// The exit code for the signal that requested a stop, if any.
     pub(crate) fn stopped_by(&self) -> Option<u8> {
         self.stop.code()
     }
@@ -206,7 +207,7 @@ impl Terminal {
         }
     }
 
-    /// Waits a moment before looking at a file again.
+    /// Waits before checking a file again.
     #[expect(
         clippy::unused_self,
         reason = "whoever holds the terminal may print and wait"
@@ -220,7 +221,7 @@ impl Terminal {
         self.progress.seconds()
     }
 
-    /// Prints the time of each stage, and its largest steps.
+    /// Prints the time of each stage and its largest steps.
     pub(crate) fn timings(&mut self) {
         self.progress.end();
         for line in self.progress.timings() {
@@ -238,11 +239,11 @@ impl Terminal {
     }
 }
 
-/// The width below which results are not fitted: a terminal that is dragged to nothing shows nothing anyway.
+/// The width below which results are not fitted: so narrow a terminal shows nothing useful anyway.
 const LEAST_WIDTH: usize = 40;
 
-/// The colour of an event: green for what comes, red for what goes, yellow for what is away for a while, magenta for a
-/// handover, cyan for every other change.
+/// The colour of an event: green for a start, red for an end, yellow for a temporary absence, magenta for a handover,
+/// cyan for every other change.
 fn colour(kind: Kind) -> &'static str {
     match kind {
         Kind::Started | Kind::Appeared => "32",
@@ -253,7 +254,7 @@ fn colour(kind: Kind) -> &'static str {
     }
 }
 
-/// Several notices about what was left out or chosen as one line.
+/// Several routine notices in one line.
 fn summary(notices: &[Notice]) -> String {
     let of = |kind: NoticeKind| notices.iter().filter(move |notice| notice.kind == kind);
     let hidden: u64 = of(NoticeKind::Hidden).map(|notice| notice.count).sum();
@@ -312,7 +313,7 @@ fn print(bytes: &[u8]) -> Result<bool> {
     }
 }
 
-/// Lines as they may be printed, whatever names they hold: all but line ends and tabs is made visible.
+/// Lines that are safe to print: all control characters except line ends and tabs are escaped.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for part in text.split_inclusive(['\n', '\t']) {
@@ -328,7 +329,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_cannot_steer_the_terminal() {
+    fn names_cannot_control_the_terminal() {
         assert_eq!(
             printable("/a\u{1b}[2J\u{202e}b\n"),
             "/a\\u{1b}[2J\\u{202e}b\n"

@@ -1,4 +1,4 @@
-//! The progress bar, and the time of each part of the work; the only file that measures time.
+//! The progress bar and the time of each stage; the only file that measures time.
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _};
@@ -8,23 +8,23 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::pipeline::Stage;
 
-/// How often a bar moves where no progress is reported, as in one long layout.
+/// The tick interval of a bar without reported progress, as in a long layout.
 const TICK: Duration = Duration::from_millis(120);
 
-/// The part of the work that is under way.
+/// The current stage.
 #[derive(Debug)]
 pub(super) struct Progress {
     is_shown: bool,
     bar: Option<ProgressBar>,
     stage: Option<(Stage, Instant)>,
     spent: BTreeMap<Stage, Duration>,
-    /// The shares of the time of each stage, in words.
+    /// The shares of the time of each stage, as text.
     shares: BTreeMap<Stage, String>,
     begun: Instant,
 }
 
 impl Progress {
-    /// Progress that is shown only where standard error is a terminal, and if `is_shown`.
+    /// Progress, shown only if standard error is a terminal and `is_shown`.
     pub(super) fn new(is_shown: bool) -> Self {
         Self {
             is_shown: is_shown && io::stderr().is_terminal(),
@@ -36,20 +36,20 @@ impl Progress {
         }
     }
 
-    /// Shows no bar from now on: results are written to the same terminal.
+    /// Hides the bar: results are written to the same terminal.
     pub(super) fn hide(&mut self) {
         self.end();
         self.is_shown = false;
     }
 
-    /// A new part of the work begins; the one before is over.
+    /// Begins a stage and ends the previous one.
     pub(super) fn begin(&mut self, stage: Stage) {
         self.end();
         self.stage = Some((stage, Instant::now()));
         self.bar = self.is_shown.then(|| bar(stage));
     }
 
-    /// The part that is under way has done `done` of `total`, which is 0 where it is not known.
+    /// Sets the progress of the current stage: `done` of `total`, which is 0 if unknown.
     pub(super) fn set(&self, done: u64, total: u64) {
         if let Some(bar) = &self.bar {
             if total > 0 {
@@ -62,7 +62,7 @@ impl Progress {
         }
     }
 
-    /// The part that is under way is over: its bar is cleared.
+    /// Ends the current stage and clears its bar.
     pub(super) fn end(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
@@ -72,7 +72,7 @@ impl Progress {
         }
     }
 
-    /// Prints something while the bar is out of the way.
+    /// Prints something with the bar hidden.
     pub(super) fn aside(&self, print: impl FnOnce()) {
         match &self.bar {
             Some(bar) => bar.suspend(print),
@@ -80,7 +80,7 @@ impl Progress {
         }
     }
 
-    /// Keeps the shares of the time of the part that is under way.
+    /// Records the time shares of the current stage.
     pub(super) fn share(&mut self, shares: &[(&'static str, f64)]) {
         let Some((stage, _)) = self.stage else {
             return;
@@ -100,7 +100,7 @@ impl Progress {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// The time of each part, and its largest steps, a line each.
+    /// The time of each stage and its largest steps, one line each.
     pub(super) fn timings(&self) -> Vec<String> {
         let line = |(stage, time): (&Stage, &Duration)| {
             let shares = self.shares.get(stage).map_or("", String::as_str);
@@ -110,7 +110,7 @@ impl Progress {
     }
 }
 
-/// A bar that turns until its total is known.
+/// A spinner until the total is known.
 fn bar(stage: Stage) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     let turning = match stage {
@@ -123,7 +123,7 @@ fn bar(stage: Stage) -> ProgressBar {
     bar
 }
 
-/// The form of a bar whose total is known.
+/// The template of a bar with a known total.
 fn counted(stage: Option<(Stage, Instant)>) -> &'static str {
     match stage.map(|(stage, _)| stage) {
         Some(Stage::Read | Stage::Verify) => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
