@@ -1,8 +1,8 @@
-//! Declarations in the source code of the robot: names come from the bag, edges from the code. Nothing is run.
+//! Declarations in the robot's source code: names come from the bag, edges from the code. Nothing is executed.
 //!
-//! The topics of a node almost always stand in its code in plain sight; the code does not say which nodes ran. So a
-//! node that the bag names gets the publishers and subscribers that its code declares, where topic and type are
-//! recorded under exactly these names. Tried on 182 public repositories and 242 bags; `matching` states the precision.
+//! A node's topics are almost always literal in its code, but the code does not tell which nodes ran. So a node named
+//! in the bag gets the publishers and subscribers that its code declares, if topic and type are recorded under exactly
+//! these names. Evaluated on 182 public repositories and 242 bags; `matching` states the precision.
 
 mod cpp;
 mod declaration;
@@ -35,19 +35,19 @@ pub struct SourceCode {
     pub folder: PathBuf,
     /// The version to read.
     pub version: Version,
-    /// Whether the only place in the code that can be meant counts too, though the bag does not name its node.
+    /// Whether the only possible declaration counts too, although the bag does not name its node.
     pub infers: bool,
 }
 
 /// The version of the code to read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Version {
-    /// The last commit before the recording's end, where the folder is in a git repository; else the files as they lie.
+    /// The last commit before the recording's end if the folder is in a git repository; else the working tree.
     #[default]
     Recording,
     /// A commit, branch or tag; `HEAD` is the newest.
     Commit(String),
-    /// The files as they lie.
+    /// The working tree.
     Worktree,
 }
 
@@ -55,11 +55,11 @@ pub enum Version {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Code {
     instances: Vec<Instance>,
-    /// Every place in the code with a declaration.
+    /// Every declaration in the code.
     places: Vec<FileDeclaration>,
     files: usize,
     packages: usize,
-    /// The commit that was read, in words.
+    /// The commit that was read, as text.
     version: Option<String>,
     infers: bool,
     notices: Vec<Notice>,
@@ -68,7 +68,7 @@ pub struct Code {
 /// Reads source code; `end` is the recording's end.
 ///
 /// # Errors
-/// If the folder cannot be read, or a commit that was asked for is not there.
+/// If the folder cannot be read, or a requested commit does not exist.
 pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
     let (files, version, mut notices) = match git::files(&wanted.folder, &wanted.version, end)? {
         git::Checkout::Commit { files, words } => (files, Some(words), Vec::new()),
@@ -142,7 +142,7 @@ fn read_file(file: &SourceFile) -> FileRead {
         Some(FileKind::Cpp) => FileRead::Code(cpp::read(&file.text)),
         Some(FileKind::Launch) => {
             let path = Path::new(&file.path);
-            // A launch file that cannot be read starts nothing.
+            // An unreadable launch file starts nothing.
             let tree = launch::tree_of(path, &file.text).ok().flatten();
             tree.map_or(FileRead::Nothing, |tree| {
                 FileRead::Launch(launch::nodes(path, &tree))
@@ -152,7 +152,7 @@ fn read_file(file: &SourceFile) -> FileRead {
     }
 }
 
-/// The number of files read at once: more do not help, for the largest file decides.
+/// The number of files read at once: more do not help, as the largest file dominates.
 const READERS: usize = 4;
 
 /// Reads all files, in their order.
@@ -178,7 +178,7 @@ fn in_parallel(files: &[SourceFile]) -> Vec<FileRead> {
             .collect()
     });
     all.sort_by_key(|(at, _)| *at);
-    // Files of a reader that died are missing; the others keep their places.
+    // If a reader panics, its files are missing; the others keep their positions.
     let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::Nothing).collect();
     for (at, file) in all {
         read[at] = file;

@@ -1,7 +1,7 @@
-//! The user's additions to a bag: nodes and edges from a file. It adds, and never overwrites measurements.
+//! The user's additions to a bag: nodes and edges from a file. They never overwrite measurements.
 //!
-//! The forms are the research prototype's CSV, a YAML form of ours, DOT saved by `rqt_graph`, and launch files: XML of
-//! ROS 1 and ROS 2, YAML and Python of ROS 2. Nothing is run.
+//! The formats are the research prototype's CSV, our own YAML, DOT saved by `rqt_graph`, and launch files: XML of ROS 1
+//! and ROS 2, YAML and Python of ROS 2. Nothing is executed.
 
 mod csv;
 mod dot;
@@ -28,7 +28,7 @@ pub enum NamedElement {
     Topic(String),
     /// A node and a topic that it publishes.
     Publish(String, String),
-    /// A node and a topic that it subscribes.
+    /// A node and a topic that it subscribes to.
     Subscribe(String, String),
 }
 
@@ -37,7 +37,7 @@ pub enum NamedElement {
 pub struct TopologyEntry {
     /// The element.
     pub element: NamedElement,
-    /// The beginning, in nanoseconds after the mission's start; `None`: from the start.
+    /// The start, in nanoseconds after the mission's start; `None`: from the start.
     pub from_ns: Option<i64>,
     /// The end, exclusive, in nanoseconds after the mission's start; `None`: to the end.
     pub to_ns: Option<i64>,
@@ -54,11 +54,11 @@ pub struct Topology {
     pub entries: Vec<TopologyEntry>,
     /// Notices about unusable parts: includes that were not found, nodes without a name.
     pub notices: Vec<Notice>,
-    /// The files that were read: those named, and what they include.
+    /// The files that were read, including included ones.
     pub files: Vec<PathBuf>,
 }
 
-/// Reads a file of any of the forms, distinguished by its name's ending and its content.
+/// Reads a file of any of the formats, distinguished by extension and content.
 ///
 /// # Errors
 /// [`Error::BadFile`] with the line of the mistake.
@@ -121,7 +121,7 @@ fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
     }
 }
 
-/// The place of an entry; without the line where there is none.
+/// The location of an entry; without a line if there is none.
 fn place(path: &Path, line: usize) -> String {
     let name = crate::bag::file_name(path);
     match line {
@@ -135,12 +135,12 @@ fn resolved(name: &str) -> String {
     format!("/{}", name.trim().trim_start_matches('/'))
 }
 
-/// A notice about something in a file that is not used.
+/// A notice about an unused part of a file.
 fn unused(path: &Path, line: usize, what: &str) -> Notice {
     Notice::new(NoticeKind::Note, format!("{}: {what}", place(path, line)))
 }
 
-/// What stands for the parsers of the feature `source` where it is left out.
+/// Replaces the parsers if the feature `source` is disabled.
 #[cfg(not(feature = "source"))]
 mod python {
     use std::collections::BTreeMap;
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_ending_names_the_known_ones() {
+    fn an_unknown_extension_lists_the_known_ones() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("robot.txt");
         std::fs::write(&path, "hello").unwrap();

@@ -1,6 +1,6 @@
 //! Declarations in C++ code: rclcpp and roscpp, actions, message filters, image transport, transforms.
 //!
-//! Macros are not expanded and headers not included: a single file nearly always says enough.
+//! Macros are not expanded and headers not included: a single file is nearly always sufficient.
 
 mod look;
 mod made;
@@ -16,9 +16,9 @@ use super::texts::TextValues;
 use crate::evidence::syntax::{Language, Node, Parsed, line, walk};
 use names::Aliases;
 
-/// Words at least one of which stands in every file that declares something; other files are not parsed. Classes count,
-/// for a node may derive from them.
-const TELLING: &[&str] = &[
+/// Every file with declarations contains at least one of these words; other files are not parsed. They include classes,
+/// as a node may derive from them.
+const KEYWORDS: &[&str] = &[
     "class ",
     "struct ",
     "ros::",
@@ -31,7 +31,7 @@ const TELLING: &[&str] = &[
 
 /// Reads a file; empty if it is too deeply nested.
 pub(super) fn read(text: &str) -> FileCode {
-    if !TELLING.iter().any(|word| text.contains(word)) {
+    if !KEYWORDS.iter().any(|word| text.contains(word)) {
         return FileCode::default();
     }
     let Some(parsed) = Parsed::new(Language::Cpp, text.to_owned()) else {
@@ -70,14 +70,14 @@ struct CppReader<'a> {
     /// Functions with the type of their first parameter.
     callbacks: BTreeMap<String, Node<'a>>,
     classes: Vec<Class>,
-    /// The place of each class.
+    /// The index of each class.
     places: BTreeMap<String, usize>,
-    /// The ends of the classes around the element, with the places of the classes.
+    /// The ends of the enclosing classes, with the indices of the classes.
     open: Vec<(usize, usize)>,
 }
 
 impl<'a> CppReader<'a> {
-    /// Visits every element, with `open` holding the classes around it.
+    /// Visits every element, with the enclosing classes in `open`.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();
         let root = self.parsed.root();

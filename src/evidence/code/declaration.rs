@@ -1,4 +1,4 @@
-//! Declarations in source code: publishers, subscribers, nodes and their names, each with its place.
+//! Declarations in source code: publishers, subscribers, nodes and their names, each with its location.
 
 use std::collections::BTreeMap;
 
@@ -11,14 +11,14 @@ pub(crate) enum Role {
     Subscribes,
 }
 
-/// The kind of thing that a call makes.
+/// The kind of object that a call creates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Made {
     Publisher,
     Subscriber,
     /// A call that waits for one message.
     Moment,
-    /// A publisher of images with the compressed topics beside it.
+    /// A publisher of images and their compressed topics.
     ImagePublisher,
     CameraPublisher,
     CameraSubscriber,
@@ -37,15 +37,15 @@ pub(super) enum Made {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Declaration {
     pub(crate) role: Role,
-    /// The topic as written: `/x`, `x` in the node's namespace, `~/x` below the node; `None` if the code does not tell.
+    /// The topic as written: `/x`, `x` in the node's namespace, `~/x` below the node; `None` if unknown.
     pub(crate) topic: Option<String>,
-    /// The possible types, as `package/Name`; several only behind imports of everything.
+    /// The possible types, as `package/Name`; several only with wildcard imports.
     pub(crate) types: Vec<String>,
     /// The line, ≥ 1.
     pub(crate) line: usize,
     /// The call in short: `create_publisher(String, 'chatter')`.
     pub(crate) text: String,
-    /// Whether it lasts for one message only.
+    /// Whether it only lasts for one message.
     pub(crate) is_momentary: bool,
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Class {
     /// The names that it gives to its node.
     pub(crate) node_names: Vec<String>,
     pub(crate) declarations: Vec<Declaration>,
-    /// The classes that may be made here, with the name given to the new one in the call, if any.
+    /// The classes that may be instantiated here, with the name passed in the call, if any.
     pub(crate) mentions: BTreeMap<String, Option<String>>,
     /// Whether the class itself is defined here, not only functions of it.
     pub(crate) is_defined: bool,
@@ -79,7 +79,7 @@ pub(crate) struct FileCode {
     pub(crate) imports: BTreeMap<String, String>,
 }
 
-/// A call that makes something: its topic and types as far as the code shows.
+/// A call that creates an object: its topic and types as far as known.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
     pub(super) made: Made,
@@ -127,7 +127,7 @@ impl Call {
                 )
             }
         };
-        // Who publishes what an action tells, and what it is reported.
+        // The roles on an action's outgoing (feedback, result, status) and incoming (goal, cancel) topics.
         let action1 = |tells, told| {
             let suffix = |word: &'static str| move |t: &str| format!("{t}{word}");
             vec![

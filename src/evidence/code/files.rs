@@ -33,7 +33,7 @@ pub(super) enum FileKind {
 /// The longest file that is read, in bytes: longer ones are generated or data.
 pub(super) const LONGEST: u64 = 600_000;
 
-/// The most files that are looked at.
+/// The most files that are read.
 pub(super) const MOST_FILES: usize = 50_000;
 
 /// The most text that is read, in bytes: ten times the largest workspace seen.
@@ -42,7 +42,7 @@ pub(super) const MOST_BYTES: usize = 200 << 20;
 /// The deepest nesting of folders that is entered.
 const DEEPEST: usize = 40;
 
-/// Folders that hold built, fetched or hidden files.
+/// Folders with built, fetched or hidden files.
 const SKIPPED: &[&str] = &[
     "build",
     "install",
@@ -58,7 +58,7 @@ const SKIPPED: &[&str] = &[
 pub(super) struct Files {
     pub(super) list: Vec<SourceFile>,
     pub(super) is_cut: bool,
-    /// The number of files left out since they are too long, and of folders since they nest too deep.
+    /// The number of files that are too long and of folders nested too deep.
     pub(super) too_long: usize,
     pub(super) too_deep: usize,
     bytes: usize,
@@ -114,7 +114,7 @@ fn is_skipped(folder: &str) -> bool {
     SKIPPED.contains(&folder) || folder.starts_with('.') || folder.contains("venv")
 }
 
-/// Whether a program without a file extension begins like one in Python.
+/// Whether a script without a file extension is in Python.
 fn is_python(bytes: &[u8]) -> bool {
     let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
     first.starts_with(b"#!") && first.windows(6).any(|w| w == b"python")
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_what_a_file_is() {
+    fn file_kinds_are_recognized_by_name() {
         for (path, expected) in [
             ("a/src/x.cpp", Some(FileKind::Cpp)),
             ("a/x.launch.py", Some(FileKind::Launch)),
@@ -199,7 +199,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_huge_files_are_left_alone() {
+    fn links_and_huge_files_are_skipped() {
         let (outside, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         fs::write(outside.path().join("secret.py"), "x = 1").unwrap();
         std::os::unix::fs::symlink(outside.path(), folder.path().join("out")).unwrap();

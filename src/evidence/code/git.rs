@@ -1,9 +1,9 @@
-//! The code of the recording's day from git: the one place that runs a program.
+//! The code as of the recording, from git: the only place that runs a program.
 //!
-//! Code changes between a recording and its analysis; with the code of the day two thirds more edges are found. Git's
-//! own program reads the objects, for it knows packs, alternates and object formats. It is asked for the commit, the
-//! files and their bytes, by commands that run no hook, filter, pager or file-system monitor, prompt for nothing and
-//! fetch nothing. It inherits the environment, without variables that would point it at another repository.
+//! Code changes between a recording and its analysis; the code as of the recording yields two thirds more edges. The
+//! git program reads the objects, as it supports packs, alternates and all object formats. The commands for the commit,
+//! its files and their bytes run no hook, filter, pager or file-system monitor, prompt for nothing and fetch nothing.
+//! They inherit the environment, without variables that would point to another repository.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -15,11 +15,11 @@ use super::git_link;
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 
-/// The result of asking git for a folder.
+/// The result of querying git for a folder.
 pub(super) enum Checkout {
-    /// The files of a commit, with its description in words.
+    /// The files of a commit, with its description.
     Commit { files: Files, words: String },
-    /// The files in the working tree are to be read, with a note about that, if any.
+    /// The working tree is to be read, with a note about that, if any.
     Lying { note: Option<String> },
 }
 
@@ -29,7 +29,7 @@ const DAY: i64 = 86_400;
 /// The files of the wanted version; `end` is the recording's end.
 ///
 /// # Errors
-/// If a commit that was asked for is not there.
+/// If a requested commit does not exist.
 pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Checkout> {
     if *version == Version::Worktree {
         return Ok(Checkout::Lying { note: None });
@@ -90,8 +90,8 @@ fn day(time: Stamp) -> String {
     time.to_string().chars().take(10).collect()
 }
 
-/// The path from the top of the repository to the folder, which ends in a slash or is empty; else the reason why git
-/// is not asked, or its first complaint.
+/// The path of the folder in its repository, which ends in a slash or is empty; else the reason why git is not used, or
+/// its first error.
 fn prefix(folder: &Path) -> std::result::Result<String, String> {
     let setting = |file: &Path, name: &str| {
         let file = file.to_str()?;
@@ -180,7 +180,7 @@ fn git(folder: &Path, words: &[&str]) -> Command {
 /// The most bytes of an answer: the paths of half a million files.
 const LONGEST_ANSWER: u64 = 64 << 20;
 
-/// The output of a git command, without the new line at its end; else its first complaint.
+/// The output of a git command without the final newline; else its first error.
 fn ask(folder: &Path, words: &[&str]) -> std::result::Result<String, String> {
     let answer = git(folder, words)
         .output()
@@ -208,7 +208,7 @@ fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
         .take()?
         .take(LONGEST_ANSWER)
         .read_to_end(&mut list);
-    // A listing that is too long is cut; the program ends when nobody reads on.
+    // A listing that is too long is cut; git ends when the pipe is closed.
     let is_cut = list.len() as u64 >= LONGEST_ANSWER;
     let done = listing.wait().ok()?;
     if read.is_err() || !done.success() && !is_cut {
@@ -234,7 +234,7 @@ struct GitEntry {
     path: String,
     /// The object with its bytes.
     id: String,
-    /// In bytes; `None` where the object is missing, as in a partial clone, for which nothing is fetched.
+    /// In bytes; `None` if the object is missing, as in a partial clone: nothing is fetched.
     size: Option<u64>,
 }
 
@@ -246,7 +246,7 @@ fn entry(line: &[u8]) -> Option<GitEntry> {
     let [mode, "blob", id, size] = about[..] else {
         return None;
     };
-    // A script without an ending is a program, by its mode.
+    // A script without an extension must be executable.
     let kind = kind(path).filter(|kind| *kind != FileKind::Script || mode == "100755");
     (mode.starts_with("100") && kind.is_some()).then(|| GitEntry {
         path: path.to_owned(),
@@ -270,7 +270,7 @@ fn bytes(folder: &Path, wanted: Vec<(String, String)>) -> Option<Files> {
         .flat_map(|(_, id)| [id.as_str(), "\n"])
         .collect();
     let files = std::thread::scope(|scope| {
-        // Both ends are pipes that fill up: what is asked is written while answers are read.
+        // Both pipes can fill up, so requests are written while answers are read.
         scope.spawn(move || input.write_all(ids.as_bytes()));
         let mut files = Files::default();
         for (path, _) in wanted {

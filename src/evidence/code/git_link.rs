@@ -1,5 +1,5 @@
-//! The repository that a folder belongs to, where its `.git` is a file or a link: work trees and submodules have such a
-//! file, and their repository knows them. A file that names somebody else's repository is not followed.
+//! The repository of a folder whose `.git` is a file or a link: work trees and submodules have such a file, and their
+//! repository refers back to them. A file that names a foreign repository is not followed.
 
 use std::fs;
 use std::io::Read as _;
@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// The longest `.git` file that is read, in bytes.
 const LONGEST: u64 = 8 << 10;
 
-/// Whether the nearest `.git` at a folder or above it is a folder, or is a file that the named repository knows as its
-/// own; true where there is none. `setting` asks a configuration file for a value.
+/// Whether the nearest `.git` at a folder or above it is a folder, or a file to which the named repository refers back;
+/// true if there is none. `setting` reads a value from a configuration file.
 pub(super) fn is_own(folder: &Path, setting: impl Fn(&Path, &str) -> Option<String>) -> bool {
     let Ok(folder) = folder.canonicalize() else {
         return false;
@@ -26,11 +26,11 @@ pub(super) fn is_own(folder: &Path, setting: impl Fn(&Path, &str) -> Option<Stri
     }
 }
 
-/// The most entries of a repository that are looked at.
+/// The most entries of a repository that are checked.
 const MOST_ENTRIES: usize = 1 << 18;
 
-/// Whether the nearest `.git` folder at a folder or above it holds nothing but files, folders and links: git waits for
-/// ever for a pipe.
+/// Whether the nearest `.git` folder at a folder or above it contains only files, folders and links: git would block
+/// forever on a pipe.
 pub(super) fn is_plain(folder: &Path) -> bool {
     let Ok(folder) = folder.canonicalize() else {
         return true;
@@ -49,7 +49,7 @@ pub(super) fn is_plain(folder: &Path) -> bool {
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() => open.push(entry.path()),
                 Ok(kind) if kind.is_file() => {}
-                // What a link leads to.
+                // The target of a link.
                 _ if fs::metadata(entry.path()).is_ok_and(|m| !m.is_file() && !m.is_dir()) => {
                     return false;
                 }
@@ -67,13 +67,13 @@ fn repository(entry: &Path) -> Option<PathBuf> {
     Some(entry.parent()?.join(path))
 }
 
-/// Whether a repository says that this `.git` file is the one of its work tree.
+/// Whether a repository lists this `.git` file as that of its work tree.
 fn is_work_tree(git: &Path, entry: &Path) -> bool {
     let named = text(&git.join("gitdir"));
     named.is_some_and(|named| is_same(&git.join(named.trim()), entry))
 }
 
-/// Whether a repository's configuration says that this folder is its work tree, as those of submodules do.
+/// Whether a repository's configuration names this folder as its work tree, as those of submodules do.
 fn is_submodule(git: &Path, tree: &Path, setting: impl Fn(&Path, &str) -> Option<String>) -> bool {
     let named = setting(&git.join("config"), "core.worktree");
     named.is_some_and(|named| is_same(&git.join(named), tree))

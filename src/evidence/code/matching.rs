@@ -31,7 +31,7 @@ pub(super) struct Match<'a> {
 pub(super) struct RecordedTopics {
     /// By name: the topic and its types.
     topics: BTreeMap<String, (Name, BTreeSet<String>)>,
-    /// Topics whose messages name their publishers.
+    /// Topics with known publishers in their messages.
     pub(super) told: BTreeSet<Name>,
     /// Elements known already, by more than a declaration.
     proved: BTreeSet<ElementKey>,
@@ -42,7 +42,7 @@ pub(super) struct RecordedTopics {
 pub(crate) struct Outcome {
     /// Notices about the amount read and found.
     pub(crate) notices: Vec<Notice>,
-    /// Places in the code that may belong to the bag and were not drawn, and what else is worth knowing; a line each.
+    /// Declarations that may belong to the bag and were not drawn, and other remarks; one per line.
     pub(crate) undrawn: Vec<String>,
 }
 
@@ -58,7 +58,7 @@ struct NamedCode {
     without: Vec<String>,
 }
 
-/// Adds the edges that the code declares for nodes that the bag names, and the only possible places if asked for.
+/// Adds the edges that the code declares for nodes in the bag, and, if requested, the only possible declarations.
 pub(crate) fn conclude(
     code: &Code,
     known: &mut Conclusions<'_>,
@@ -94,7 +94,7 @@ pub(crate) fn conclude(
     }
 }
 
-/// Adds the edges that the code declares for nodes that the bag names.
+/// Adds the edges that the code declares for nodes in the bag.
 fn draw_named(
     code: &Code,
     known: &mut Conclusions<'_>,
@@ -178,7 +178,7 @@ fn summary(
     Notice::new(NoticeKind::Note, text)
 }
 
-/// Remarks about the code of a node that ran: topics that it names and the bag lacks, or has with another type.
+/// Remarks about the code of a node that ran: topics that are missing in the bag or have another type there.
 fn remarks_on(instance: &Instance, node: &str, recorded: &RecordedTopics) -> Vec<String> {
     let remark = |placed: &FileDeclaration| {
         let declaration = &placed.declaration;
@@ -283,7 +283,7 @@ fn without_numbers(name: &str) -> &str {
 }
 
 /// The declarations of the best of several programs that may be this node: the one with most of its topics recorded.
-/// Where several are equally good, those that all of them declare.
+/// If several are equally good, those that all of them declare.
 fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &RecordedTopics) -> Vec<Match<'a>> {
     let is_real = |i: &&&Instance| !i.is_test;
     let real: Vec<&Instance> = candidates.iter().filter(is_real).copied().collect();
@@ -331,7 +331,7 @@ pub(super) fn matches<'a>(
     found
 }
 
-/// The full name of a topic that a node of this name writes like this.
+/// The resolved name of a topic as written in a node of this name.
 pub(super) fn resolved(node: &str, topic: &str) -> String {
     let joined = match (topic.strip_prefix('/'), topic.strip_prefix('~')) {
         (Some(absolute), _) => format!("/{absolute}"),
@@ -350,7 +350,7 @@ fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
     found.map_or_else(|| topic.to_owned(), |(_, to)| resolved(node, to))
 }
 
-/// Adds an edge, unless the bag has it already or contradicts it; returns whether it was added.
+/// Adds an edge unless the bag already contains or contradicts it; returns whether it was added.
 fn draw(
     code: &Code,
     known: &mut Conclusions<'_>,
@@ -376,8 +376,8 @@ fn draw(
     true
 }
 
-/// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers
-/// were offered than are known.
+/// Whether a topic may have another unknown publisher: its messages do not name theirs, and more publishers were
+/// offered than are known.
 fn has_room(known: &Conclusions<'_>, recorded: &RecordedTopics, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
     let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);

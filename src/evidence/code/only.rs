@@ -1,9 +1,9 @@
-//! Edges from code whose nodes the bag does not name: the only possible place of an edge (`--infer source`), and the
-//! reasons why other places are not drawn.
+//! Edges from code whose nodes are not named in the bag: the only possible declaration of an edge (`--infer source`),
+//! and the reasons why others are not drawn.
 //!
-//! A topic of exactly this name and type that one place of the whole workspace publishes (or subscribes) is that
-//! place's in 135 of 141 cases (96 %), if its node declares mostly topics that were recorded, and no launch file, log
-//! record or known publisher contradicts it. Where several places are possible, 27 % are right.
+//! If a single declaration in the workspace publishes (or subscribes to) a topic of exactly this name and type, it is
+//! right in 135 of 141 cases (96 %), provided that its node mostly declares recorded topics and no launch file, log
+//! record or known publisher contradicts it. If several are possible, 27 % are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,17 +17,17 @@ use crate::evidence::claim::{Degree, Name};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
-/// The reason why a place is not drawn.
+/// The reason why a declaration is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum NotDrawn {
     SeveralPlaces,
-    /// The other topics of its node fit another place as well, so that it may not have run.
+    /// The other topics of its node fit another declaration too, so it may not have run.
     Disputed,
     KnownPublisher,
-    /// Messages of this type come from one well-known program.
+    /// Messages of this type are published by one well-known program.
     OwnedType,
     OtherLaunchFile,
-    /// A launch file of the same system starts what the bag shows, and not this node.
+    /// A launch file of the same system starts the recorded nodes without this one.
     Alternative,
     FewTopics,
     WouldHaveLogged,
@@ -51,7 +51,7 @@ impl NotDrawn {
     }
 }
 
-/// A place in the code that a recorded topic may come from or go to.
+/// A declaration that may publish or subscribe to a recorded topic.
 struct Candidate<'a> {
     node: String,
     found: Match<'a>,
@@ -59,7 +59,7 @@ struct Candidate<'a> {
     share: (usize, usize),
 }
 
-/// The places that are not drawn: the reason, and the place in words.
+/// The declarations that are not drawn: the reason and the description.
 pub(super) type Undrawn = Vec<(NotDrawn, String)>;
 
 /// Facts of the bag.
@@ -77,7 +77,7 @@ pub(super) struct BagTopics<'a> {
 /// The well-known program that alone publishes messages of a type, by the type and the topic.
 pub(crate) type Owner<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
-/// Adds the only possible places if asked for; returns the places that were not drawn, with the reasons.
+/// Adds the only possible declarations if requested; returns those that were not drawn, with the reasons.
 pub(super) fn conclude(
     code: &Code,
     known: &mut Conclusions<'_>,
@@ -126,8 +126,8 @@ pub(super) fn conclude(
     (edges, undrawn)
 }
 
-/// Every recorded topic of every node that the workspace may start and the bag does not name; of tests only if there is
-/// nothing else.
+/// Every recorded topic of every node that the workspace may start and the bag does not name; tests count only if there
+/// is nothing else.
 fn candidates<'a>(code: &'a Code, bag: &BagTopics<'_>) -> Vec<Candidate<'a>> {
     let mut all = Vec::new();
     for instance in code
@@ -165,7 +165,7 @@ fn full_name(instance: &Instance) -> String {
     join(space, &instance.name)
 }
 
-/// The places in the code of each edge, whether a node was found for them or not.
+/// The declarations of each edge, whether their node was found or not.
 fn places<'a>(
     code: &'a Code,
     recorded: &RecordedTopics,
@@ -191,7 +191,7 @@ fn places<'a>(
     all
 }
 
-/// The contents of a launch file beside those of the bag.
+/// A launch file compared with the bag.
 #[derive(Default)]
 struct LaunchFit<'a> {
     /// The programs that it starts.
@@ -205,8 +205,8 @@ struct LaunchFit<'a> {
 }
 
 impl LaunchFit<'_> {
-    /// Whether this is rather not what ran, but `other`: it starts no more of the named nodes, and more that the bag
-    /// does not name. A simulation starts the robot's nodes too.
+    /// Whether `other` is more likely to have run: this starts no more of the named nodes, and more that the bag does
+    /// not name. A simulation starts the robot's nodes too.
     fn is_beaten_by(&self, other: &Self) -> bool {
         let starts_the_same = !self.named.is_empty() && self.named.is_subset(&other.named);
         starts_the_same && other.others < self.others
@@ -217,7 +217,7 @@ impl LaunchFit<'_> {
 struct Launches<'a> {
     /// By path.
     fits: BTreeMap<&'a str, LaunchFit<'a>>,
-    /// Those that explain most edges, without those that another one beats.
+    /// Those that explain most edges, except those beaten by another.
     best: BTreeSet<&'a str>,
 }
 
@@ -258,8 +258,8 @@ impl<'a> Launches<'a> {
         path.is_some_and(|path| self.best.contains(path))
     }
 
-    /// Whether some launch file is an alternative without this program: it starts parts of the same system and something
-    /// that the bag shows. A robot and its simulation, or two controllers, are such alternatives.
+    /// Whether a launch file is an alternative without this program: it starts parts of the same system and recorded
+    /// nodes. A robot and its simulation, or two controllers, are such alternatives.
     fn do_without(&self, program: &(String, String)) -> bool {
         let starts = |fit: &&LaunchFit<'_>| fit.programs.contains(program);
         let with: BTreeSet<_> = self
@@ -276,7 +276,7 @@ impl<'a> Launches<'a> {
     }
 }
 
-/// Whether two nodes have the same name, in whatever namespaces.
+/// Whether two nodes have the same name, ignoring namespaces.
 fn is_same_name(a: &str, b: &str) -> bool {
     last_part(a) == last_part(b)
 }

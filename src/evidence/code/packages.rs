@@ -22,7 +22,7 @@ pub(super) enum Program {
     Class(String),
 }
 
-/// All packages, sorted by folder, with the programs that their build files name.
+/// All packages, sorted by folder, with the programs in their build files.
 pub(super) fn packages(files: &[SourceFile]) -> Vec<Package> {
     let of_kind = |wanted| files.iter().filter(move |f| kind(&f.path) == Some(wanted));
     let mut all: Vec<Package> = of_kind(FileKind::Package).filter_map(package).collect();
@@ -86,10 +86,10 @@ fn entry_points(text: &str, folder: &str) -> Vec<(String, Program)> {
 /// The most variables and sources of a `CMakeLists.txt` that are kept.
 const MOST: usize = 10_000;
 
-/// The most text that the variables of a `CMakeLists.txt` may grow to, in bytes.
+/// The most text in the variables of a `CMakeLists.txt`, in bytes.
 const MOST_TEXT: usize = 4 << 20;
 
-/// The executables that a `CMakeLists.txt` makes.
+/// The executables that a `CMakeLists.txt` builds.
 fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Program)> {
     let here = folder(&file.path);
     let mut variables = BTreeMap::from([("PROJECT_NAME".to_owned(), package.to_owned())]);
@@ -224,7 +224,7 @@ fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
     found
 }
 
-/// The place of the parenthesis that closes the one open at the start.
+/// The position of the parenthesis that closes the one at the start.
 fn closing(text: &str) -> usize {
     let mut open = 1_usize;
     let end = text.char_indices().find(|(_, c)| {
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn executables_of_cmake_know_their_sources() {
+    fn executables_of_cmake_have_their_sources() {
         let all = workspace(&[
             ("a/package.xml", "<package><name> arm </name></package>"),
             ("a/src/one.cpp", ""),
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn entry_points_of_python_know_their_module() {
+    fn entry_points_of_python_have_their_module() {
         let setup = "setup(name='p', entry_points={'console_scripts': ['talk = p.nodes.talker:main', \"hear=p.hear:main\"]})";
         let all = workspace(&[
             ("w/p/package.xml", "<name>p</name>"),
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn variables_that_grow_come_to_an_end() {
+    fn growing_variables_are_bounded() {
         let grow: String = (0..40).flat_map(|_| ["set(A ${A}${A}${A}x)\n"]).collect();
         let all = workspace(&[("package.xml", "<name>p</name>"), ("CMakeLists.txt", &grow)]);
         assert!(all[0].programs.is_empty());

@@ -39,12 +39,12 @@ struct PythonReader<'a> {
     wildcards: Vec<String>,
     texts: TextValues<'a>,
     classes: Vec<Class>,
-    /// The ends of the classes around the element, with the places of the classes.
+    /// The ends of the enclosing classes, with the indices of the classes.
     open: Vec<(usize, usize)>,
 }
 
 impl<'a> PythonReader<'a> {
-    /// Visits every element, with `open` holding the classes around it.
+    /// Visits every element, with the enclosing classes in `open`.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();
         let mut next = 1;
@@ -205,7 +205,7 @@ impl<'a> PythonReader<'a> {
         }
     }
 
-    /// Reads names of nodes, logging, and bags that are written.
+    /// Records node names, logging, and bag writing.
     fn remark(&mut self, name: &str, object: &str, full: &str, given: &CallArguments<'a>) {
         let is_init = name == "__init__"
             && (object.starts_with("super(") || object == "Node" || object.ends_with(".Node"));
@@ -319,7 +319,7 @@ impl<'a> PythonReader<'a> {
         self.string_at(node, 0).filter(|text| text.len() <= LONGEST)
     }
 
-    /// The text of an expression, as far as it is known.
+    /// The text of an expression, if known.
     fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
         if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
@@ -389,7 +389,7 @@ impl<'a> CallArguments<'a> {
     }
 }
 
-/// The thing that a call makes, by its name and its full name.
+/// The kind of object that a call creates, by its name and its full name.
 fn made(name: &str, full: &str) -> Option<Made> {
     let module = full.split('.').next().unwrap_or_default();
     Some(match (name, module) {

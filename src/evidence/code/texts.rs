@@ -10,8 +10,8 @@ pub(super) const LONGEST: usize = 1000;
 /// The most steps from name to name that are followed.
 pub(super) const DEEPEST: usize = 8;
 
-/// The most expressions that are looked at for the texts of a file of this many bytes: code written by hand needs a
-/// tenth, and names that refer to each other over and over cost no more than reading the file.
+/// The most expressions evaluated for the texts of a file of this many bytes: hand-written code needs a tenth, and
+/// names that refer to each other repeatedly cost no more than reading the file.
 pub(super) fn most_work(bytes: usize) -> usize {
     1000 + bytes
 }
@@ -24,12 +24,12 @@ pub(super) struct TextValues<'a> {
 }
 
 impl<'a> TextValues<'a> {
-    /// Notes that a name is given a value.
+    /// Records an assignment to a name.
     pub(super) fn set(&mut self, name: &str, value: Node<'a>) {
         put(&mut self.names, name, value);
     }
 
-    /// Notes that a parameter has a default.
+    /// Records a parameter's default.
     pub(super) fn set_parameter(&mut self, name: &str, value: Node<'a>) {
         put(&mut self.parameters, name, value);
     }

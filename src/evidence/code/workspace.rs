@@ -1,5 +1,5 @@
-//! All of a workspace together: the classes that names refer to, the parts of each node, and the nodes that its
-//! programs and launch files start.
+//! A whole workspace: the classes that names refer to, the parts of each node, and the nodes that its programs and
+//! launch files start.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub(super) struct CodeFile {
     pub(super) code: FileCode,
 }
 
-/// The place of a class, or of the code outside classes: file, place in the file.
+/// The position of a class, or of the code outside classes: file, index in the file.
 type ClassPlace = (usize, usize);
 
 /// A declaration with its file.
@@ -48,7 +48,7 @@ pub(crate) struct Instance {
     pub(crate) remaps: Vec<(String, String)>,
     /// The launch file and the line that start it.
     pub(crate) launched: Option<(String, usize)>,
-    /// The file and the class, which tell it from other programs of the same node name.
+    /// The file and the class, which distinguish it from other programs with the same node name.
     pub(crate) program: (String, String),
     /// The declarations of its program.
     pub(crate) declared: Arc<[FileDeclaration]>,
@@ -70,7 +70,7 @@ struct CodeNode {
 /// Base classes that make a class a node.
 const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 
-/// The most parts that one node may be made of.
+/// The most parts of a node.
 const MOST_PARTS: usize = 300;
 
 /// The most declarations of one node, and of all nodes together: a hundred times those of the largest robots.
@@ -122,7 +122,7 @@ impl Workspace {
         all
     }
 
-    /// Every declaration of files that do not belong to tests, whatever its node.
+    /// Every declaration outside tests, with or without a node.
     pub(super) fn places(&self) -> Vec<FileDeclaration> {
         let files = self.files.iter().filter(|file| !is_test(&file.path));
         let declared = files.flat_map(|file| {
@@ -169,7 +169,7 @@ impl Workspace {
             let parts = self.meant(class, file);
             if let Some(part) = parts.first().filter(|p| self.is_node(**p, 0)) {
                 let mut node = self.class_node(*part);
-                // A text at the call may be anything; the name counts where the class has none of its own.
+                // The text in the call may be anything; it is used as a name only if the class has none.
                 if node.names.is_empty() {
                     node.names.push(name.clone());
                     nodes.push(node);
@@ -236,7 +236,7 @@ impl Workspace {
         own.map(|part| self.class_node(part)).into_iter().collect()
     }
 
-    /// The nodes that a program of these files starts: the one of its own code, and the node classes that it makes.
+    /// The nodes that a program of these files starts: its own code's, and the node classes that it instantiates.
     fn nodes_of(&self, files: &[usize]) -> Vec<CodeNode> {
         let mut nodes: Vec<CodeNode> = self.free_node(files).into_iter().collect();
         let free = files.iter().map(|file| (*file, 0)).collect();
@@ -248,7 +248,7 @@ impl Workspace {
     /// The node of the code outside classes.
     fn free_node(&self, files: &[usize]) -> Option<CodeNode> {
         let free: Vec<ClassPlace> = files.iter().map(|file| (*file, 0)).collect();
-        // rospy knows one node per process, wherever it is named.
+        // rospy has one node per process, wherever it is named.
         let all = files
             .iter()
             .flat_map(|f| (0..self.files[*f].code.classes.len()).map(|place| (*f, place)));
@@ -264,7 +264,7 @@ impl Workspace {
 
     fn class_node(&self, part: ClassPlace) -> CodeNode {
         let (parts, _) = self.belonging(self.parts(part));
-        // The class's own name for its node beats those of its bases.
+        // A node name in the class itself takes precedence over those in its bases.
         let own = self
             .parts(part)
             .into_iter()
@@ -303,13 +303,13 @@ impl Workspace {
                 .collect::<Vec<_>>()
         };
         CodeNode {
-            // A text that is not a name of a node was given for something else.
+            // A text that is not a valid node name has another purpose.
             names: names
                 .into_iter()
                 .filter(|n| !n.is_empty() && !n.contains(char::is_whitespace))
                 .collect(),
             program,
-            // What writes bags subscribes what it was reported, which the code does not say.
+            // A recorder subscribes to topics given at run time, which are not in the code.
             declared: if is_recorder {
                 Arc::default()
             } else {
@@ -319,8 +319,8 @@ impl Workspace {
         }
     }
 
-    /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it makes and that are
-    /// not nodes themselves. Those that are nodes come second.
+    /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it instantiates and
+    /// that are not nodes themselves. Those that are nodes are returned second.
     fn belonging(&self, parts: Vec<ClassPlace>) -> (Vec<ClassPlace>, Vec<ClassPlace>) {
         let mut open = parts;
         let (mut own, mut others) = (BTreeSet::new(), BTreeSet::new());
@@ -348,7 +348,7 @@ impl Workspace {
         (own.iter().copied().collect(), defined.collect())
     }
 
-    /// The parts of the class that a name refers to in a file: of this file, of the module that it is imported from, of
+    /// The parts of the class that a name refers to in a file: in this file, in the module that it is imported from, in
     /// this package, or the only one in the workspace.
     fn meant(&self, name: &str, file: usize) -> Vec<ClassPlace> {
         let Some(all) = self.by_name.get(name) else {
@@ -388,7 +388,7 @@ impl Workspace {
         chosen.map(|part| self.parts(part)).unwrap_or_default()
     }
 
-    /// A class with those of its functions that stand in other files of its package.
+    /// A class with its functions in other files of its package.
     fn parts(&self, part: ClassPlace) -> Vec<ClassPlace> {
         let package = self.file(part).package;
         let others = self
@@ -446,7 +446,7 @@ fn as_written(node: &CodeNode, name: &str) -> Instance {
     }
 }
 
-/// A node as a launch file starts it. Its name there beats the code's, where the program starts one node only.
+/// A node as a launch file starts it. The name there takes precedence if the program starts only one node.
 fn as_launched(path: &str, launched: &LaunchedNode, nodes: &[CodeNode]) -> Vec<Instance> {
     let mut all = Vec::new();
     for node in nodes {

@@ -8,10 +8,10 @@ use std::fmt;
 use crate::bag::Encoding;
 use crate::base::time::Stamp;
 
-/// The error of a payload that does not have the expected content.
+/// The error for a payload without the expected content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Malformed {
-    /// The place, in bytes from the payload's start.
+    /// The position, in bytes from the payload's start.
     pub at: usize,
     /// The expected content.
     pub expected: &'static str,
@@ -26,12 +26,12 @@ impl fmt::Display for Malformed {
 /// The result of every reading function.
 pub(crate) type PayloadResult<T> = std::result::Result<T, Malformed>;
 
-/// A place in a payload.
+/// A position in a payload.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadCursor<'a> {
     data: &'a [u8],
     at: usize,
-    /// The place from which alignment counts; `None` where nothing is aligned (ROS 1).
+    /// The origin of alignment; `None` if nothing is aligned (ROS 1).
     origin: Option<usize>,
     big_endian: bool,
 }
@@ -62,10 +62,10 @@ impl<'a> PayloadCursor<'a> {
         }
     }
 
-    /// A cursor over a CDR payload, behind its encapsulation header.
+    /// A cursor over a CDR payload, after its encapsulation header.
     ///
     /// # Errors
-    /// Unless the header says plain CDR of either byte order.
+    /// Unless the header states plain CDR, of either byte order.
     pub(crate) fn cdr(data: &'a [u8]) -> PayloadResult<Self> {
         match data {
             [0, kind @ (0 | 1), _, _, ..] => Ok(Self {
@@ -103,7 +103,7 @@ impl<'a> PayloadCursor<'a> {
         Ok(())
     }
 
-    /// The error for `expected` at this place.
+    /// The error for `expected` at this position.
     pub(crate) fn wrong(&self, expected: &'static str) -> Malformed {
         Malformed {
             at: self.at,
@@ -193,31 +193,31 @@ impl<'a> PayloadCursor<'a> {
         self.bytes(count.saturating_mul(size))
     }
 
-    /// Whether numbers are written with their most significant byte first.
+    /// Whether numbers are big-endian.
     pub(crate) fn is_big_endian(&self) -> bool {
         self.big_endian
     }
 
-    /// The next string; bytes that are not UTF-8 are an error.
+    /// The next string; invalid UTF-8 is an error.
     pub(crate) fn string(&mut self) -> PayloadResult<&'a str> {
         let text = self.text()?;
         std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
     }
 
-    /// The bytes of the next string, whatever they are.
+    /// The bytes of the next string, unchecked.
     pub(crate) fn text(&mut self) -> PayloadResult<&'a [u8]> {
         let len = self.u32()? as usize;
         let text = self.bytes(len)?;
         match text {
             _ if !self.is_cdr() => Ok(text),
             [rest @ .., 0] => Ok(rest),
-            // Some writers leave an empty string without its closing zero.
+            // Some writers omit the final zero of an empty string.
             [] => Ok(text),
             _ => Err(self.wrong("a string's closing zero")),
         }
     }
 
-    /// Like [`PayloadCursor::string`], stepping over it without a look at its bytes.
+    /// Skips the next string without checking its bytes.
     pub(crate) fn skip_string(&mut self) -> PayloadResult<()> {
         let len = self.u32()? as usize;
         self.bytes(len).map(drop)
@@ -232,7 +232,7 @@ impl<'a> PayloadCursor<'a> {
         Ok(count)
     }
 
-    /// Steps over a `std_msgs/Header`, which begins with a sequence number in ROS 1.
+    /// Skips a `std_msgs/Header`, which begins with a sequence number in ROS 1.
     pub(crate) fn header(&mut self) -> PayloadResult<()> {
         if !self.is_cdr() {
             self.u32()?;

@@ -1,4 +1,4 @@
-//! A message as data, taken apart by its own definition: for messages whose layout has changed over the years.
+//! A message as data, decoded by its own definition: for messages whose layout has changed over the years.
 
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::outline;
@@ -9,7 +9,7 @@ pub(crate) enum MessageValue {
     Text(String),
     /// An unsigned number of one byte.
     Byte(u8),
-    /// Any other number, with its value if it is a whole one.
+    /// Any other number, with its value if it is an integer.
     Number(Option<i128>),
     List(Vec<Self>),
     /// Fields by name.
@@ -25,7 +25,7 @@ impl MessageValue {
         }
     }
 
-    /// A field that holds text; empty if there is none.
+    /// A text field; empty if there is none.
     pub(crate) fn text(&self, name: &str) -> &str {
         match self.field(name) {
             Some(Self::Text(text)) => text,
@@ -33,7 +33,7 @@ impl MessageValue {
         }
     }
 
-    /// A field that holds a list; empty if there is none.
+    /// A list field; empty if there is none.
     pub(crate) fn list(&self, name: &str) -> &[Self] {
         match self.field(name) {
             Some(Self::List(list)) => list,
@@ -61,7 +61,7 @@ impl MessageSchema {
         Self(outline(definition))
     }
 
-    /// The schema of a definition's text, if the message itself holds words or whole numbers.
+    /// The schema of a definition's text, if the message itself contains strings or integers.
     pub(crate) fn of_words(definition: &str) -> Option<Self> {
         const KINDS: [&str; 7] = [
             "string", "int16", "uint16", "int32", "uint32", "int64", "uint64",
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_is_taken_apart_by_its_definition() {
+    fn a_message_is_decoded_by_its_definition() {
         let schema = MessageSchema::of_text(
             "Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n",
         );
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_definition_that_holds_itself_is_refused() {
+    fn a_recursive_definition_is_refused() {
         let schema = MessageSchema::of_text("A a\n===\nMSG: x/A\nA a\n");
         assert!(schema.read(&mut PayloadCursor::ros1(&[0; 64])).is_err());
     }

@@ -1,7 +1,7 @@
 //! Messages as columns of a table: a column per field, with dots in the names of nested fields, and a list for each
 //! array around a field.
 //!
-//! A payload is read by the definition in its bag, or by [`KnownTypes`] where the bag holds none (<http://wiki.ros.org/msg>,
+//! A payload is read by the definition in its bag, or by [`KnownTypes`] if there is none (<http://wiki.ros.org/msg>,
 //! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. A time is one
 //! column; a duration is two, `sec` and `nanosec`, in ROS 1 as in ROS 2.
 
@@ -34,12 +34,12 @@ const MOST_COLUMNS: usize = 2000;
 /// The type of a field that is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Primitive {
-    /// A number or a truth value, and its size in bytes.
+    /// A number or a Boolean, and its size in bytes.
     Number(ColumnKind, usize),
     Text,
 }
 
-/// The next thing to do with a payload.
+/// A step of decoding a payload.
 #[derive(Clone, Debug, PartialEq)]
 enum DecodeStep {
     One(usize, Primitive),
@@ -71,7 +71,8 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
-    /// The decoder of a connection's messages, and the one to try if their type is known and has changed over the years.
+    /// The decoder of a connection's messages, and the one to try if their type is known and has changed over the
+    /// years.
     ///
     /// # Errors
     /// The reason why its messages cannot be decoded.
@@ -114,8 +115,8 @@ impl Decoder {
         })
     }
 
-    /// A column for each field, in the order of the definition, whose names are none of `taken`. With `is_nested` they
-    /// are paths of names, with [`LIST`] behind lists.
+    /// A column for each field, in the order of the definition, with names distinct from `taken`. With `is_nested` they
+    /// are paths of names, with [`LIST`] after lists.
     pub(crate) fn columns(
         &self,
         taken: &[&str],
@@ -138,7 +139,7 @@ impl Decoder {
         })
     }
 
-    /// Adds a payload's values to the columns from `first` on. On failure they are left half-filled.
+    /// Adds a payload's values to the columns from `first` on. On failure they are left incomplete.
     ///
     /// # Errors
     /// If the payload has another layout.
@@ -246,7 +247,7 @@ impl DecodePlan<'_> {
         let primitive = match kind {
             "bool" => number(ColumnKind::Flag, 1),
             "int8" => number(ColumnKind::I8, 1),
-            // ROS 1 says that `byte` is signed; ROS 2 has it unsigned, and so has everybody in practice.
+            // In ROS 1 `byte` is signed by definition; in ROS 2, and in practice everywhere, it is unsigned.
             "uint8" | "char" | "byte" | "octet" => number(ColumnKind::U8, 1),
             "int16" => number(ColumnKind::I16, 2),
             "uint16" => number(ColumnKind::U16, 2),
@@ -317,7 +318,7 @@ fn run(
                 }
             }
             DecodeStep::Time(column) => {
-                // Of 32 bits in ROS 1 unsigned, in ROS 2 signed: the same until 2038.
+                // 32 bits, unsigned in ROS 1 and signed in ROS 2: the same until 2038.
                 let sec = payload.u32()?;
                 let sec = if payload.is_cdr() {
                     i64::from(sec.cast_signed())
@@ -348,7 +349,7 @@ fn run(
     Ok(())
 }
 
-/// The number of elements of an array; never more than the payload has room for.
+/// The number of elements of an array; never more than fit in the payload.
 fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
         Array::Told => payload.length(least),
@@ -371,7 +372,7 @@ fn list(
         [DecodeStep::One(column, Primitive::Number(_, size))] => {
             numbers(payload, count, *size, &mut columns[*column].values)
         }
-        // Elements without a byte hold nothing, however many a hostile payload has of them.
+        // Empty elements need no work, however many a hostile payload states.
         _ if least == 0 => Ok(()),
         _ => (0..count).try_for_each(|_| run(element, payload, columns)),
     }

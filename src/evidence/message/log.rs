@@ -8,7 +8,7 @@ pub(crate) struct LogRecord<'a> {
     /// The full name of the node, or of the logger, which is a node or a part of one.
     pub(crate) logger: String,
     pub(crate) text: &'a str,
-    /// The path of the source file as the compiler or interpreter names it.
+    /// The path of the source file as recorded by the compiler or interpreter.
     pub(crate) file: &'a str,
 }
 

@@ -28,14 +28,14 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Parameter<'a> {
     pub(crate) name: &'a str,
-    /// The value, if it is a truth value.
+    /// The value, if Boolean.
     pub(crate) truth: Option<bool>,
 }
 
 /// A change of a node's parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ParameterEvent<'a> {
-    /// The node's full name; empty if the writer named none.
+    /// The node's full name; empty if not stated.
     pub(crate) node: &'a str,
     /// The new and the changed parameters.
     pub(crate) set: Vec<Parameter<'a>>,
@@ -57,7 +57,7 @@ impl<'a> ParameterEvent<'a> {
             for _ in 0..payload.length(4)? {
                 let parameter = parameter(payload)?;
                 is_start |= list == 0 && parameter.name == "use_sim_time";
-                // The third list holds those deleted.
+                // The third list contains deleted parameters.
                 set.extend((list < 2).then_some(parameter));
             }
         }
@@ -70,7 +70,7 @@ impl<'a> ParameterEvent<'a> {
     }
 }
 
-/// `rcl_interfaces/msg/ParameterType`: the number of the type of truth values.
+/// The value of `PARAMETER_BOOL` in `rcl_interfaces/msg/ParameterType`.
 const BOOL: u8 = 1;
 
 fn parameter<'a>(payload: &mut PayloadCursor<'a>) -> PayloadResult<Parameter<'a>> {

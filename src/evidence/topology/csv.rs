@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_a_node_with_its_topics_and_its_life() {
+    fn a_row_is_a_node_with_topics_and_lifetime() {
         let text = "Name,Publish,Subscribe,Node-start,Node-end\nplanner,\"['/plan', '/path']\",['/map'],10,20.5\n";
         let entries = parse(text).unwrap().entries;
         assert_eq!(entries.len(), 4);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_without_end_is_refused_while_it_is_read() {
+    fn an_endless_table_is_refused_while_reading() {
         let rows: Vec<String> = (0..TOPOLOGY_ENTRIES + 10)
             .map(|n| format!("n{n},,,,\n"))
             .collect();
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_line_is_named() {
+    fn errors_have_their_line() {
         for (row, told) in [
             ("a,[/x],,,", "is not a list"),
             ("a,,,soon,", "not a number"),

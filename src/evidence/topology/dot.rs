@@ -1,4 +1,4 @@
-//! DOT as `rqt_graph` saves it: ellipses are nodes, boxes are topics, and labels hold the names. Without a label the
+//! DOT as `rqt_graph` saves it: ellipses are nodes, boxes are topics, and labels are the names. Without a label the
 //! escaped identifier is decoded (`t___scan` is the topic `/scan`).
 
 use std::collections::BTreeMap;
@@ -95,7 +95,7 @@ fn statements(tokens: &[DotToken]) -> Statements {
             .contains(&token.text.as_str());
         let next = tokens.get(at).map_or("", |t| t.text.as_str());
         if !token.word || next == "=" {
-            // A sign, or an attribute of the graph itself; its value is skipped with it.
+            // Punctuation, or an attribute of the graph, which is skipped with its value.
             at += if next == "=" { 2 } else { 0 };
             continue;
         }
@@ -177,7 +177,7 @@ fn decoded(id: &str) -> String {
     name.replace("__", "/")
 }
 
-/// The words and punctuation marks of a text; the line of a string that never ends as an error.
+/// The words and punctuation marks of a text; the line of an unterminated string as an error.
 fn tokens(text: &str) -> Result<Vec<DotToken>, usize> {
     let mut tokens = Vec::new();
     let mut line = 1;
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_and_topics_are_told_by_their_shapes() {
+    fn nodes_and_topics_are_distinguished_by_shape() {
         let text = r#"digraph graphname { graph [bb="0,0,300,100", rankdir=LR];
             subgraph cluster___x { graph [label="/x"]; n___x__a [label="/x/a", shape=ellipse, pos="50,50"]; }
             t___b [label="/b", shape=box]; n___c [shape=ellipse, label="/c"];
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_between_nodes_names_its_topic() {
+    fn an_edge_between_nodes_has_its_topic() {
         let text = r#"digraph { a [label="/a"]; b [label="/b"]; a -> b [label="/t\n5 Hz"]; }"#;
         assert!(elements(text).contains(&NamedElement::Publish("/a".into(), "/t".into())));
     }
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_string_without_an_end_is_named_by_its_line() {
+    fn an_unterminated_string_is_reported_with_its_line() {
         let error = read(Path::new("g.dot"), "digraph {\n a [label=\"x];\n}").unwrap_err();
         assert!(error.to_string().contains("line 2"), "{error}");
     }

@@ -1,7 +1,7 @@
 //! Launch files of ROS 1 and ROS 2: the nodes they would start, with their namespaces and remapped topics.
 //!
-//! Arguments, namespaces, conditions and includes are followed as far as that needs no execution: files of other
-//! packages are looked for beside the file. See <http://wiki.ros.org/roslaunch/XML> and the design article on static
+//! Arguments, namespaces, conditions and includes are resolved as far as possible without execution: files of other
+//! packages are searched for beside the file. See <http://wiki.ros.org/roslaunch/XML> and the design article on static
 //! launch files of ROS 2.
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use super::{NamedElement, Topology, TopologyEntry, place, python, resolved, unus
 use crate::base::budget::LaunchWork;
 use crate::base::error::Result;
 
-/// The deepest nesting of includes; deeper ones go in circles.
+/// The deepest nesting of includes; deeper ones are cyclic.
 const DEEPEST: usize = 16;
 
 /// The cost of opening a file, in bytes of work.
@@ -46,16 +46,16 @@ pub(crate) struct LaunchedNode {
     pub(crate) line: usize,
 }
 
-/// The treatment of a condition that only running the file would decide.
+/// The treatment of conditions that cannot be decided statically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Undecided {
-    /// The elements under it are left out, and a notice says so.
+    /// The elements under it are left out with a notice.
     LeftOut,
-    /// All conditions count as met: every node that the file may start is wanted.
+    /// All conditions count as met, to find every node that the file may start.
     Taken,
 }
 
-/// The settings at a place in a file.
+/// The settings in effect at a point in a file.
 #[derive(Clone, Debug, Default)]
 struct Scope {
     namespace: String,
@@ -75,10 +75,10 @@ pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     Ok(reader.topology)
 }
 
-/// Every node that a launch file may start by itself, without its includes, whatever its conditions say.
+/// Every node that a launch file may start by itself, without its includes and regardless of conditions.
 pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
     let mut reader = Launch::new(Undecided::Taken);
-    // Includes are not followed, and nothing else can fail.
+    // Only includes can fail, and they are not followed.
     let _ = reader.inside(path, tree, &mut Scope::default());
     reader.nodes
 }
@@ -95,7 +95,7 @@ struct Launch {
 
 impl Launch {
     fn new(undecided: Undecided) -> Self {
-        // Files that a person names may include others; those of a workspace are read each by itself, and are many.
+        // Files given by the user may include others; those of a workspace are read individually, and are many.
         let budget = match undecided {
             Undecided::LeftOut => LaunchWork::all(),
             Undecided::Taken => LaunchWork::of_text(OWN_TEXT),
@@ -110,7 +110,7 @@ impl Launch {
         }
     }
 
-    /// The elements inside one, in order; changes by them hold for those after them.
+    /// Reads the children of an element in order; their changes apply to those after them.
     fn inside(&mut self, path: &Path, tree: &Tree, scope: &mut Scope) -> Result<()> {
         if self.nested > NESTED {
             self.left_out(path, tree, "it nests too deep");
@@ -167,7 +167,7 @@ impl Launch {
         Ok(())
     }
 
-    /// An attribute with its substitutions replaced; `None` if it is missing or only known when the file runs.
+    /// An attribute with its substitutions replaced; `None` if it is missing or only known at run time.
     fn value(&mut self, path: &Path, tree: &Tree, scope: &Scope, name: &str) -> Option<String> {
         let arguments = &scope.arguments;
         SubstitutionContext { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
@@ -194,7 +194,7 @@ impl Launch {
         true
     }
 
-    /// Sets an argument. One whose value is not known is not set, so that it stays unknown.
+    /// Sets an argument. One without a known value stays unset.
     fn argument(
         &mut self,
         scope: &mut Scope,
@@ -213,7 +213,7 @@ impl Launch {
 
     /// Charges for the copy of a scope that is about to change.
     fn copied(&mut self, entries: usize) {
-        // Refusals are seen where texts are made.
+        // An exceeded budget is reported where texts are created.
         let _ = self.budget.spend(entries);
     }
 
@@ -256,7 +256,7 @@ impl Launch {
         let full = join(&node.namespace, name);
         self.add(path, tree, NamedElement::Node(full.clone()));
         for (_, to) in &node.remaps {
-            // `~x` lies below the node, a plain name in its namespace.
+            // `~x` is below the node, a plain name in its namespace.
             let topic = match to.strip_prefix('~') {
                 Some(private) => join(&full, private.trim_start_matches('/')),
                 None => join(&node.namespace, to),
@@ -265,7 +265,7 @@ impl Launch {
         }
     }
 
-    /// The remaps that hold for a node: those around it, then its own.
+    /// The remaps that apply to a node: the enclosing ones, then its own.
     fn remaps(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> Vec<(String, String)> {
         if self.budget.spend(scope.remaps.len() * ENTRY).is_none() {
             return Vec::new();
@@ -360,7 +360,7 @@ pub(crate) fn tree_of(path: &Path, text: &str) -> Result<Option<Tree>> {
     }
 }
 
-/// The file that an include names: as it stands, or beside the including file.
+/// The file that an include refers to: as written, or beside the including file.
 fn located(path: &Path, file: &str) -> Option<PathBuf> {
     let file = Path::new(file);
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -370,7 +370,7 @@ fn located(path: &Path, file: &str) -> Option<PathBuf> {
         .flatten()
 }
 
-/// A name in a namespace; a name that begins with a slash is left as it is.
+/// A name in a namespace; a name that begins with a slash is unchanged.
 pub(crate) fn join(space: &str, name: &str) -> String {
     match name.strip_prefix('/') {
         Some(_) if name.trim_matches('/').is_empty() => String::new(),

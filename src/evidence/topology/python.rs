@@ -1,5 +1,5 @@
-//! Launch files in Python, read and never run: the result of `generate_launch_description` becomes a tree like that of
-//! the XML form, with `$(…)` for values that the launch system would fill in.
+//! Launch files in Python, parsed but never run: the result of `generate_launch_description` becomes a tree like that
+//! of the XML format, with `$(…)` for values that the launch system would substitute.
 
 mod action;
 mod call;
@@ -17,7 +17,7 @@ use crate::evidence::syntax::{Language, Parsed};
 use evaluator::Evaluator;
 use value::PythonValue;
 
-/// The tag of an element that only running the file would reveal.
+/// The tag of an element that is only known at run time.
 pub(super) const UNREAD: &str = "unread";
 
 const HINT: &str = "a launch file in Python defines `generate_launch_description` and returns a `LaunchDescription`";
@@ -49,7 +49,7 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
 }
 
 /// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` have these texts;
-/// `None` if only running it would tell.
+/// `None` if it is only known at run time.
 pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
     match value(expression, names)? {
         // XML puts quotes around the whole expression.

@@ -1,4 +1,4 @@
-//! Texts of launch files with their substitutions `$(…)` replaced, as far as that needs no execution.
+//! Replaces substitutions `$(…)` in launch files, as far as possible without execution.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::python;
 use crate::base::budget::LaunchWork;
 
-/// The longest text that substitutions may grow to, in bytes: longer than any path.
+/// The longest text after substitution, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
 
 /// The deepest nesting of substitutions; deeper ones are hostile.
@@ -19,8 +19,7 @@ pub(super) struct SubstitutionContext<'a> {
 }
 
 impl SubstitutionContext<'_> {
-    /// The text with everything replaced; `None` if a part of it is only known when the file runs, or it grows too
-    /// long.
+    /// The text after substitution; `None` if a part of it is only known at run time, or it becomes too long.
     pub(super) fn substitute(&self, text: &str, budget: &mut LaunchWork) -> Option<String> {
         self.at_depth(text, budget, 0)
     }
@@ -61,7 +60,7 @@ impl SubstitutionContext<'_> {
             _ => None,
         };
         match verb {
-            // ROS 2 takes a default behind the name.
+            // In ROS 2 a default follows the name.
             "arg" | "var" => match words.split_once(' ') {
                 Some((name, default)) => argument(name).or(Some(unquoted(default).to_owned())),
                 None => argument(words),
@@ -102,12 +101,12 @@ fn truth(is_true: bool) -> String {
 fn unquoted(text: &str) -> &str {
     let text = text.trim();
     let quoted = |quote: char| text.strip_prefix(quote).and_then(|t| t.strip_suffix(quote));
-    // Quotes inside show that the outer ones belong to two texts: `'a' == 'b'`.
+    // With quotes inside, the outer ones belong to two texts: `'a' == 'b'`.
     let inside = |quote: char| quoted(quote).filter(|t| !t.contains(quote));
     inside('"').or(inside('\'')).unwrap_or(text)
 }
 
-/// The place of the parenthesis that closes the one open at the start.
+/// The position of the parenthesis that closes the one at the start.
 fn closing(text: &str) -> Option<usize> {
     let mut open = 1_usize;
     text.char_indices().find_map(|(at, c)| {
@@ -120,7 +119,7 @@ fn closing(text: &str) -> Option<usize> {
     })
 }
 
-/// The folder of a package, searched among the folders above the file and beside those; its name if not found.
+/// The folder of a package, searched for above the file and beside those folders; its name if not found.
 fn package(path: &Path, name: &str) -> String {
     let above = path.ancestors().skip(1);
     let found = above
@@ -151,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_needs_no_execution_is_put_in() {
+    fn static_substitutions_are_replaced() {
         for (text, expected) in [
             ("$(arg robot)/$(var robot)", "r1/r1"),
             ("$(var $(var which))", "r1"),
@@ -166,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_would_have_to_run_is_not_known() {
+    fn substitutions_that_need_execution_are_unknown() {
         for text in [
             "$(command hostname)",
             "$(arg nobody)",

@@ -1,4 +1,4 @@
-//! A launch file as a tree of elements, from XML or from the YAML of ROS 2, so that one reader serves them and Python.
+//! A launch file as a tree of elements, from XML or from ROS 2's YAML, so that one reader handles them and Python.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub(crate) struct Tree {
     /// Attributes in order.
     pub(super) attributes: Vec<(String, String)>,
     pub(super) children: Vec<Self>,
-    /// The line, ≥ 1; 0 where not known.
+    /// The line, ≥ 1; 0 if unknown.
     pub(super) line: usize,
 }
 
@@ -57,7 +57,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
 
 struct XmlLaunch<'a> {
     path: &'a Path,
-    /// The places where lines end, in bytes.
+    /// The ends of the lines, in bytes.
     lines: Vec<usize>,
 }
 
@@ -119,7 +119,7 @@ fn entity(tag: &str, value: &Value) -> Tree {
         ..Tree::default()
     };
     match value {
-        // A group: its list holds entities.
+        // A group: its list contains entities.
         Value::Array(list) => tree.children = list.iter().flat_map(entities).collect(),
         Value::Object(map) => {
             for (key, value) in map {

@@ -1,4 +1,5 @@
-//! Graphs in YAML. Our own form has under `nodes` each node with `publishes`, `subscribes`, `services`, `clients`, `actions`,
+//! Graphs in YAML. In our own format, `nodes` contains each node with `publishes`, `subscribes`, `services`, `clients`,
+//! `actions`,
 //! `action_clients`, and `start` and `end` in seconds after the bag's start. Other tools list nodes (`/rosgraph` as
 //! `ros2 topic echo` prints it, the `architecture.yaml` of CARET), or describe a single one (`NoDL` 2).
 
@@ -14,7 +15,7 @@ use crate::base::yaml;
 const HINT: &str =
     "write `nodes:`, then below it `/name: {publishes: [/a], subscribes: [/b], start: 0, end: 60}`";
 
-/// The part that a node has in a topic, a service or an action.
+/// The role of a node in a topic, a service or an action.
 #[derive(Clone, Copy)]
 enum EndKind {
     Publishes,
@@ -25,7 +26,7 @@ enum EndKind {
     Asks,
 }
 
-/// The keys of lists of ends: in our form, and in those of others.
+/// The keys of lists of ends, in our format and in those of other tools.
 const ENDS: [(&str, EndKind); 11] = [
     ("publishes", EndKind::Publishes),
     ("publishers", EndKind::Publishes),
@@ -58,7 +59,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
             }
         }
         _ if data.get("nodl_version").is_some() => {
-            // The file's name is the node's: `planner.nodl.yaml`.
+            // The file is named after the node: `planner.nodl.yaml`.
             let name = crate::bag::file_name(path);
             let name = name.split('.').next().unwrap_or_default();
             topology.entries.extend(file.node_of_others(name, &data)?);
@@ -92,14 +93,14 @@ impl<'a> TopologyYaml<'a> {
         Self { path, lines }
     }
 
-    /// The error about a key, at the first line that holds it.
+    /// The error for a key, at the first line that contains it.
     fn wrong(&self, key: &str, reason: &str) -> Error {
         bad(self.path, self.line(key), reason.to_owned(), HINT)
     }
 
     /// The first line that begins with a key; 0 if none does.
     fn line(&self, key: &str) -> usize {
-        // All that begin with it stand together in the order of their text.
+        // Lines with the same prefix are contiguous in this order.
         let from = self.lines.range(key..);
         let own = from
             .take_while(|(line, _)| line.starts_with(key))
@@ -137,7 +138,7 @@ impl<'a> TopologyYaml<'a> {
         Ok(entries)
     }
 
-    /// A node with its ends; other keys mean nothing here.
+    /// A node with its ends; other keys are ignored.
     fn node_of_others(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
         let node = resolved(name);
         let entry = |element| TopologyEntry {
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_line_is_named() {
+    fn errors_have_their_line() {
         let text = "nodes:\n  /a:\n    publishs: [x]\n";
         let error = read(Path::new("t.yaml"), text).unwrap_err().to_string();
         assert!(

@@ -70,7 +70,7 @@ impl<'a> CppReader<'a> {
         class.line = line(node);
     }
 
-    /// Notes that a name is given a value.
+    /// Records an assignment to a name.
     pub(super) fn set(&mut self, node: Node<'a>, name: &str, value: &str) {
         let sides = [name, value].map(|side| node.child_by_field_name(side));
         if let [Some(name), Some(value)] = sides {

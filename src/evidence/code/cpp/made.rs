@@ -1,4 +1,4 @@
-//! The functions and classes of the client libraries that make publishers and subscribers.
+//! The functions and classes of the client libraries that create publishers and subscribers.
 
 use super::super::declaration::Made;
 use crate::evidence::syntax::{Node, Parsed};
@@ -26,7 +26,7 @@ impl<'a> Callee<'a> {
                 .child_by_field_name("argument")
                 .map_or("", |n| parsed.text(n));
         }
-        // Names inside names: `a::b::c<T>`, `object.c<T>`.
+        // Nested names: `a::b::c<T>`, `object.c<T>`.
         for _ in 0..8 {
             let field = |name| function.child_by_field_name(name);
             function = match function.kind() {
@@ -57,7 +57,7 @@ impl<'a> Callee<'a> {
     }
 }
 
-/// The thing that a function makes.
+/// The kind of object that a function creates.
 pub(super) fn by_function(callee: &Callee<'_>) -> Option<Made> {
     let has_type = !callee.template.is_empty();
     let is_transport = callee.scope.ends_with("image_transport");
@@ -78,8 +78,7 @@ pub(super) fn by_function(callee: &Callee<'_>) -> Option<Made> {
     })
 }
 
-/// The thing that a variable of this type makes as it is constructed, with the type in its template; pointers to it as
-/// well.
+/// The kind of object that constructing a variable of this type, or a pointer to it, creates, with its template's type.
 pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     let (before, inner) = kind.split_once('<')?;
     let inner = inner.trim().strip_suffix('>')?;
@@ -97,7 +96,7 @@ pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     }
 }
 
-/// The thing that a class of transforms makes.
+/// The kind of object that a transform class creates.
 pub(super) fn transform(scope: &str, name: &str) -> Option<Made> {
     Some(match (scope, name) {
         ("tf" | "tf2_ros", "TransformBroadcaster") => Made::Broadcaster,

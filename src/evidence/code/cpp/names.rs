@@ -17,7 +17,7 @@ pub(super) struct Aliases {
 const DEEPEST: usize = 8;
 
 impl Aliases {
-    /// Adds an element that gives a name to something.
+    /// Adds an element that defines a name.
     pub(super) fn look(&mut self, parsed: &Parsed, node: Node<'_>) {
         let text = |node: Node<'_>| parsed.text(node).trim().to_owned();
         let field = |name| node.child_by_field_name(name).map(text);
@@ -46,7 +46,7 @@ impl Aliases {
         }
     }
 
-    /// The types that a name may mean, as `package/Name`.
+    /// The types that a name may refer to, as `package/Name`.
     pub(super) fn types(&self, name: &str) -> Vec<String> {
         let mut full = bare(name).to_owned();
         for _ in 0..DEEPEST {

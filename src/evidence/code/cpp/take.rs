@@ -1,4 +1,4 @@
-//! Second pass over a C++ file: the calls and variables that make publishers, subscribers and nodes.
+//! Second pass over a C++ file: the calls and variables that create publishers, subscribers and nodes.
 
 use super::super::declaration::{Call, Made, short};
 use super::CppReader;
@@ -7,7 +7,7 @@ use super::made::{self, Callee, by_constructor, by_function, is_recorder};
 use crate::evidence::syntax::{Node, children, line, walk};
 
 impl<'a> CppReader<'a> {
-    /// Second pass: calls and variables that make publishers, subscribers and nodes.
+    /// Second pass: calls and variables that create publishers, subscribers and nodes.
     pub(super) fn take(&mut self, node: Node<'a>) {
         match node.kind() {
             "call_expression" => self.call(node),
@@ -71,7 +71,7 @@ impl<'a> CppReader<'a> {
                 .to_owned();
             self.class().mentions.insert(class, Some(name));
         }
-        // A filter is made without a topic and subscribes later.
+        // A filter is constructed without a topic and subscribes later.
         if let ("subscribe", Some(kind)) = (callee.name, self.members.get(callee.object))
             && let Some((made, inner)) = by_constructor(self.text(*kind))
         {
@@ -96,7 +96,7 @@ impl<'a> CppReader<'a> {
         }
     }
 
-    /// A member that is made with its class: `sub_(nh_, "topic", 1)`, `Node("name")`.
+    /// A member initializer: `sub_(nh_, "topic", 1)`, `Node("name")`.
     pub(super) fn initializer(&mut self, node: Node<'a>) {
         let parts = children(node);
         let [name, given, ..] = parts[..] else {
@@ -120,7 +120,7 @@ impl<'a> CppReader<'a> {
         }
     }
 
-    /// A variable that is made from these arguments.
+    /// A variable constructed from these arguments.
     pub(super) fn constructed(&mut self, node: Node<'a>, kind: Node<'a>, given: Node<'a>) {
         let given = children(given);
         let kind = self.text(kind);
@@ -190,7 +190,7 @@ impl<'a> CppReader<'a> {
         self.class().declarations.extend(call.declarations());
     }
 
-    /// The type of the messages that a callback among the arguments takes.
+    /// The message type of a callback among the arguments.
     pub(super) fn callback_type(&self, given: &[Node<'a>]) -> Vec<String> {
         let of = |argument: &Node<'a>| {
             let mut found = None;
@@ -213,8 +213,8 @@ impl<'a> CppReader<'a> {
     }
 }
 
-/// The namespace that a node handle's name suggests, where the code that made it is elsewhere: `pnh`, `private_nh_`.
-/// The bag tells whether that was right, for only a topic of exactly this name counts.
+/// The namespace suggested by a node handle's name, if it is constructed elsewhere: `pnh`, `private_nh_`. The bag
+/// verifies the guess, as only a topic of exactly this name counts.
 fn spoken(object: &str) -> &'static str {
     let name = object.to_lowercase();
     let is_private = ["pnh", "private", "priv_n", "nhp", "nh_p"]

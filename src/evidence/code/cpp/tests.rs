@@ -52,7 +52,7 @@ fn publishers_and_subscribers_of_rclcpp() {
 }
 
 #[test]
-fn roscpp_tells_types_by_callbacks_and_namespaces_by_handles() {
+fn roscpp_types_come_from_callbacks_and_namespaces_from_handles() {
     let text = r#"void onScan(const sensor_msgs::LaserScan::ConstPtr& m) {}
         void Hear::onMap(const nav_msgs::OccupancyGridConstPtr m) {}
         int main(int argc, char** argv) {
@@ -116,7 +116,7 @@ fn filters_actions_images_and_transforms() {
 }
 
 #[test]
-fn names_stand_for_texts_and_types() {
+fn names_resolve_to_texts_and_types() {
     for (head, topic, expected) in [
         ("#define TOPIC \"/fixed\"", "TOPIC", "/fixed"),
         ("static constexpr char TOPIC[] = \"/k\";", "TOPIC", "/k"),
@@ -163,14 +163,14 @@ fn functions_outside_their_class_belong_to_it() {
 }
 
 #[test]
-fn macros_and_broken_code_do_not_stop_the_reading() {
+fn macros_and_broken_code_are_tolerated() {
     let text = "#define A A A\n#define B B(B(B\nQ_OBJECT_LIKE(x) class X EXPORT : public Y { );\n\
         void f() { auto p = node->create_publisher<std_msgs::msg::Bool>(\"on\", 1); }";
     assert_eq!(declared(text), ["+on std_msgs/Bool"]);
 }
 
 #[test]
-fn calls_that_only_look_alike_are_told_apart() {
+fn similar_calls_are_not_declarations() {
     let text = "void f() { mqtt_subscribe(\"x\"); subscribe(\"y\"); auto c = create_client<a::srv::B>(\"s\"); /* nh.advertise<a::B>(\"z\", 1); */ }";
     assert_eq!(declared(text), [] as [&str; 0]);
 }

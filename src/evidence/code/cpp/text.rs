@@ -17,7 +17,7 @@ impl<'a> CppReader<'a> {
         self.string_at(node, 0).filter(|text| text.len() <= LONGEST)
     }
 
-    /// The text of an expression, as far as it is known.
+    /// The text of an expression, if known.
     pub(super) fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
         if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {

@@ -91,7 +91,7 @@ fn actions_filters_and_transforms() {
 }
 
 #[test]
-fn names_stand_for_texts() {
+fn names_resolve_to_texts() {
     let head = "import rospy\nfrom std_msgs.msg import String\nTOPIC = '/fixed'\n";
     for (code, topic) in [
         ("p = rospy.Publisher(TOPIC, String)", "/fixed"),
@@ -119,14 +119,14 @@ fn names_stand_for_texts() {
 }
 
 #[test]
-fn texts_that_grow_come_to_an_end() {
+fn growing_texts_are_bounded() {
     let many = "{a}".repeat(2000);
     let text = format!("a = f'{many}'\nimport rospy\nrospy.Publisher(f'{many}', String)\n");
     assert_eq!(declared(&text), ["+? "]);
 }
 
 #[test]
-fn calls_that_only_look_alike_are_none() {
+fn similar_calls_are_not_declarations() {
     let text = "from zmq import Publisher\np = Publisher('x', y)\n# rospy.Publisher('no', String)\n'''rospy.Publisher('no', String)'''\n";
     assert_eq!(declared(text), [] as [&str; 0]);
 }

@@ -46,7 +46,7 @@ pub(crate) struct MessageFields {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Definition {
     pub(super) messages: Vec<Arc<MessageFields>>,
-    /// Whether the text named the messages inside it, in some old bags without their packages.
+    /// Whether the text names nested messages, in some old bags without their packages.
     is_loose: bool,
 }
 
@@ -85,11 +85,11 @@ impl Definition {
         })
     }
 
-    /// The place of the message that `kind` names in the message at place `from`: of the package in the name, of the
-    /// same package, of any.
+    /// The index of the message that `kind` refers to in the message with index `from`: in the named package, in the
+    /// same package, in any.
     ///
     /// # Errors
-    /// If the definition does not hold it.
+    /// If the definition does not contain it.
     pub(super) fn find(&self, from: usize, kind: &str) -> Result<usize, String> {
         let wanted = MessageFields::new(kind);
         let own = &self.messages[from].package;
@@ -102,7 +102,7 @@ impl Definition {
         let found = inside()
             .find(|(_, m)| m.name == wanted.name && m.package == *package)
             .or_else(|| {
-                // `Header` alone is the one of `std_msgs`, wherever it stands.
+                // `Header` alone always refers to that of `std_msgs`.
                 let by_name = |m: &MessageFields| self.is_loose || m.name == "Header";
                 inside().find(|(_, m)| m.name == wanted.name && by_name(m))
             });
@@ -112,7 +112,7 @@ impl Definition {
     }
 }
 
-/// The messages of a text: `type_name`, whose fields come first, and those behind a line `MSG:`.
+/// The messages of a text: `type_name`, whose fields come first, and those after `MSG:` lines.
 ///
 /// # Errors
 /// The reason why it cannot be used.

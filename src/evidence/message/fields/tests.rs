@@ -36,7 +36,7 @@ fn csv(connection: &Connection, data: &[u8]) -> String {
 }
 
 #[test]
-fn fields_of_messages_inside_have_dots_and_arrays_are_lists() {
+fn nested_fields_have_dotted_names_and_arrays_are_lists() {
     let definition = "time stamp\nbool FLAG=1\nPart[] parts\nfloat32[2] two\nuint8[] raw\nint8 last # end\n\
                       ===\nMSG: a/Part\nuint16 n\nstring[] names\nb/Deep deep\n===\nMSG: b/Deep\nint64 x\n";
     let mut data: Vec<u8> = Vec::new();
@@ -71,7 +71,7 @@ fn cdr_is_aligned_and_an_empty_message_is_a_byte() {
 }
 
 #[test]
-fn a_field_named_like_a_column_of_ours_gets_a_tail() {
+fn a_field_with_a_reserved_name_gets_a_suffix() {
     let batch = decoded(
         &connection("a/T", "int8 time_ns\nint8 time_ns\n", Encoding::Ros1),
         &[1, 2],
@@ -81,7 +81,7 @@ fn a_field_named_like_a_column_of_ours_gets_a_tail() {
 }
 
 #[test]
-fn what_cannot_be_decoded_says_why() {
+fn undecodable_messages_report_the_reason() {
     let why = |definition: &str, encoding| {
         decoded(&connection("a/T", definition, encoding), &[]).unwrap_err()
     };
@@ -93,7 +93,7 @@ fn what_cannot_be_decoded_says_why() {
 }
 
 #[test]
-fn common_types_need_no_definition_and_are_read_as_they_were() {
+fn common_types_need_no_definition_in_either_version() {
     // `shape_msgs/SolidPrimitive` ends in a polygon since Humble.
     let mut connection = connection("shape_msgs/msg/SolidPrimitive", "", Encoding::Cdr);
     connection.definition = None;
@@ -107,7 +107,7 @@ fn common_types_need_no_definition_and_are_read_as_they_were() {
     assert!(fits(&newer, 2) && !fits(&newer, 1));
     let older = older.unwrap();
     assert!(fits(&older, 1) && !fits(&older, 2));
-    // Types of the user's own come before those that we carry, and may hold them.
+    // The user's types take precedence over built-in ones, and may contain them.
     let mut types = KnownTypes::default();
     types
         .add("my_msgs/Place", "geometry_msgs/Point32 at\nHeader header\n")
@@ -140,14 +140,14 @@ fn every_carried_type_is_complete() {
 }
 
 #[test]
-fn hostile_payloads_end_early() {
+fn hostile_payloads_are_rejected_early() {
     let fails = |definition: &str, data: &[u8]| {
         decoded(&connection("a/T", definition, Encoding::Ros1), data).is_err()
     };
     assert!(fails("float64[] x\n", &[255, 255, 255, 255]));
     assert!(fails("float64[4294967295] x\n", &[0; 64]));
     assert!(fails("int8 x\n", &[1, 2]), "bytes are left");
-    // Many elements without a byte each: told at once, not one by one.
+    // Many empty elements: skipped at once, not one by one.
     let nothing = "E[] e\n===\nMSG: a/E\nF[100] f\n===\nMSG: a/F\n";
     let mut data = vec![0; 1 << 20];
     data[..4].copy_from_slice(&(1_u32 << 19).to_le_bytes());

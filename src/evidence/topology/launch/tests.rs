@@ -85,7 +85,7 @@ fn a_file_that_includes_itself_is_read_once() {
 }
 
 #[test]
-fn files_that_include_each_other_over_and_over_come_to_an_end() {
+fn repeated_includes_are_bounded() {
     let folder = tempfile::tempdir().unwrap();
     for n in 0..12 {
         let include = format!(r#"<include file="{}.launch"/>"#, n + 1).repeat(10);
@@ -102,7 +102,7 @@ fn files_that_include_each_other_over_and_over_come_to_an_end() {
 }
 
 #[test]
-fn arguments_that_repeat_each_other_do_not_fill_memory() {
+fn arguments_that_repeat_each_other_are_bounded() {
     let grow = |n: usize| {
         format!(
             r#"<arg name="a{}" value="{}"/>"#,
@@ -119,7 +119,7 @@ fn arguments_that_repeat_each_other_do_not_fill_memory() {
 }
 
 #[test]
-fn an_undecided_condition_is_said() {
+fn an_undecided_condition_is_reported() {
     let text = r#"<launch><node pkg="a" type="b" name="n" if="$(env SIM)"/></launch>"#;
     let path = Path::new("x.launch");
     let topology = read(path, &tree::of_xml(path, text).unwrap()).unwrap();
@@ -129,7 +129,7 @@ fn an_undecided_condition_is_said() {
 }
 
 #[test]
-fn a_bad_line_is_named() {
+fn errors_have_their_line() {
     let error = tree::of_xml(Path::new("x.launch"), "<launch>\n<node>\n</launch>").unwrap_err();
     assert!(error.to_string().contains("line 3"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! The actions of launch and `launch_ros` as elements of the XML form.
+//! The actions of launch and `launch_ros` as elements of the XML format.
 
 use super::super::tree::Tree;
 use super::UNREAD;
@@ -25,7 +25,7 @@ const OTHER: &[&str] = &[
 ];
 
 impl Evaluator<'_> {
-    /// The action that a call makes; `None` if it does not make one.
+    /// The action that a call creates, if any.
     pub(super) fn action(&mut self, name: &str, arguments: &Arguments) -> Option<PythonValue> {
         let mut tree = match name {
             "LaunchDescription" => {
@@ -55,8 +55,8 @@ impl Evaluator<'_> {
         Some(PythonValue::Action(tree))
     }
 
-    /// A function that the launch system calls: followed like any other of this file; answers of the running system are
-    /// unknown.
+    /// A function that the launch system calls: followed like any other in this file; values from the running system
+    /// are unknown.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
             Some(PythonValue::Function(name)) => self.function(name),
@@ -192,7 +192,7 @@ fn node(tag: &str, given: &Arguments) -> Tree {
 
 fn include(given: &Arguments) -> Tree {
     let file = given.text(0, "launch_description_source");
-    // In ROS 2 an included file sees the arguments of the file that includes it.
+    // In ROS 2 an included file inherits the arguments of the including file.
     let mut tree = element(
         "include",
         &[("file", file), ("pass_all_args", Some("true".to_owned()))],

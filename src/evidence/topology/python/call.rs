@@ -107,7 +107,7 @@ impl<'a> Evaluator<'a> {
         arguments
     }
 
-    /// A method of a known value: lists grow, texts are formatted.
+    /// A method of a known value: appends to lists, formats texts.
     fn method(
         &mut self,
         object: Node<'a>,
@@ -130,7 +130,7 @@ impl<'a> Evaluator<'a> {
                 }
                 _ => None,
             },
-            // `LaunchConfiguration('x').perform(context)` is what `$(var x)` stands for.
+            // `LaunchConfiguration('x').perform(context)` is equivalent to `$(var x)`.
             "perform" => Some(self.value(object)).filter(|value| value.text().is_some()),
             "find" => {
                 let share = self.value(object).text()?;
@@ -200,7 +200,7 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// A substitution that the launch system fills in, in the words of its XML form.
+/// A launch substitution in its XML notation.
 fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
     let text = |place, name| arguments.text(place, name);
     let made = match name {
@@ -236,7 +236,7 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
         "NotSubstitution" => format!("$(not {})", text(0, "value")?),
         "AndSubstitution" => format!("$(and {} {})", text(0, "left")?, text(1, "right")?),
         "OrSubstitution" => format!("$(or {} {})", text(0, "left")?, text(1, "right")?),
-        // The path that they are given.
+        // Their path argument.
         "PythonLaunchDescriptionSource"
         | "AnyLaunchDescriptionSource"
         | "XMLLaunchDescriptionSource"
@@ -290,7 +290,7 @@ fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
     }
 }
 
-/// The parts of a path joined; a part that begins with a slash starts anew.
+/// Joins the parts of a path; a part that begins with a slash replaces those before it.
 fn path(parts: &[PythonValue]) -> String {
     let mut joined = String::new();
     for part in parts {

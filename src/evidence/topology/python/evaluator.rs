@@ -1,5 +1,5 @@
-//! Follows a launch file's statements without running anything: assignments, literal lists, loops over them, functions
-//! of the file. Where a condition is not known both branches count, and what they make is marked as undecided.
+//! Evaluates a launch file's statements statically: assignments, literal lists, loops over them, functions of the file.
+//! If a condition is unknown, both branches are followed and their results marked as undecided.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) struct Evaluator<'a> {
     frames: Vec<Locals>,
     functions: BTreeMap<String, Node<'a>>,
     pub(super) budget: LaunchWork,
-    /// The number of unknown conditions around the statement.
+    /// The number of enclosing unknown conditions.
     pub(super) undecided: usize,
     nested: usize,
 }
@@ -63,7 +63,7 @@ impl<'a> Evaluator<'a> {
         Some(self.call(function, &[], &[]))
     }
 
-    /// The value of the file's only expression; `None` where there is none or it is not known.
+    /// The value of the file's only expression; `None` if there is none or it is unknown.
     pub(super) fn whole(&mut self) -> Option<PythonValue> {
         let statement = children(self.parsed.root());
         let expression = statement.first().and_then(|s| s.named_child(0))?;
@@ -77,7 +77,7 @@ impl<'a> Evaluator<'a> {
         self.parsed.text(node)
     }
 
-    /// Keeps a new value, if it is neither too large nor too deep and there is room.
+    /// Returns a new value, or unknown if it is too large, too deep or exceeds the budget.
     pub(super) fn kept(&mut self, value: PythonValue, at: Node<'_>) -> PythonValue {
         let (size, depth) = value.measure();
         let is_small =
@@ -202,7 +202,7 @@ impl<'a> Evaluator<'a> {
         ControlFlow::Next
     }
 
-    /// The items that a loop goes over, as far as they are known.
+    /// The items of a loop, as far as known.
     pub(super) fn items(&mut self, node: Node<'a>) -> Vec<PythonValue> {
         match self.value(node) {
             PythonValue::List(list) => list,
@@ -214,7 +214,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// An expression that stands by itself: an assignment, a call that changes a list.
+    /// An expression statement: an assignment, or a call that changes a list.
     fn effect(&mut self, node: Node<'a>) {
         let side = |name| node.child_by_field_name(name);
         match (node.kind(), side("left"), side("right")) {

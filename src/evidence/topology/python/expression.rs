@@ -204,7 +204,7 @@ impl<'a> Evaluator<'a> {
             self.value(side("left")?).truth(),
             self.value(side("right")?).truth(),
         );
-        // What the operator makes of a side that decides alone.
+        // The value of a left side for which the operator short-circuits.
         let deciding = self.text(side("operator")?) == "or";
         match (left, right) {
             (Some(a), _) if a == deciding => Some(deciding),
@@ -272,7 +272,7 @@ impl<'a> Evaluator<'a> {
 }
 
 impl PythonValue {
-    /// Whether it is an item of a list or a part of a text; `None` where that is not known.
+    /// Whether it is an item of a list or a part of a text; `None` if unknown.
     fn is_in(&self, all: &Self) -> Option<bool> {
         match (self, all) {
             (_, Self::List(list)) => {

@@ -85,7 +85,7 @@ fn arguments_have_defaults_and_texts_are_joined() {
 }
 
 #[test]
-fn conditions_that_can_be_decided_are() {
+fn decidable_conditions_are_decided() {
     let lines = "sim = LaunchConfiguration('sim')\nslam = LaunchConfiguration('slam')";
     for (condition, met) in [
         ("IfCondition(sim)", true),
@@ -117,7 +117,7 @@ fn conditions_that_can_be_decided_are() {
 }
 
 #[test]
-fn groups_containers_and_timers_hold_nodes() {
+fn groups_containers_and_timers_contain_nodes() {
     let actions = "GroupAction(actions=[PushRosNamespace('g'), SetRemap(src='scan', dst='lidar'), \
             Node(package='a', executable='b', name='in')]), \
         ComposableNodeContainer(name='box', namespace='c', package='rclcpp_components', executable='component_container', \
@@ -149,7 +149,7 @@ fn loops_lists_and_functions_of_the_file_are_followed() {
 }
 
 #[test]
-fn opaque_functions_are_followed_and_what_only_runs_is_said() {
+fn opaque_functions_are_followed_and_unknowns_reported() {
     let text = "def setup(context, *args, **kwargs):\n    \
             name = LaunchConfiguration('robot').perform(context)\n    \
             nodes = [Node(package='a', executable='b', name=name)]\n    \
@@ -199,7 +199,7 @@ fn includes_find_their_package_beside_the_file() {
 }
 
 #[test]
-fn every_node_that_may_start_is_known_to_those_who_ask() {
+fn every_node_that_may_start_is_listed_on_request() {
     let text = "def generate_launch_description():\n    ld = LaunchDescription()\n    \
         if os.environ['MODEL'] == 'burger':\n        ld.add_action(Node(package='a', executable='b', name='n'))\n    \
         else:\n        ld.add_action(Node(package='c', executable='d'))\n    return ld\n";
@@ -214,7 +214,7 @@ fn every_node_that_may_start_is_known_to_those_who_ask() {
 }
 
 #[test]
-fn a_program_is_never_run_and_never_runs_away() {
+fn evaluation_is_static_and_bounded() {
     for body in [
         "    a = ['x']\n    for i in range(1000):\n        a = [a, a]\n    return LaunchDescription(a)\n",
         "    a = 'x'\n    for i in range(1000):\n        a = a + a\n    return LaunchDescription([Node(name=a)])\n",

@@ -2,10 +2,10 @@
 
 use crate::evidence::topology::tree::Tree;
 
-/// The value of an expression. Texts may hold substitutions `$(…)`, which the launch system would fill in.
+/// The value of an expression. Texts may contain launch substitutions `$(…)`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum PythonValue {
-    /// A value that only running the file would reveal; with the line.
+    /// A value that is only known at run time, with its line.
     Unknown(usize),
     None,
     Bool(bool),
@@ -23,7 +23,7 @@ pub(super) enum PythonValue {
 pub(super) const DEEPEST: usize = 48;
 
 impl PythonValue {
-    /// The text in launch files: parts of a list joined, an unknown part as `$(unknown)`.
+    /// The text in launch notation: the parts of a list joined, an unknown part as `$(unknown)`.
     pub(super) fn launch_text(&self) -> String {
         match self {
             Self::List(parts) => parts.iter().map(Self::launch_text).collect(),
@@ -32,7 +32,7 @@ impl PythonValue {
         }
     }
 
-    /// The text as Python's `str` writes it; `None` where that is not known.
+    /// The text as Python's `str` returns it; `None` if unknown.
     pub(super) fn text(&self) -> Option<String> {
         match self {
             Self::Text(text) => Some(text.clone()),
@@ -44,7 +44,7 @@ impl PythonValue {
         }
     }
 
-    /// Whether Python treats it as true; `None` where that is not known.
+    /// Whether Python treats it as true; `None` if unknown.
     pub(super) fn truth(&self) -> Option<bool> {
         match self {
             Self::Bool(is_true) => Some(*is_true),
@@ -58,8 +58,7 @@ impl PythonValue {
         }
     }
 
-    /// Whether two values are equal; `None` where that is not known. A text that says `true` equals `True`, for texts
-    /// of arguments are read both ways.
+    /// Whether two values are equal; `None` if unknown. The text `true` equals `True`, as arguments are texts.
     pub(super) fn equals(&self, other: &Self) -> Option<bool> {
         match (self, other) {
             (Self::Text(a), Self::Text(b)) if a.contains("$(") || b.contains("$(") => None,
@@ -115,7 +114,7 @@ fn of_tree(tree: &Tree) -> (usize, usize) {
         })
 }
 
-/// The value of an argument's text: `true` and `false` become truth values.
+/// The value of an argument's text: `true` and `false` become Booleans.
 pub(super) fn of_text(text: &str) -> PythonValue {
     match text {
         "true" | "True" => PythonValue::Bool(true),
