@@ -32,10 +32,10 @@ use crate::base::time::{Span, Stamp};
 
 pub(crate) use growing::follow;
 use index::Query;
-pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
+pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
 use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
-pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
+pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, SecondFinds, pass, walk};
 
 /// The parser for one format of chunked bags. A value keeps the state that later descriptions depend on.
 pub(crate) trait Grammar: Default + Send + 'static {

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::Grammar;
 use super::check::{Behind, ToldMessages};
 use super::index::{hand_over, nameless};
-use super::record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
+use super::record::{Announced, ChunkHead, NoRecord, RecordHead, pass, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{MOST_PAYLOAD, Sink, Want};
+use crate::bag::model::{MOST_PAYLOAD, Sink};
 use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
@@ -39,9 +39,7 @@ const MOST_EARLY: usize = 1 << 18;
 /// A walk through the records of a bag.
 struct Forward<'s, G> {
     sink: &'s mut dyn Sink,
-    grammar: G,
-    connections: Connections,
-    wants: Vec<Want>,
+    announced: Announced<G>,
     told: ToldMessages,
     early: Early,
     found: ForwardScan,
@@ -60,11 +58,9 @@ pub(super) fn read<G: Grammar>(
     size: u64,
     sink: &mut dyn Sink,
 ) -> ForwardScan {
-    let mut forward = Forward {
+    let mut forward: Forward<'_, G> = Forward {
         sink,
-        grammar: G::default(),
-        connections: Connections::default(),
-        wants: Vec::new(),
+        announced: Announced::default(),
         told: ToldMessages::default(),
         early: Early::default(),
         found: ForwardScan {
@@ -211,7 +207,7 @@ impl<G: Grammar> Forward<'_, G> {
         (raw, count): (u32, u32),
         len: u64,
     ) -> Result<(), NoRecord> {
-        let Some(id) = self.connections.get(raw) else {
+        let Some((id, _)) = self.announced.get(raw) else {
             return pass(stream, len);
         };
         let stamps = if self.told.wants_stamps(id, count) {
@@ -294,12 +290,11 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         stream: &mut ByteStream<'_>,
         (raw, time, size): (u32, Stamp, u32),
     ) -> Result<(), NoRecord> {
-        let Some(id) = self.connections.get(raw) else {
+        let Some((id, want)) = self.announced.get(raw) else {
             pass(stream, u64::from(size))?;
             self.early.hold(raw, time, size);
             return Ok(());
         };
-        let want = self.wants[id.0 as usize];
         hand_over(stream, (id, time, size), want, self.sink)?;
         self.told.add(id, time, size, self.sink);
         Ok(())
@@ -315,18 +310,15 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
             return pass(stream, len);
         }
         let data = peek_whole(stream, len)?;
-        let Ok(described) = self.grammar.describe(what, data, &self.connections) else {
+        let Ok(new) = self.announced.describe(what, data, self.sink) else {
             self.damage("the description of a connection cannot be read");
             return pass(stream, len);
         };
-        if let Some((raw, connection)) = described
-            && let Some(connection) = self.connections.add(raw, connection)
+        if let Some((raw, id)) = new
+            && let Some((stamps, sizes)) = self.early.runs.remove(&raw)
         {
-            self.wants.push(self.sink.connection(connection));
-            if let Some((stamps, sizes)) = self.early.runs.remove(&raw) {
-                self.told.messages += stamps.len() as u64;
-                self.sink.stamps(connection.id, &stamps, Some(&sizes));
-            }
+            self.told.messages += stamps.len() as u64;
+            self.sink.stamps(id, &stamps, Some(&sizes));
         }
         pass(stream, len)
     }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::forward::peek_whole;
 use super::index::hand_over;
-use super::record::{Connections, NoRecord, RecordHead, pass, walk};
+use super::record::{Announced, NoRecord, RecordHead, pass, walk};
 use super::unpack::{Visitor, unpack};
 use super::{Grammar, HEAD};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::input::closed;
-use crate::bag::model::{Growing, Growth, MOST_PAYLOAD, Sink, Want};
+use crate::bag::model::{Growing, Growth, MOST_PAYLOAD, Sink};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -26,9 +26,7 @@ struct GrowingChunks<G> {
     len: u64,
     /// Whether the bag had its end and an index at that time.
     is_closed: bool,
-    grammar: G,
-    connections: Connections,
-    wants: Vec<Want>,
+    announced: Announced<G>,
     allowance: Arc<Allowance>,
 }
 
@@ -43,9 +41,7 @@ pub(crate) fn follow<G: Grammar>(path: &Path) -> Result<Box<dyn Growing>> {
         at: 0,
         len: 0,
         is_closed: false,
-        grammar: G::default(),
-        connections: Connections::default(),
-        wants: Vec::new(),
+        announced: Announced::default(),
         allowance: Arc::default(),
     }))
 }
@@ -144,10 +140,9 @@ impl<G: Grammar> Visitor<G> for Records<'_, G> {
         stream: &mut ByteStream<'_>,
         (raw, time, size): (u32, Stamp, u32),
     ) -> Result<(), NoRecord> {
-        let Some(id) = self.bag.connections.get(raw) else {
+        let Some((id, want)) = self.bag.announced.get(raw) else {
             return pass(stream, u64::from(size));
         };
-        let want = self.bag.wants[id.0 as usize];
         hand_over(stream, (id, time, size), want, self.sink)?;
         self.gather.add(id, time, size, self.sink);
         Ok(())
@@ -161,12 +156,8 @@ impl<G: Grammar> Visitor<G> for Records<'_, G> {
     ) -> Result<(), NoRecord> {
         if len <= MOST_PAYLOAD as u64 {
             let data = peek_whole(stream, len)?;
-            let bag = &mut *self.bag;
-            if let Ok(Some((raw, new))) = bag.grammar.describe(what, data, &bag.connections)
-                && let Some(connection) = bag.connections.add(raw, new)
-            {
-                bag.wants.push(self.sink.connection(connection));
-            }
+            // What cannot be read is told when the bag is read whole.
+            let _ = self.bag.announced.describe(what, data, self.sink);
         }
         pass(stream, len)
     }

@@ -4,8 +4,11 @@
 use std::collections::HashMap;
 use std::{fmt, io};
 
+use super::Grammar;
+use super::index::{hand_over_slice, nameless};
+use crate::bag::adapters::Gather;
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Connection, ConnectionId};
+use crate::bag::model::{Connection, ConnectionId, Sink, Want};
 use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
@@ -166,5 +169,72 @@ impl Connections {
         self.ids.insert(raw, id);
         self.list.push(Connection { id, ..connection });
         self.list.last()
+    }
+}
+
+/// The connections of a bag that were announced to a sink, and what it wants of each.
+#[derive(Default)]
+pub(crate) struct Announced<G> {
+    grammar: G,
+    connections: Connections,
+    wants: Vec<Want>,
+}
+
+impl<G: Grammar> Announced<G> {
+    /// The connection that the bag calls `raw`, and what is wanted of it.
+    pub(crate) fn get(&self, raw: u32) -> Option<(ConnectionId, Want)> {
+        let id = self.connections.get(raw)?;
+        Some((id, self.wants[id.0 as usize]))
+    }
+
+    /// Announces the connection of a description if it is a new one; returns it with the bag's number for it.
+    pub(crate) fn describe(
+        &mut self,
+        what: &G::Description,
+        data: &[u8],
+        sink: &mut dyn Sink,
+    ) -> Result<Option<(u32, ConnectionId)>, NoRecord> {
+        let described = self.grammar.describe(what, data, &self.connections)?;
+        let new = described.and_then(|(raw, new)| Some((raw, self.connections.add(raw, new)?)));
+        Ok(new.map(|(raw, connection)| {
+            self.wants.push(sink.connection(connection));
+            (raw, connection.id)
+        }))
+    }
+}
+
+/// What a second reader of a bag finds, on its way to the sink.
+pub(crate) struct SecondFinds<'s, G> {
+    announced: Announced<G>,
+    gather: Gather,
+    sink: &'s mut dyn Sink,
+}
+
+impl<'s, G: Grammar> SecondFinds<'s, G> {
+    pub(crate) fn new(sink: &'s mut dyn Sink) -> Self {
+        Self {
+            announced: Announced::default(),
+            gather: Gather::default(),
+            sink,
+        }
+    }
+
+    pub(crate) fn describe(&mut self, what: &G::Description, data: &[u8]) {
+        // What cannot be read is told when its messages come.
+        let _ = self.announced.describe(what, data, self.sink);
+    }
+
+    pub(crate) fn message(&mut self, raw: u32, time: Stamp, data: &[u8]) {
+        let Some((id, want)) = self.announced.get(raw) else {
+            return nameless(self.sink, 1);
+        };
+        hand_over_slice(data, (id, time), want, self.sink);
+        let size = u32::try_from(data.len()).unwrap_or(u32::MAX);
+        self.gather.add(id, time, size, self.sink);
+    }
+
+    /// Reports what was gathered.
+    pub(crate) fn flush(&mut self) {
+        self.gather.flush(self.sink);
     }
 }

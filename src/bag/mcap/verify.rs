@@ -7,26 +7,14 @@ use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::{Described, Mcap, records};
-use crate::bag::adapters::Gather;
-use crate::bag::chunked::{
-    Connections, Grammar as _, NoRecord, hand_over_slice, nameless, pass, walk,
-};
+use crate::bag::chunked::{Grammar as _, NoRecord, SecondFinds, pass, walk};
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Sink, Want};
+use crate::bag::model::Sink;
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
 /// The longest record that is parsed, in bytes.
 const LONGEST_RECORD: usize = 256 << 20;
-
-/// Passes on the crate's findings to a sink.
-struct Crate<'s> {
-    sink: &'s mut dyn Sink,
-    grammar: Mcap,
-    connections: Connections,
-    wants: Vec<Want>,
-    gather: Gather,
-}
 
 /// Reports everything that the crate finds to `sink`.
 ///
@@ -41,15 +29,9 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
         .with_validate_summary_section_crc(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let mut found = Crate {
-        sink,
-        grammar: Mcap::default(),
-        connections: Connections::default(),
-        wants: Vec::new(),
-        gather: Gather::default(),
-    };
-    let told = found.records(&mut reader, &mut from);
-    found.gather.flush(found.sink);
+    let mut found = SecondFinds::new(sink);
+    let told = records_of(&mut reader, &mut from, &mut found);
+    found.flush();
     told
 }
 
@@ -92,55 +74,38 @@ fn bound_chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<(), String> {
     }
 }
 
-impl Crate<'_> {
-    fn records(&mut self, reader: &mut LinearReader, from: &mut dyn Read) -> Result<(), String> {
-        while let Some(event) = reader.next_event() {
-            match event.map_err(|e| e.to_string())? {
-                LinearReadEvent::ReadRequest(n) => {
-                    // Memory grows with the bytes received, not with the bytes requested.
-                    let got = read_some(from, reader.insert(n.min(1 << 20)))
-                        .map_err(|e| e.to_string())?;
-                    reader.notify_read(got);
-                }
-                LinearReadEvent::Record { data, opcode } => self.record(opcode, data)?,
+fn records_of(
+    reader: &mut LinearReader,
+    from: &mut dyn Read,
+    found: &mut SecondFinds<'_, Mcap>,
+) -> Result<(), String> {
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|e| e.to_string())? {
+            LinearReadEvent::ReadRequest(n) => {
+                // Memory grows with the bytes received, not with the bytes requested.
+                let got = read_some(from, reader.insert(n.min(1 << 20)));
+                reader.notify_read(got.map_err(|e| e.to_string())?);
+            }
+            LinearReadEvent::Record { data, opcode } => record(opcode, data, found)?,
+        }
+    }
+    Ok(())
+}
+
+fn record(kind: u8, data: &[u8], found: &mut SecondFinds<'_, Mcap>) -> Result<(), String> {
+    match kind {
+        op::SCHEMA => found.describe(&Described::Schema, data),
+        op::CHANNEL => found.describe(&Described::Channel, data),
+        op::MESSAGE => {
+            let record = parse_record(kind, data).map_err(|e| e.to_string())?;
+            if let Record::Message { header, data } = record {
+                let time = Stamp::from_nanos(header.log_time);
+                found.message(u32::from(header.channel_id), time, &data);
             }
         }
-        Ok(())
+        _ => {}
     }
-
-    /// Passes only these kinds to the crate's parser: it panics on a short attachment.
-    fn record(&mut self, kind: u8, data: &[u8]) -> Result<(), String> {
-        match kind {
-            op::SCHEMA => self.describe(Described::Schema, data),
-            op::CHANNEL => self.describe(Described::Channel, data),
-            op::MESSAGE => {
-                let record = parse_record(kind, data).map_err(|e| e.to_string())?;
-                if let Record::Message { header, data } = record {
-                    self.message(header.channel_id, Stamp::from_nanos(header.log_time), &data);
-                }
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn describe(&mut self, what: Described, data: &[u8]) {
-        let described = self.grammar.describe(&what, data, &self.connections);
-        if let Ok(Some((raw, connection))) = described
-            && let Some(connection) = self.connections.add(raw, connection)
-        {
-            self.wants.push(self.sink.connection(connection));
-        }
-    }
-
-    fn message(&mut self, channel: u16, time: Stamp, data: &[u8]) {
-        let Some(id) = self.connections.get(u32::from(channel)) else {
-            return nameless(self.sink, 1);
-        };
-        hand_over_slice(data, (id, time), self.wants[id.0 as usize], self.sink);
-        let size = u32::try_from(data.len()).unwrap_or(u32::MAX);
-        self.gather.add(id, time, size, self.sink);
-    }
+    Ok(())
 }
 
 fn read_some(from: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {

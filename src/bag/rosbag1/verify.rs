@@ -7,13 +7,9 @@ use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
 
 use super::records::{self, ENTRY, Header};
 use super::{Described, Rosbag1};
-use crate::bag::adapters::Gather;
-use crate::bag::chunked::{
-    ChunkBody, ChunkPlan, Connections, Grammar as _, NoRecord, SecondReading, hand_over_slice,
-    nameless, pass, walk,
-};
+use crate::bag::chunked::{ChunkBody, ChunkPlan, NoRecord, SecondFinds, SecondReading, pass, walk};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{Sink, Want};
+use crate::bag::model::Sink;
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
@@ -31,16 +27,7 @@ pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -
         bad.map_or(Ok(bag), |e| Err(e.to_string()))
     });
     verified.refused = bag.is_err();
-    let told = bag.and_then(|bag| {
-        Crate {
-            sink,
-            grammar: Rosbag1::default(),
-            connections: Connections::default(),
-            wants: Vec::new(),
-            gather: Gather::default(),
-        }
-        .read(&bag)
-    });
+    let told = bag.and_then(|bag| records_of(&bag, &mut SecondFinds::new(sink)));
     verified.stopped = told.err();
     verified
 }
@@ -109,75 +96,52 @@ fn unpacked_len(
     Ok(plain.position() - base)
 }
 
-/// Passes on the crate's findings to a sink.
-struct Crate<'s> {
-    sink: &'s mut dyn Sink,
-    grammar: Rosbag1,
-    connections: Connections,
-    wants: Vec<Want>,
-    gather: Gather,
-}
-
-impl Crate<'_> {
-    fn read(&mut self, bag: &RosBag) -> Result<(), String> {
-        for record in bag.index_records() {
-            if let IndexRecord::Connection(connection) = record.map_err(|e| e.to_string())? {
-                self.announce(&connection);
-            }
+fn records_of(bag: &RosBag, to: &mut SecondFinds<'_, Rosbag1>) -> Result<(), String> {
+    for record in bag.index_records() {
+        if let IndexRecord::Connection(connection) = record.map_err(|e| e.to_string())? {
+            announce(&connection, to);
         }
-        for record in bag.chunk_records() {
-            if let ChunkRecord::Chunk(chunk) = record.map_err(|e| e.to_string())? {
-                for message in chunk.messages() {
-                    match message.map_err(|e| e.to_string())? {
-                        MessageRecord::Connection(connection) => self.announce(&connection),
-                        MessageRecord::MessageData(message) => self.message(&message),
+    }
+    for record in bag.chunk_records() {
+        if let ChunkRecord::Chunk(chunk) = record.map_err(|e| e.to_string())? {
+            for message in chunk.messages() {
+                match message.map_err(|e| e.to_string())? {
+                    MessageRecord::Connection(connection) => announce(&connection, to),
+                    MessageRecord::MessageData(message) => {
+                        let time = Stamp::from_nanos(message.time);
+                        to.message(message.conn_id, time, message.data);
                     }
                 }
-                self.gather.flush(self.sink);
             }
+            to.flush();
         }
-        Ok(())
     }
+    Ok(())
+}
 
-    fn announce(&mut self, found: &rosbag::record_types::Connection<'_>) {
-        let mut data = Vec::new();
-        let md5: String = found
-            .md5sum
-            .iter()
-            .flat_map(|b| [b >> 4, b & 15])
-            .filter_map(|d| char::from_digit(d.into(), 16))
-            .collect();
-        let fields = [
-            ("type", found.tp),
-            ("md5sum", md5.as_str()),
-            ("message_definition", found.message_definition),
-            ("callerid", found.caller_id),
-            ("latching", if found.latching { "1" } else { "0" }),
-        ];
-        for (name, value) in fields {
-            let len = u32::try_from(name.len() + 1 + value.len()).unwrap_or(0);
-            data.extend(len.to_le_bytes());
-            data.extend(name.bytes().chain([b'=']).chain(value.bytes()));
-        }
-        let what = Described {
-            raw: found.id,
-            topic: found.storage_topic.as_bytes().to_vec(),
-        };
-        let described = self.grammar.describe(&what, &data, &self.connections);
-        if let Ok(Some((raw, connection))) = described
-            && let Some(connection) = self.connections.add(raw, connection)
-        {
-            self.wants.push(self.sink.connection(connection));
-        }
+fn announce(found: &rosbag::record_types::Connection<'_>, to: &mut SecondFinds<'_, Rosbag1>) {
+    let mut data = Vec::new();
+    let md5: String = found
+        .md5sum
+        .iter()
+        .flat_map(|b| [b >> 4, b & 15])
+        .filter_map(|d| char::from_digit(d.into(), 16))
+        .collect();
+    let fields = [
+        ("type", found.tp),
+        ("md5sum", md5.as_str()),
+        ("message_definition", found.message_definition),
+        ("callerid", found.caller_id),
+        ("latching", if found.latching { "1" } else { "0" }),
+    ];
+    for (name, value) in fields {
+        let len = u32::try_from(name.len() + 1 + value.len()).unwrap_or(0);
+        data.extend(len.to_le_bytes());
+        data.extend(name.bytes().chain([b'=']).chain(value.bytes()));
     }
-
-    fn message(&mut self, found: &rosbag::record_types::MessageData<'_>) {
-        let Some(id) = self.connections.get(found.conn_id) else {
-            return nameless(self.sink, 1);
-        };
-        let time = Stamp::from_nanos(found.time);
-        hand_over_slice(found.data, (id, time), self.wants[id.0 as usize], self.sink);
-        let size = u32::try_from(found.data.len()).unwrap_or(u32::MAX);
-        self.gather.add(id, time, size, self.sink);
-    }
+    let what = Described {
+        raw: found.id,
+        topic: found.storage_topic.as_bytes().to_vec(),
+    };
+    to.describe(&what, &data);
 }
