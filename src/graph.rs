@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder};
 use crate::base::time::{Span, Stamp};
+use crate::base::words::worded;
 use crate::evidence::{Degree, Evidence};
 
 #[cfg(test)]
@@ -126,31 +127,18 @@ pub struct Elements {
     pub subscribes: Vec<Edge>,
 }
 
-/// The state of an element in one window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum State {
-    /// Messages or evidence in the window.
-    Active,
-    /// Alive without a message.
-    Silent,
-    /// Alive by a latched or transient-local message.
-    Latched,
-    /// Known from a header or metadata only.
-    Declared,
-}
-
-impl State {
-    /// All states, the liveliest first.
-    pub const ALL: [Self; 4] = [Self::Active, Self::Silent, Self::Latched, Self::Declared];
-
-    /// The state's word in JSON and in class names.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Active => "active",
-            Self::Silent => "silent",
-            Self::Latched => "latched",
-            Self::Declared => "declared",
-        }
+worded! {
+    /// The state of an element in one window.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum State {
+        /// Messages or evidence in the window.
+        Active = "active",
+        /// Alive without a message.
+        Silent = "silent",
+        /// Alive by a latched or transient-local message.
+        Latched = "latched",
+        /// Known from a header or metadata only.
+        Declared = "declared",
     }
 }
 

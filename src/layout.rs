@@ -15,6 +15,7 @@ mod spacing;
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
+use crate::base::words::worded;
 
 /// The outline that a route must end at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,22 +109,14 @@ pub struct Plan {
     pub is_labelled: bool,
 }
 
-/// The direction in which the edges run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Orientation {
-    /// From left to right.
-    LeftRight,
-    /// From top to bottom.
-    TopBottom,
-}
-
-impl Orientation {
-    /// Its word on the command line and in JSON.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::LeftRight => "LR",
-            Self::TopBottom => "TB",
-        }
+worded! {
+    /// The direction in which the edges run.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Orientation {
+        /// From left to right.
+        LeftRight = "LR",
+        /// From top to bottom.
+        TopBottom = "TB",
     }
 }
 

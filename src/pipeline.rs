@@ -1,5 +1,6 @@
 //! The whole program in the order it happens: it reads, divides, builds, compares, draws and writes.
 
+use crate::base::words::worded;
 mod collect;
 #[cfg(feature = "render")]
 mod draw;
@@ -51,35 +52,23 @@ pub(crate) use {
     read::mission_file,
 };
 
-/// A part of the work, for progress and timings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
-pub enum Stage {
-    /// Bags are read; progress counts bytes.
-    Read,
-    /// Bags are read a second time and compared; progress counts bytes.
-    Verify,
-    /// Bags of a fleet are counted; progress counts bags.
-    Count,
-    /// Graphs are built; progress counts windows.
-    Graphs,
-    /// Everything is laid out.
-    Layout,
-    /// Frames are drawn and written; progress counts frames.
-    Draw,
-}
-
-impl Stage {
-    /// Its word for people.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Read => "reading",
-            Self::Verify => "verifying",
-            Self::Count => "counting",
-            Self::Graphs => "graphs",
-            Self::Layout => "layout",
-            Self::Draw => "drawing",
-        }
+worded! {
+    /// A part of the work, for progress and timings.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[non_exhaustive]
+    pub enum Stage {
+        /// Bags are read; progress counts bytes.
+        Read = "reading",
+        /// Bags are read a second time and compared; progress counts bytes.
+        Verify = "verifying",
+        /// Bags of a fleet are counted; progress counts bags.
+        Count = "counting",
+        /// Graphs are built; progress counts windows.
+        Graphs = "graphs",
+        /// Everything is laid out.
+        Layout = "layout",
+        /// Frames are drawn and written; progress counts frames.
+        Draw = "drawing",
     }
 }
 

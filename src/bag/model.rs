@@ -8,6 +8,7 @@ use crate::base::error::Result;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Period, Span, Stamp};
+use crate::base::words::worded;
 
 /// The serialisation of a payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,28 +146,18 @@ pub trait Sink {
     }
 }
 
-/// The way a bag was read; `reading.md` calls them tiers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Tier {
-    /// By its index: only wanted payloads are read.
-    Index,
-    /// By the message counts per chunk in its tail; by the index only if a chunk spans several windows.
-    Chunks,
-    /// Record by record from the front.
-    Forward,
-    /// By a second, independent reader of the whole bag.
-    Verify,
-}
-
-impl Tier {
-    /// The tier's name in JSON.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Index => "index",
-            Self::Chunks => "chunks",
-            Self::Forward => "forward",
-            Self::Verify => "verify",
-        }
+worded! {
+    /// The way a bag was read; `reading.md` calls them tiers.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Tier {
+        /// By its index: only wanted payloads are read.
+        Index = "index",
+        /// By the message counts per chunk in its tail; by the index only if a chunk spans several windows.
+        Chunks = "chunks",
+        /// Record by record from the front.
+        Forward = "forward",
+        /// By a second, independent reader of the whole bag.
+        Verify = "verify",
     }
 }
 

@@ -1,35 +1,38 @@
 //! Notices: problems that did not stop the command, grouped by kind and counted.
 
+use crate::base::words::worded;
 use std::collections::BTreeMap;
 
 use super::budget::NOTICES;
 
-/// The kind of a notice. Its name in JSON is [`NoticeKind::word`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum NoticeKind {
-    /// Part of the bag was lost: cut, unreadable or skipped. The command exits 3.
-    Damaged,
-    /// The bag's end is missing. The command exits 3.
-    Truncated,
-    /// The bag was not read by its index, for the reason given; nothing was lost.
-    Downgraded,
-    /// A tool rewrote the bag, so its headers name wrong publishers.
-    Rewritten,
-    /// The bag was recorded while another was played back.
-    Playback,
-    /// A payload without the layout that its type defines.
-    Undecodable,
-    /// Messages with an impossible time, excluded from all counts. The command exits 3.
-    ImpossibleTime,
-    /// Something that the picture hides or collapses, and how to show it.
-    Hidden,
-    /// A choice made for the user, such as the period.
-    Chosen,
-    /// A character that the bundled font lacks.
-    Glyph,
-    /// Any other note.
-    Note,
+worded! {
+    /// The kind of a notice. Its name in JSON is [`NoticeKind::word`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[non_exhaustive]
+    pub enum NoticeKind {
+        /// Part of the bag was lost: cut, unreadable or skipped. The command exits 3.
+        Damaged = "damaged",
+        /// The bag's end is missing. The command exits 3.
+        Truncated = "truncated",
+        /// The bag was not read by its index, for the reason given; nothing was lost.
+        Downgraded = "downgraded",
+        /// A tool rewrote the bag, so its headers name wrong publishers.
+        Rewritten = "rewritten",
+        /// The bag was recorded while another was played back.
+        Playback = "playback",
+        /// A payload without the layout that its type defines.
+        Undecodable = "undecodable",
+        /// Messages with an impossible time, excluded from all counts. The command exits 3.
+        ImpossibleTime = "impossible_time",
+        /// Something that the picture hides or collapses, and how to show it.
+        Hidden = "hidden",
+        /// A choice made for the user, such as the period.
+        Chosen = "chosen",
+        /// A character that the bundled font lacks.
+        Glyph = "glyph",
+        /// Any other note.
+        Note = "note",
+    }
 }
 
 impl NoticeKind {
@@ -41,42 +44,6 @@ impl NoticeKind {
     /// Whether it belongs to a normal run: hidden elements and automatic choices.
     pub fn is_routine(self) -> bool {
         matches!(self, Self::Hidden | Self::Chosen | Self::Glyph)
-    }
-
-    const ALL: [Self; 11] = [
-        Self::Damaged,
-        Self::Truncated,
-        Self::Downgraded,
-        Self::Rewritten,
-        Self::Playback,
-        Self::Undecodable,
-        Self::ImpossibleTime,
-        Self::Hidden,
-        Self::Chosen,
-        Self::Glyph,
-        Self::Note,
-    ];
-
-    /// The kind with this name in JSON.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.word() == word)
-    }
-
-    /// The kind's name in JSON.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Damaged => "damaged",
-            Self::Truncated => "truncated",
-            Self::Downgraded => "downgraded",
-            Self::Rewritten => "rewritten",
-            Self::Playback => "playback",
-            Self::Undecodable => "undecodable",
-            Self::ImpossibleTime => "impossible_time",
-            Self::Hidden => "hidden",
-            Self::Chosen => "chosen",
-            Self::Glyph => "glyph",
-            Self::Note => "note",
-        }
     }
 }
 

@@ -6,6 +6,40 @@ use std::borrow::Cow;
 
 use chrono::DateTime;
 
+/// An enum without values whose variants have a word each: on the command line, in JSON, for people.
+macro_rules! worded {
+    (
+        $(#[$about:meta])*
+        $vis:vis enum $name:ident {
+            $($(#[$meaning:meta])* $variant:ident = $word:literal,)+
+        }
+    ) => {
+        $(#[$about])*
+        $vis enum $name {
+            $($(#[$meaning])* $variant,)+
+        }
+
+        #[allow(dead_code, reason = "not each is listed, or read by its word")]
+        impl $name {
+            /// All of them, in order.
+            $vis const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            /// Its word.
+            $vis fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+
+            /// The one of this word.
+            $vis fn from_word(word: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| one.word() == word)
+            }
+        }
+    };
+}
+pub(crate) use worded;
+
 const SECOND: i64 = 1_000_000_000;
 
 /// A rate in messages per second: `50 Hz`, `12.5 Hz`, `0.25 Hz`, `1.2 kHz`; `0 Hz` for an infinite one, NaN and below

@@ -27,6 +27,7 @@ mod tex;
 pub(crate) mod tracks;
 
 use crate::base::error::{Error, Result};
+use crate::base::words::worded;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
 use crate::mission::Mission;
@@ -36,61 +37,45 @@ use canvas::Sizes;
 pub(crate) use course::Course;
 use source::FigureSource;
 
-/// The kind of figure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum FigureKind {
-    /// Life lines: when each row was alive, how busy it was, and what changed.
-    #[default]
-    Lives,
-    /// The graph of nodes over the whole mission, with the phases in which each lives.
-    Map,
-    /// A panel per change of phase, with only the differences.
-    Steps,
-    /// A map per phase, all at the same places, with the changes of the phase in colour.
-    Changes,
+worded! {
+    /// The kind of figure.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum FigureKind {
+        /// Life lines: when each row was alive, how busy it was, and what changed.
+        #[default]
+        Lives = "lives",
+        /// The graph of nodes over the whole mission, with the phases in which each lives.
+        Map = "map",
+        /// A panel per change of phase, with only the differences.
+        Steps = "steps",
+        /// A map per phase, all at the same places, with the changes of the phase in colour.
+        Changes = "changes",
+    }
 }
 
 impl FigureKind {
-    /// The figures by the words of the command line.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("lives", Self::Lives),
-        ("map", Self::Map),
-        ("steps", Self::Steps),
-        ("changes", Self::Changes),
-    ];
-
     /// The figure of this word.
     ///
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        let found = Self::ALL.iter().find(|(name, _)| *name == word);
-        found.map(|(_, kind)| *kind).ok_or_else(|| {
-            Error::usage(
-                format!("`{word}` is not a figure"),
-                "figures: lives, map, steps, changes",
-            )
-        })
-    }
-
-    /// Its word on the command line.
-    pub fn word(self) -> &'static str {
-        Self::ALL
-            .iter()
-            .find(|(_, kind)| *kind == self)
-            .map_or("", |(word, _)| word)
+        let what = || format!("`{word}` is not a figure");
+        Self::from_word(word)
+            .ok_or_else(|| Error::usage(what(), "figures: lives, map, steps, changes"))
     }
 }
 
-/// The kind of thing that rows and boxes stand for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RowKind {
-    /// Nodes, by role.
-    Nodes,
-    /// Nodes of one namespace that live in the same phases.
-    Groups,
-    /// Topics.
-    Topics,
+worded! {
+    /// The kind of thing that rows and boxes stand for.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum RowKind {
+        /// Nodes, by role.
+        Nodes = "nodes",
+        /// Nodes of one namespace that live in the same phases.
+        Groups = "groups",
+        /// Topics.
+        Topics = "topics",
+    }
 }
 
 impl RowKind {
@@ -99,15 +84,8 @@ impl RowKind {
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        match word {
-            "nodes" => Ok(Self::Nodes),
-            "groups" => Ok(Self::Groups),
-            "topics" => Ok(Self::Topics),
-            _ => {
-                let what = format!("`{word}` cannot be a row");
-                Err(Error::usage(what, "rows: nodes, groups, topics"))
-            }
-        }
+        let what = || format!("`{word}` cannot be a row");
+        Self::from_word(word).ok_or_else(|| Error::usage(what(), "rows: nodes, groups, topics"))
     }
 }
 

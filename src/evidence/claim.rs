@@ -9,34 +9,22 @@ use std::sync::Arc;
 
 use crate::base::budget;
 use crate::base::time::{Span, Stamp};
+use crate::base::words::worded;
 use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
-/// The strength of the evidence for something. Ordered: the stronger is the smaller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Degree {
-    /// Messages of this very connection, or the middleware's own statistics.
-    Measured,
-    /// A statement: a log record's topic list, a graph snapshot, the user's own file.
-    Stated,
-    /// A convention: an action, a bond, every node publishes `/rosout`.
-    Inferred,
-    /// Known from a header or metadata only.
-    Declared,
-}
-
-impl Degree {
-    /// All degrees, strongest first.
-    pub const ALL: [Self; 4] = [Self::Measured, Self::Stated, Self::Inferred, Self::Declared];
-
-    /// The degree's word in JSON and in class names.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Stated => "stated",
-            Self::Inferred => "inferred",
-            Self::Declared => "declared",
-        }
+worded! {
+    /// The strength of the evidence for something. Ordered: the stronger is the smaller.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum Degree {
+        /// Messages of this very connection, or the middleware's own statistics.
+        Measured = "measured",
+        /// A statement: a log record's topic list, a graph snapshot, the user's own file.
+        Stated = "stated",
+        /// A convention: an action, a bond, every node publishes `/rosout`.
+        Inferred = "inferred",
+        /// Known from a header or metadata only.
+        Declared = "declared",
     }
 }
 

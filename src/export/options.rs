@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::base::error::{Error, Result};
+use crate::base::words::worded;
 pub use crate::draw::figure::FigureOptions;
 use crate::draw::figure::course::LifeLines;
 pub use crate::draw::strip::Choice;
@@ -76,29 +77,25 @@ impl SequenceOptions {
     }
 }
 
-/// The profile of a DOT file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Profile {
-    /// As `rqt_graph` saves it: every place is in the file.
-    #[default]
-    Rqt,
-    /// Without places, with a title and colours, for `dot -Tpdf`.
-    Plain,
+worded! {
+    /// The profile of a DOT file.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Profile {
+        /// As `rqt_graph` saves it: every place is in the file.
+        #[default]
+        Rqt = "rqt",
+        /// Without places, with a title and colours, for `dot -Tpdf`.
+        Plain = "plain",
+    }
 }
 
 impl Profile {
-    /// The profiles by the words of the command line.
-    pub const ALL: [(&'static str, Self); 2] = [("rqt", Self::Rqt), ("plain", Self::Plain)];
-
     /// The profile of this word.
     ///
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        let found = Self::ALL.iter().find(|(name, _)| *name == word);
-        found.map(|(_, profile)| *profile).ok_or_else(|| {
-            let what = format!("`{word}` is not a profile of DOT");
-            Error::usage(what, "profiles: rqt, plain")
-        })
+        let what = || format!("`{word}` is not a profile of DOT");
+        Self::from_word(word).ok_or_else(|| Error::usage(what(), "profiles: rqt, plain"))
     }
 }

@@ -10,6 +10,7 @@ use super::measure::MEASURES;
 use super::pattern::Pattern;
 use super::range::{During, Range};
 use crate::base::time::{Period, Stamp};
+use crate::base::words::worded;
 pub(crate) use crate::base::yaml::YamlPlace;
 use crate::mission::ledger::Kind;
 
@@ -190,40 +191,17 @@ pub(crate) struct Event {
     pub(crate) to: Option<Pattern>,
 }
 
-/// Kinds of events, as a rule names them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EventKind {
-    Added,
-    Removed,
-    Restarted,
-    Silent,
-    HandedOver,
-    Rate,
-    Lifecycle,
-}
-
-impl EventKind {
-    pub(crate) const ALL: [Self; 7] = [
-        Self::Added,
-        Self::Removed,
-        Self::Restarted,
-        Self::Silent,
-        Self::HandedOver,
-        Self::Rate,
-        Self::Lifecycle,
-    ];
-
-    /// Its word in the file.
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Self::Added => "added",
-            Self::Removed => "removed",
-            Self::Restarted => "restarted",
-            Self::Silent => "silent",
-            Self::HandedOver => "handed_over",
-            Self::Rate => "rate",
-            Self::Lifecycle => "lifecycle",
-        }
+worded! {
+    /// Kinds of events, as a rule names them.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) enum EventKind {
+        Added = "added",
+        Removed = "removed",
+        Restarted = "restarted",
+        Silent = "silent",
+        HandedOver = "handed_over",
+        Rate = "rate",
+        Lifecycle = "lifecycle",
     }
 }
 

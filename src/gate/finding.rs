@@ -6,241 +6,131 @@ use std::fmt;
 use crate::base::digest;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::visible;
+use crate::base::words::worded;
 use crate::base::yaml::YamlPlace;
 
-/// A kind of finding: its place in [`KINDS`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum FindingKind {
-    NodeMissing,
-    NodeForbidden,
-    NodeLate,
-    NodeGone,
-    NodeRestarted,
-    NodeLifecycle,
-    TopicMissing,
-    TopicForbidden,
-    TopicType,
-    TopicQos,
-    TopicRateLow,
-    TopicRateHigh,
-    TopicGap,
-    TopicLate,
-    TopicGone,
-    TopicAge,
-    TopicBytes,
-    TopicDrops,
-    PublisherMissing,
-    PublisherUnexpected,
-    SubscriberMissing,
-    OrderBroken,
-    ReactionMissing,
-    TooManyChanges,
-    UnexpectedNode,
-    UnexpectedTopic,
-    Starved,
-    DuplicateName,
-    MessagesLost,
-    AllowUnused,
+/// The kinds of findings: the word, the meaning, and the way it is decided.
+macro_rules! kinds {
+    ($($kind:ident $word:literal: $says:literal, $more:literal;)+) => {
+        /// A kind of finding: its place in [`KINDS`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub(crate) enum FindingKind {
+            $($kind,)+
+        }
+
+        /// All kinds in their order: the word, the meaning, and the way it is decided.
+        pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] =
+            &[$((FindingKind::$kind, $word, $says, $more),)+];
+    };
 }
 
-/// All kinds in their order: the word, the meaning, and the way it is decided.
-pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
-    (
-        FindingKind::NodeMissing,
-        "node-missing",
+kinds! {
+    NodeMissing "node-missing":
         "An expected node is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
          folded). Undecidable in a bag that names no node at all or only those that wrote a log, in one whose senders a tool \
          has merged, of nodes with `known_by: log`, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
-         true` asks for nothing.",
-    ),
-    (
-        FindingKind::NodeForbidden,
-        "node-forbidden",
+         true` asks for nothing.";
+    NodeForbidden "node-forbidden":
         "A forbidden node is in the bag.",
-        "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.",
-    ),
-    (
-        FindingKind::NodeLate,
-        "node-late",
+        "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.";
+    NodeLate "node-late":
         "A node appeared later, or earlier, than it should have.",
         "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have been there earlier for \
-         all that the bag tells.",
-    ),
-    (
-        FindingKind::NodeGone,
-        "node-gone",
+         all that the bag tells.";
+    NodeGone "node-gone":
         "A node ended before the mission did.",
         "A node that is expected is expected to stay. Its end is told by a rhythm that broke for good, or by something \
          that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go, \
-         `may_end: 1:30..` from then on.",
-    ),
-    (
-        FindingKind::NodeRestarted,
-        "node-restarted",
+         `may_end: 1:30..` from then on.";
+    NodeRestarted "node-restarted":
         "A node restarted more or less often than allowed.",
-        "`restarts: ..0`. A restart is proved by sequence numbers, a new process, or a new anonymous name of one role.",
-    ),
-    (
-        FindingKind::NodeLifecycle,
-        "node-lifecycle",
+        "`restarts: ..0`. A restart is proved by sequence numbers, a new process, or a new anonymous name of one role.";
+    NodeLifecycle "node-lifecycle":
         "A node is in another lifecycle state at the end.",
-        "`lifecycle: active`. Undecidable without the node's transition events.",
-    ),
-    (
-        FindingKind::TopicMissing,
-        "topic-missing",
+        "`lifecycle: active`. Undecidable without the node's transition events.";
+    TopicMissing "topic-missing":
         "An expected topic is not in the bag.",
         "A topic is there if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
-         messages. `optional: true` asks for nothing.",
-    ),
-    (
-        FindingKind::TopicForbidden,
-        "topic-forbidden",
+         messages. `optional: true` asks for nothing.";
+    TopicForbidden "topic-forbidden":
         "A forbidden topic is in the bag.",
-        "Written as `forbidden: true`, mostly for a pattern.",
-    ),
-    (
-        FindingKind::TopicType,
-        "topic-type",
+        "Written as `forbidden: true`, mostly for a pattern.";
+    TopicType "topic-type":
         "A topic has another type than expected.",
-        "`type: sensor_msgs/LaserScan`; the `/msg/` of ROS 2 makes no difference.",
-    ),
-    (
-        FindingKind::TopicQos,
-        "topic-qos",
+        "`type: sensor_msgs/LaserScan`; the `/msg/` of ROS 2 makes no difference.";
+    TopicQos "topic-qos":
         "A topic is offered with another quality of service.",
         "`qos: reliable` asks for each of its words; `latched: true` for a last message that stands. Undecidable where \
-         the bag does not tell.",
-    ),
-    (
-        FindingKind::TopicRateLow,
-        "topic-rate-low",
+         the bag does not tell.";
+    TopicRateLow "topic-rate-low":
         "A topic had fewer messages per second than expected.",
         "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
          95` of them at least. A message more or less at the edge of a window is none. `mean_hz: 2..3` is judged from the \
-         first to the last message, for topics that come unevenly.",
-    ),
-    (
-        FindingKind::TopicRateHigh,
-        "topic-rate-high",
+         first to the last message, for topics that come unevenly.";
+    TopicRateHigh "topic-rate-high":
         "A topic had more messages per second than expected.",
-        "As `topic-rate-low`, above the range.",
-    ),
-    (
-        FindingKind::TopicGap,
-        "topic-gap",
+        "As `topic-rate-low`, above the range.";
+    TopicGap "topic-gap":
         "A topic was silent for longer than allowed.",
-        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.",
-    ),
-    (
-        FindingKind::TopicLate,
-        "topic-late",
+        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.";
+    TopicLate "topic-late":
         "A topic's first message came later, or earlier, than it should have.",
         "`within: 40s..1:10` counts from the first message of the bag. What comes within 2.5 s of the recorder's start is \
-         never early: it may have been there before.",
-    ),
-    (
-        FindingKind::TopicGone,
-        "topic-gone",
+         never early: it may have been there before.";
+    TopicGone "topic-gone":
         "A topic's last message came before its time.",
-        "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.",
-    ),
-    (
-        FindingKind::TopicAge,
-        "topic-age",
+        "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.";
+    TopicAge "topic-age":
         "The messages of a topic were older than allowed when they arrived.",
         "`age: ..0.2s` is checked against the mean age in every window, from statistics or, where they are read, from the stamps \
-         in headers. Undecidable in a bag without either.",
-    ),
-    (
-        FindingKind::TopicBytes,
-        "topic-bytes",
+         in headers. Undecidable in a bag without either.";
+    TopicBytes "topic-bytes":
         "A topic had more, or fewer, bytes per second than allowed.",
-        "`bytes: ..5MB/s` is checked in every window.",
-    ),
-    (
-        FindingKind::TopicDrops,
-        "topic-drops",
+        "`bytes: ..5MB/s` is checked in every window.";
+    TopicDrops "topic-drops":
         "More messages of a topic were lost than allowed.",
-        "`drops: ..0` is checked in every window, by the drops that statistics report. Undecidable in a bag without them.",
-    ),
-    (
-        FindingKind::PublisherMissing,
-        "publisher-missing",
+        "`drops: ..0` is checked in every window, by the drops that statistics report. Undecidable in a bag without them.";
+    PublisherMissing "publisher-missing":
         "A node does not publish an expected topic.",
-        "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.",
-    ),
-    (
-        FindingKind::PublisherUnexpected,
-        "publisher-unexpected",
+        "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.";
+    PublisherUnexpected "publisher-unexpected":
         "A topic has a publisher that is not listed.",
         "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` makes it milder. Only publishers that are \
-         measured or stated count.",
-    ),
-    (
-        FindingKind::SubscriberMissing,
-        "subscriber-missing",
+         measured or stated count.";
+    SubscriberMissing "subscriber-missing":
         "A node does not subscribe to an expected topic.",
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
-         discovery, or this node's log of its connections.",
-    ),
-    (
-        FindingKind::OrderBroken,
-        "order-broken",
+         discovery, or this node's log of its connections.";
+    OrderBroken "order-broken":
         "Nodes did not appear in the expected order.",
-        "`appear_in_order: [/a, /b]`. Undecidable where the times that the bag tells overlap.",
-    ),
-    (
-        FindingKind::ReactionMissing,
-        "reaction-missing",
+        "`appear_in_order: [/a, /b]`. Undecidable where the times that the bag tells overlap.";
+    ReactionMissing "reaction-missing":
         "An expected reaction did not happen.",
         "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
-         must follow; times count as uncertain as they are known.",
-    ),
-    (
-        FindingKind::TooManyChanges,
-        "too-many-changes",
+         must follow; times count as uncertain as they are known.";
+    TooManyChanges "too-many-changes":
         "There were more, or fewer, reconfigurations than allowed.",
-        "`during: -30s.., changes: ..0` counts the entries that `bagreel events` prints.",
-    ),
-    (
-        FindingKind::UnexpectedNode,
-        "unexpected-node",
+        "`during: -30s.., changes: ..0` counts the entries that `bagreel events` prints.";
+    UnexpectedNode "unexpected-node":
         "A node in the bag is not in the file.",
-        "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.",
-    ),
-    (
-        FindingKind::UnexpectedTopic,
-        "unexpected-topic",
+        "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.";
+    UnexpectedTopic "unexpected-topic":
         "A topic in the bag is not in the file.",
-        "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.",
-    ),
-    (
-        FindingKind::Starved,
-        "starved",
+        "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.";
+    Starved "starved":
         "A subscriber gets nothing, since its quality of service asks for more than is offered.",
-        "A warning wherever a log or `/rosgraph` says so; `policy: {starved: error}` or `allow`.",
-    ),
-    (
-        FindingKind::DuplicateName,
-        "duplicate-name",
+        "A warning wherever a log or `/rosgraph` says so; `policy: {starved: error}` or `allow`.";
+    DuplicateName "duplicate-name":
         "Two nodes have the same name.",
-        "A warning wherever a log or `/rosgraph` says so; `policy: {duplicate_names: error}` or `allow`.",
-    ),
-    (
-        FindingKind::MessagesLost,
-        "messages-lost",
+        "A warning wherever a log or `/rosgraph` says so; `policy: {duplicate_names: error}` or `allow`.";
+    MessagesLost "messages-lost":
         "The recorder lost messages, so that gaps and low rates may be its own.",
-        "A warning wherever the recorder says so; `policy: {messages_lost: error}` or `allow`.",
-    ),
-    (
-        FindingKind::AllowUnused,
-        "allow-unused",
+        "A warning wherever the recorder says so; `policy: {messages_lost: error}` or `allow`.";
+    AllowUnused "allow-unused":
         "An allowance forgave nothing.",
-        "Remove it, so that it does not forgive something else later.",
-    ),
-];
+        "Remove it, so that it does not forgive something else later.";
+}
 
 impl FindingKind {
     /// Its word.
@@ -261,26 +151,16 @@ impl FindingKind {
     }
 }
 
-/// The severity of a finding, the worst first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Severity {
-    Error,
-    Warning,
-    /// The bag does not tell.
-    Unknown,
-    /// Known and forgiven.
-    Allowed,
-}
-
-impl Severity {
-    /// Its word.
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Self::Error => "error",
-            Self::Warning => "warning",
-            Self::Unknown => "unknown",
-            Self::Allowed => "allowed",
-        }
+worded! {
+    /// The severity of a finding, the worst first.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub(crate) enum Severity {
+        Error = "error",
+        Warning = "warning",
+        /// The bag does not tell.
+        Unknown = "unknown",
+        /// Known and forgiven.
+        Allowed = "allowed",
     }
 }
 

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::time::Stamp;
+use crate::base::words::worded;
 use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicState};
 
 /// A reconfiguration, as in JSON and the log of events.
@@ -80,25 +81,16 @@ impl Change {
     }
 }
 
-/// The kinds of values in [`Change::Value`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ValueKind {
-    /// The types of a topic.
-    Type,
-    /// The quality of service of a topic.
-    Qos,
-    /// The lifecycle state of a node.
-    Lifecycle,
-}
-
-impl ValueKind {
-    /// The kind's word in JSON.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Type => "type",
-            Self::Qos => "qos",
-            Self::Lifecycle => "lifecycle",
-        }
+worded! {
+    /// The kinds of values in [`Change::Value`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum ValueKind {
+        /// The types of a topic.
+        Type = "type",
+        /// The quality of service of a topic.
+        Qos = "qos",
+        /// The lifecycle state of a node.
+        Lifecycle = "lifecycle",
     }
 }
 

@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
+use crate::base::words::worded;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Window;
@@ -60,79 +61,43 @@ pub struct Ledger {
     pub(crate) compares: bool,
 }
 
-/// The kind of an event. Ordered as entries of one time are listed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum Kind {
-    /// A node began; its edges and topics are parts of it.
-    Started,
-    /// A node ended.
-    Stopped,
-    /// A node, or an anonymous role, was gone from [`Entry::time`] to [`Entry::until`] and is back.
-    Restarted,
-    /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a restart.
-    Silent,
-    /// A topic of unknown publisher, or an edge of a living node, began.
-    Appeared,
-    /// A topic of unknown publisher, or an edge of a living node, ended.
-    Vanished,
-    /// A topic's messages come from other senders.
-    HandedOver,
-    /// A topic's or publication's rate changed.
-    Rate,
-    /// A node's lifecycle state changed.
-    Lifecycle,
-    /// A topic has another type.
-    Type,
-    /// A topic is offered with another quality of service.
-    Qos,
-    /// A subscriber gets nothing over this edge: its quality of service asks for more than is offered.
-    Starved,
-    /// Two nodes have the same name.
-    Duplicate,
-    /// The recorder lost messages of a topic.
-    Lost,
+worded! {
+    /// The kind of an event. Ordered as entries of one time are listed.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[non_exhaustive]
+    pub enum Kind {
+        /// A node began; its edges and topics are parts of it.
+        Started = "started",
+        /// A node ended.
+        Stopped = "stopped",
+        /// A node, or an anonymous role, was gone from [`Entry::time`] to [`Entry::until`] and is back.
+        Restarted = "restarted",
+        /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a restart.
+        Silent = "silent",
+        /// A topic of unknown publisher, or an edge of a living node, began.
+        Appeared = "appeared",
+        /// A topic of unknown publisher, or an edge of a living node, ended.
+        Vanished = "vanished",
+        /// A topic's messages come from other senders.
+        HandedOver = "handed_over",
+        /// A topic's or publication's rate changed.
+        Rate = "rate",
+        /// A node's lifecycle state changed.
+        Lifecycle = "lifecycle",
+        /// A topic has another type.
+        Type = "type",
+        /// A topic is offered with another quality of service.
+        Qos = "qos",
+        /// A subscriber gets nothing over this edge: its quality of service asks for more than is offered.
+        Starved = "starved",
+        /// Two nodes have the same name.
+        Duplicate = "duplicate",
+        /// The recorder lost messages of a topic.
+        Lost = "lost",
+    }
 }
 
 impl Kind {
-    /// All kinds, in their order.
-    pub const ALL: [Self; 14] = [
-        Self::Started,
-        Self::Stopped,
-        Self::Restarted,
-        Self::Silent,
-        Self::Appeared,
-        Self::Vanished,
-        Self::HandedOver,
-        Self::Rate,
-        Self::Lifecycle,
-        Self::Type,
-        Self::Qos,
-        Self::Starved,
-        Self::Duplicate,
-        Self::Lost,
-    ];
-
-    /// The kind's word in JSON and in the log.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Started => "started",
-            Self::Stopped => "stopped",
-            Self::Restarted => "restarted",
-            Self::Silent => "silent",
-            Self::Appeared => "appeared",
-            Self::Vanished => "vanished",
-            Self::HandedOver => "handed_over",
-            Self::Rate => "rate",
-            Self::Lifecycle => "lifecycle",
-            Self::Type => "type",
-            Self::Qos => "qos",
-            Self::Starved => "starved",
-            Self::Duplicate => "duplicate",
-            Self::Lost => "lost",
-        }
-    }
-
     /// Whether it is a remark about the robot or the recorder, and no reconfiguration.
     pub(crate) fn is_remark(self) -> bool {
         matches!(self, Self::Starved | Self::Duplicate | Self::Lost)
@@ -220,26 +185,15 @@ pub struct Interruption {
     pub length: i64,
 }
 
-/// The kind of an interruption.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
-pub enum InterruptionKind {
-    /// The recorder's clock was set back, or simulated time began again: what follows is shown behind what came before.
-    ClockBack,
-    /// Nothing was recorded: the recorder paused, or its clock was set ahead.
-    Nothing,
-}
-
-impl InterruptionKind {
-    /// All kinds, in their order.
-    pub const ALL: [Self; 2] = [Self::ClockBack, Self::Nothing];
-
-    /// The kind's word in JSON and in the log.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::ClockBack => "clock_back",
-            Self::Nothing => "nothing_recorded",
-        }
+worded! {
+    /// The kind of an interruption.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[non_exhaustive]
+    pub enum InterruptionKind {
+        /// The recorder's clock was set back, or simulated time began again: what follows is shown behind what came before.
+        ClockBack = "clock_back",
+        /// Nothing was recorded: the recorder paused, or its clock was set ahead.
+        Nothing = "nothing_recorded",
     }
 }
 

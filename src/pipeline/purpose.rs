@@ -2,19 +2,22 @@
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::base::words::worded;
 use crate::draw::picture::PageOptions;
 
-/// The place where the picture will be seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    /// On a repository's front page, which is at most 830 pixels wide.
-    Readme,
-    /// On a screen or a wall, 1280 × 720.
-    Slide,
-    /// In a column of a paper, 88 mm.
-    Column,
-    /// On a page of a paper, 181 mm.
-    Page,
+worded! {
+    /// The place where the picture will be seen.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Purpose {
+        /// On a repository's front page, which is at most 830 pixels wide.
+        Readme = "readme",
+        /// On a screen or a wall, 1280 × 720.
+        Slide = "slide",
+        /// In a column of a paper, 88 mm.
+        Column = "column",
+        /// On a page of a paper, 181 mm.
+        Page = "page",
+    }
 }
 
 /// Pixels per millimetre on paper, 96 to the inch.
@@ -25,26 +28,14 @@ const HIGHEST: f64 = 225.0;
 const FURNITURE: f64 = 10.5;
 
 impl Purpose {
-    /// The purposes by the words of the command line.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("readme", Self::Readme),
-        ("slide", Self::Slide),
-        ("column", Self::Column),
-        ("page", Self::Page),
-    ];
-
     /// The purpose of this word.
     ///
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        let found = Self::ALL.iter().find(|(name, _)| *name == word);
-        found.map(|(_, purpose)| *purpose).ok_or_else(|| {
-            Error::usage(
-                format!("`{word}` is not a known place"),
-                "places: readme, slide, column, page",
-            )
-        })
+        let what = || format!("`{word}` is not a known place");
+        Self::from_word(word)
+            .ok_or_else(|| Error::usage(what(), "places: readme, slide, column, page"))
     }
 
     /// The width on paper in millimetres, if it is seen there.

@@ -4,37 +4,26 @@ use std::sync::Arc;
 
 use super::filter::NameFilter;
 use crate::base::error::{Error, Result};
+use crate::base::words::worded;
 
-/// The kinds of boxes and arrows in the picture, as in the first box of `rqt_graph`'s window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
-    Nodes,
-    /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a graph that
-    /// no page can hold.
-    Bundles,
-    /// Nodes and topics, in each window only those that carry messages in it.
-    Active,
-    /// Nodes and topics, all that are known.
-    #[default]
-    All,
+worded! {
+    /// The kinds of boxes and arrows in the picture, as in the first box of `rqt_graph`'s window.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Mode {
+        /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
+        Nodes = "nodes",
+        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a graph that
+        /// no page can hold.
+        Bundles = "bundles",
+        /// Nodes and topics, in each window only those that carry messages in it.
+        Active = "active",
+        /// Nodes and topics, all that are known.
+        #[default]
+        All = "all",
+    }
 }
 
 impl Mode {
-    /// The modes by the words of the command line.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("nodes", Self::Nodes),
-        ("bundles", Self::Bundles),
-        ("active", Self::Active),
-        ("all", Self::All),
-    ];
-
-    /// Its word on the command line.
-    pub fn word(self) -> &'static str {
-        let found = Self::ALL.iter().find(|(_, mode)| *mode == self);
-        found.map_or("", |(word, _)| word)
-    }
-
     /// Whether arrows run from node to node, over topics that are not drawn.
     pub(crate) fn is_direct(self) -> bool {
         matches!(self, Self::Nodes | Self::Bundles)
@@ -45,10 +34,7 @@ impl Mode {
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        let found = Self::ALL.iter().find(|(name, _)| *name == word);
-        found
-            .map(|(_, mode)| *mode)
-            .ok_or_else(|| unknown("mode", word, "nodes, bundles, active, all"))
+        Self::from_word(word).ok_or_else(|| unknown("mode", word, "nodes, bundles, active, all"))
     }
 }
 

@@ -83,5 +83,5 @@ Examples:
 
 /// The kinds of figures.
 pub(super) fn kinds() -> PossibleValuesParser {
-    PossibleValuesParser::new(FigureKind::ALL.map(|(word, _)| word))
+    PossibleValuesParser::new(FigureKind::ALL.map(FigureKind::word))
 }

@@ -60,10 +60,7 @@ Exit codes: 0 done, 1 failed or a store refused a bag (run again), 2 usage error
 damaged bags.";
 
 fn detail(text: &str) -> Result<CountDetail, String> {
-    let found = CountDetail::ALL
-        .into_iter()
-        .find(|detail| detail.word() == text);
-    found.ok_or_else(|| "write `auto`, `index` or `chunks`".to_owned())
+    CountDetail::from_word(text).ok_or_else(|| "write `auto`, `index` or `chunks`".to_owned())
 }
 
 fn on_error(text: &str) -> Result<OnError, String> {

@@ -1,42 +1,23 @@
 //! The time of drawing: the time of each step, summed over all cores.
 
+use crate::base::words::worded;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// A step from a window to written bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RunStep {
-    /// The drawing of a window is put together.
-    Compose,
-    /// It is turned into pixels.
-    Paint,
-    /// Pixels become places in the palette.
-    Colours,
-    /// They are compressed.
-    Compress,
-    /// Bytes are written.
-    Write,
-}
-
-impl RunStep {
-    /// Every step, in order.
-    const ALL: [Self; 5] = [
-        Self::Compose,
-        Self::Paint,
-        Self::Colours,
-        Self::Compress,
-        Self::Write,
-    ];
-
-    /// Its word for people.
-    fn word(self) -> &'static str {
-        match self {
-            Self::Compose => "composing",
-            Self::Paint => "painting",
-            Self::Colours => "colours",
-            Self::Compress => "compressing",
-            Self::Write => "writing",
-        }
+worded! {
+    /// A step from a window to written bytes.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) enum RunStep {
+        /// The drawing of a window is put together.
+        Compose = "composing",
+        /// It is turned into pixels.
+        Paint = "painting",
+        /// Pixels become places in the palette.
+        Colours = "colours",
+        /// They are compressed.
+        Compress = "compressing",
+        /// Bytes are written.
+        Write = "writing",
     }
 }
 

@@ -275,12 +275,10 @@ pub(crate) fn spans(pairs: &[[i64; 2]]) -> Vec<Span> {
 
 /// The state of this word; active for another, or none.
 pub(crate) fn state_of(word: Option<&str>) -> State {
-    let known = State::ALL.into_iter().find(|s| word == Some(s.word()));
-    known.unwrap_or(State::Active)
+    word.and_then(State::from_word).unwrap_or(State::Active)
 }
 
 /// The degree of this word; stated for another, or none.
 pub(crate) fn degree_of(word: Option<&str>) -> Degree {
-    let known = Degree::ALL.into_iter().find(|d| word == Some(d.word()));
-    known.unwrap_or(Degree::Stated)
+    word.and_then(Degree::from_word).unwrap_or(Degree::Stated)
 }

@@ -210,7 +210,7 @@ pub(crate) fn read(rows: &[EntryJson<'_>], elements: &Elements) -> Option<Vec<En
 impl EntryJson<'_> {
     fn entry(&self, elements: &Elements) -> Option<Entry> {
         Some(Entry {
-            kind: Kind::ALL.into_iter().find(|k| k.word() == self.kind)?,
+            kind: Kind::from_word(&self.kind)?,
             what: self.named.element(elements)?,
             time: Stamp(self.time_ns),
             earliest: Stamp(self.earliest_ns.unwrap_or(self.time_ns)),
@@ -264,10 +264,9 @@ impl From<&Interruption> for InterruptionRow {
 /// The interruptions of rows that were read, without those of unknown kinds.
 pub(crate) fn interruptions(rows: &[InterruptionRow]) -> Vec<Interruption> {
     let one = |row: &InterruptionRow| {
-        let mut kinds = InterruptionKind::ALL.into_iter();
         Some(Interruption {
             time: Stamp(row.time_ns),
-            kind: kinds.find(|kind| kind.word() == row.kind)?,
+            kind: InterruptionKind::from_word(&row.kind)?,
             length: row.length_ns.max(0),
         })
     };

@@ -190,13 +190,11 @@ fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
 }
 
 fn report(raw: BagJson<'_>) -> Report {
-    let tiers = [Tier::Index, Tier::Chunks, Tier::Forward, Tier::Verify];
-    let tier = tiers.into_iter().find(|t| t.word() == raw.tier);
     Report {
         name: raw.name.into_owned(),
         format: raw.format.into_owned(),
         compression: raw.compression.into_iter().map(Into::into).collect(),
-        tier: tier.unwrap_or(Tier::Forward),
+        tier: Tier::from_word(&raw.tier).unwrap_or(Tier::Forward),
         tier_reason: raw.tier_reason.map(Into::into),
         complete: raw.complete.unwrap_or(true),
         bytes_read: 0,

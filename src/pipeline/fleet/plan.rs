@@ -8,6 +8,7 @@ use regex::Regex;
 use crate::bag::{self, Input, OpenOptions};
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Stamp};
+use crate::base::words::worded;
 use crate::graph::window::Align;
 use crate::pipeline::extract::Bounds;
 
@@ -39,30 +40,18 @@ const TEN_SECONDS: Period = match Period::from_nanos(10_000_000_000) {
     None => unreachable!(),
 };
 
-/// The detail in which messages are counted: with their times, or only by their number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CountDetail {
-    /// By chunks where a bag is far away and has more than 64 of them, as each would cost a request; else by the index.
-    #[default]
-    Auto,
-    /// Every message's time, from the index.
-    Index,
-    /// By chunks: one that lies in one window is counted as a whole, without times. A bag without chunks is read by its
-    /// index.
-    Chunks,
-}
-
-impl CountDetail {
-    /// All details.
-    pub const ALL: [Self; 3] = [Self::Auto, Self::Index, Self::Chunks];
-
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Index => "index",
-            Self::Chunks => "chunks",
-        }
+worded! {
+    /// The detail in which messages are counted: with their times, or only by their number.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum CountDetail {
+        /// By chunks where a bag is far away and has more than 64 of them, as each would cost a request; else by the index.
+        #[default]
+        Auto = "auto",
+        /// Every message's time, from the index.
+        Index = "index",
+        /// By chunks: one that lies in one window is counted as a whole, without times. A bag without chunks is read by its
+        /// index.
+        Chunks = "chunks",
     }
 }
 

@@ -6,31 +6,25 @@ use std::collections::BTreeMap;
 use super::SoFar;
 use crate::base::rhythm::{CLOSING_NS, TOGETHER_NS};
 use crate::base::time::Stamp;
+use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
 use crate::mission::events::{LogFormat, line, quoted};
 use crate::mission::ledger::{Entry, Kind};
 
-/// How far a line can be relied on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Certainty {
-    /// The next messages may show that it is not so.
-    SoFar,
-    /// It holds for everything up to now.
-    Sure,
-    /// It was told, and more messages tell otherwise.
-    Withdrawn,
+worded! {
+    /// How far a line can be relied on.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub(crate) enum Certainty {
+        /// The next messages may show that it is not so.
+        SoFar = "so_far",
+        /// It holds for everything up to now.
+        Sure = "sure",
+        /// It was told, and more messages tell otherwise.
+        Withdrawn = "withdrawn",
+    }
 }
 
 impl Certainty {
-    /// Its word in JSON, and behind a line.
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Self::SoFar => "so_far",
-            Self::Sure => "sure",
-            Self::Withdrawn => "withdrawn",
-        }
-    }
-
     /// A line of text, or an object, with the certainty in it.
     fn mark(self, line: &str, format: LogFormat) -> String {
         match (format, self) {
