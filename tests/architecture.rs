@@ -276,7 +276,7 @@ fn members(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn groups_of_imports_are_taken_apart() {
+fn grouped_imports_are_split() {
     let code =
         "use crate::{bag, base::{error::{Error, Result}, time}};\nlet x = super::model::Sink;";
     let found: Vec<String> = uses("bag/mcap", code)
@@ -294,7 +294,7 @@ fn groups_of_imports_are_taken_apart() {
 }
 
 #[test]
-fn the_doors_below_src_are_the_stations() {
+fn the_top_level_modules_are_the_stations() {
     let all = files();
     let doors: BTreeSet<&str> = all.iter().map(|f| f.parts()[0]).collect();
     let expected: BTreeSet<&str> = STATIONS
@@ -328,7 +328,7 @@ fn words_after<'a>(code: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a s
 }
 
 #[test]
-fn stations_use_only_those_below_them() {
+fn stations_only_use_lower_stations() {
     let place = |station: &str| STATIONS.iter().position(|s| *s == station);
     let mut wrong = Vec::new();
     for file in files() {
@@ -345,7 +345,7 @@ fn stations_use_only_those_below_them() {
 }
 
 #[test]
-fn files_of_a_station_use_only_lower_floors() {
+fn files_of_a_station_only_use_lower_levels() {
     let all = files();
     let mut wrong = Vec::new();
     for (station, floors) in FLOORS {
@@ -374,7 +374,7 @@ fn files_of_a_station_use_only_lower_floors() {
 }
 
 #[test]
-fn siblings_do_not_know_each_other() {
+fn siblings_do_not_import_each_other() {
     let all = files();
     let mut wrong = Vec::new();
     for folder in SIBLINGS {
@@ -399,7 +399,7 @@ fn siblings_do_not_know_each_other() {
 }
 
 #[test]
-fn a_dependency_stands_in_one_folder() {
+fn each_dependency_is_used_in_one_folder() {
     let manifest =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
     let section = manifest
@@ -480,7 +480,7 @@ fn names_crate(file: &File, name: &str) -> bool {
 }
 
 #[test]
-fn every_file_says_what_it_is_for() {
+fn every_file_states_its_purpose() {
     let silent: Vec<_> = files()
         .into_iter()
         .filter(|f| !f.first_line.starts_with("//! "))
@@ -490,7 +490,7 @@ fn every_file_says_what_it_is_for() {
 }
 
 #[test]
-fn files_are_rooms_not_halls() {
+fn files_stay_short() {
     let long: Vec<_> = files()
         .into_iter()
         .map(|f| (f.code.lines().count(), f.path))
@@ -521,7 +521,7 @@ const SPELLINGS: &[(&str, &[&str])] = &[
 ];
 
 #[test]
-fn one_module_spells_for_people() {
+fn one_module_formats_for_people() {
     let mut wrong = Vec::new();
     for file in files().iter().filter(|f| f.path != "base/words") {
         for (spelling, allowed) in SPELLINGS {

@@ -101,7 +101,7 @@ fn the_user_chooses_between_graph_and_board() {
 }
 
 #[test]
-fn a_picture_for_a_readme_can_be_read_there() {
+fn a_picture_for_a_readme_is_legible() {
     let (folder, done) = rendered("warehouse.bag", &["--for", "readme"], &["{n}.svg"]);
     assert!(done.status.success(), "{}", said(&done));
     assert!(
@@ -116,7 +116,7 @@ fn a_picture_for_a_readme_can_be_read_there() {
 }
 
 #[test]
-fn a_picture_for_paper_is_as_wide_as_a_column_and_says_what_cannot_be_read() {
+fn a_picture_for_paper_fits_a_column_and_reports_illegible_text() {
     let (folder, done) = rendered(
         "warehouse.bag",
         &["--for", "column", "--fit", "none"],
@@ -139,7 +139,7 @@ fn a_picture_for_paper_is_as_wide_as_a_column_and_says_what_cannot_be_read() {
 }
 
 #[test]
-fn frames_show_who_lived_when_below_the_graph() {
+fn frames_show_lifetimes_below_the_graph() {
     let (folder, done) = rendered("warehouse.bag", &[], &["{n}.svg"]);
     assert!(done.status.success(), "{}", said(&done));
     let svg = text(&folder, "2.svg");

@@ -57,7 +57,7 @@ fn rows<'a>(window: &'a Value, what: &str) -> impl Iterator<Item = &'a Value> {
 }
 
 #[test]
-fn a_folded_box_counts_those_in_the_window() {
+fn a_collapsed_box_counts_its_elements_in_the_window() {
     let folded = [
         "--period",
         "10",

@@ -71,7 +71,7 @@ fn same(name: &str, text: &str) {
 
 #[test]
 #[cfg(unix)]
-fn the_commands_of_the_jobs_run_and_write_what_lies_beside_them() {
+fn the_commands_of_ci_jobs_reproduce_the_stored_outputs() {
     let dir = place();
     let here = dir.path();
     let read = |name: &str| fs::read_to_string(here.join(name)).unwrap();
@@ -104,7 +104,7 @@ fn the_commands_of_the_jobs_run_and_write_what_lies_beside_them() {
 
 #[test]
 #[cfg(unix)]
-fn the_three_expectations_find_what_lies_beside_them() {
+fn the_three_expectations_have_the_stored_findings() {
     let dir = place();
     for (name, code) in [("minimal", 0), ("graph", 1), ("rules", 1)] {
         let command = format!(
@@ -123,7 +123,7 @@ fn the_three_expectations_find_what_lies_beside_them() {
 }
 
 #[test]
-fn what_others_made_is_pinned() {
+fn third_party_actions_are_pinned() {
     for job in ["github.yml", "comment.yml", "setup-bagreel/action.yml"] {
         let text = fs::read_to_string(folder().join(job)).unwrap();
         for line in text
@@ -181,7 +181,7 @@ fn set_up(dir: &Path, sha256: &str) -> (bool, String, String) {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn the_action_runs_only_an_archive_with_the_checksum() {
+fn the_action_only_runs_an_archive_with_the_right_checksum() {
     let dir = tempfile::tempdir().unwrap();
     let name = format!("bagreel-{}-unknown-linux-musl", std::env::consts::ARCH);
     let ours = "mkdir $0 && printf '#!/bin/sh\necho hello from $0' > $0/bagreel && chmod +x $0/bagreel && \

@@ -45,7 +45,7 @@ fn refused(folder: &Path, args: &[&str], with: i32, says: &str, hint: &str) {
 }
 
 #[test]
-fn what_is_no_bag_is_refused_with_a_way_out() {
+fn files_that_are_not_bags_are_refused_with_advice() {
     let dir = folder();
     file(dir.path(), "empty.bag", b"");
     file(dir.path(), "text.bag", b"hello, this is a note\n");
@@ -75,7 +75,7 @@ fn what_is_no_bag_is_refused_with_a_way_out() {
 }
 
 #[test]
-fn what_makes_no_sense_is_a_usage_error() {
+fn invalid_requests_are_usage_errors() {
     let dir = folder();
     refused(dir.path(), &[], 2, "Usage", "");
     refused(
@@ -128,7 +128,7 @@ fn what_makes_no_sense_is_a_usage_error() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written_is_found_before_the_bag_is_read() {
+fn an_unwritable_output_is_detected_before_the_bag_is_read() {
     let dir = folder();
     file(dir.path(), "wall", b"");
     let output = bagreel(dir.path(), &["render", "gone.bag", "-o", "wall/x.json"]);
@@ -150,7 +150,7 @@ fn an_output_never_replaces_its_own_bag() {
 }
 
 #[test]
-fn a_cut_bag_yields_what_can_be_read_and_exits_3() {
+fn a_truncated_bag_is_recovered_and_exits_3() {
     let dir = folder();
     let whole = fs::read(WAREHOUSE).unwrap();
     file(dir.path(), "cut.bag", &whole[..whole.len() / 2]);
@@ -167,7 +167,7 @@ fn a_cut_bag_yields_what_can_be_read_and_exits_3() {
 }
 
 #[test]
-fn standard_input_counts_as_the_file_does() {
+fn standard_input_has_the_same_counts_as_the_file() {
     let dir = folder();
     let from_file = bagreel(
         dir.path(),
@@ -202,7 +202,7 @@ fn counts(json: &[u8]) -> Vec<(String, u64)> {
 }
 
 #[test]
-fn a_closed_pipe_is_no_failure() {
+fn a_closed_pipe_is_not_a_failure() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .args([
             "render", WAREHOUSE, "--period", "10", "-o", "-", "--format", "json",
@@ -216,7 +216,7 @@ fn a_closed_pipe_is_no_failure() {
 }
 
 #[test]
-fn two_runs_write_the_same_bytes() {
+fn output_is_deterministic() {
     let dir = folder();
     let run = |name: &str| {
         let outputs = ["gif", "json", "dot"].map(|e| format!("{name}.{e}"));
@@ -232,7 +232,7 @@ fn two_runs_write_the_same_bytes() {
 }
 
 #[test]
-fn nothing_appears_beside_the_bag() {
+fn no_file_is_created_beside_the_bag() {
     let (beside, away) = (folder(), folder());
     let bag = beside.path().join("w.bag");
     fs::copy(WAREHOUSE, &bag).unwrap();
@@ -245,7 +245,7 @@ fn nothing_appears_beside_the_bag() {
 }
 
 #[test]
-fn quiet_says_nothing_and_results_go_to_standard_output() {
+fn quiet_prints_no_messages_and_results_go_to_standard_output() {
     let dir = folder();
     let output = bagreel(dir.path(), &["-q", "info", WAREHOUSE]);
     assert_eq!((code(&output), errors(&output).as_str()), (Some(0), ""));
@@ -257,7 +257,7 @@ fn quiet_says_nothing_and_results_go_to_standard_output() {
 }
 
 #[test]
-fn a_folder_of_bags_is_surveyed_with_the_broken_ones() {
+fn a_survey_of_a_folder_includes_broken_bags() {
     let dir = folder();
     fs::copy(WAREHOUSE, dir.path().join("w.bag")).unwrap();
     file(dir.path(), "broken.bag", b"");

@@ -150,7 +150,7 @@ fn details(mission: &Mission) -> String {
 
 #[test]
 #[expect(clippy::too_many_lines, reason = "a recording after the other")]
-fn only_the_recorder_is_told_of_when_its_clock_is_not_straight() {
+fn clock_faults_are_attributed_to_the_recorder() {
     let healthy = Healthy::new();
     let (length, half) = (healthy.length, healthy.length / 2);
     let from_half = |at: i64, step: i64| if at < half { at } else { at + step };

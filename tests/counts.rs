@@ -78,7 +78,7 @@ fn rendered(bag: &str, period: &str, folder: &Path) -> String {
 }
 
 #[test]
-fn every_frame_counts_what_the_data_says() {
+fn every_frame_has_the_counts_of_the_data() {
     let all = [
         ("warehouse.bag", "10"),
         ("warehouse.bag", "60"),

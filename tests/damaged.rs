@@ -100,7 +100,7 @@ fn chunked() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
-fn a_flipped_bit_costs_no_message_in_silence_and_makes_none() {
+fn a_flipped_bit_neither_loses_nor_invents_messages_silently() {
     let truth = short().messages.len();
     for (name, bytes) in chunked() {
         let mut whole = 0;
@@ -132,7 +132,7 @@ fn a_flipped_bit_costs_no_message_in_silence_and_makes_none() {
 }
 
 #[test]
-fn a_chunk_named_at_a_wrong_place_is_told_once() {
+fn a_chunk_listed_at_a_wrong_position_is_reported_once() {
     for (name, bytes) in tiny()
         .into_iter()
         .filter(|(name, _)| !name.starts_with("front"))
@@ -159,7 +159,7 @@ fn a_chunk_named_at_a_wrong_place_is_told_once() {
 }
 
 #[test]
-fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
+fn messages_lost_from_a_chunk_are_counted_by_its_index() {
     let bytes = unsummed(Some(::mcap::Compression::Zstd));
     let truth = short().messages.len();
     // The first one describes the connections.
@@ -190,7 +190,7 @@ fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
 }
 
 #[test]
-fn a_record_of_a_false_kind_does_not_end_the_file() {
+fn a_record_of_a_wrong_kind_does_not_end_the_file() {
     let bytes = unsummed(None);
     let truth = short().messages.len();
     let mut seen = 0;
@@ -213,7 +213,7 @@ fn a_record_of_a_false_kind_does_not_end_the_file() {
 }
 
 #[test]
-fn the_index_of_a_chunk_that_is_none_any_more_answers_for_it() {
+fn messages_of_a_destroyed_chunk_are_counted_by_its_index() {
     let truth = short().messages.len();
     for bytes in [unsummed(None), unsummed(Some(::mcap::Compression::Zstd))] {
         let bytes = &bytes;
@@ -238,7 +238,7 @@ fn the_index_of_a_chunk_that_is_none_any_more_answers_for_it() {
 }
 
 #[test]
-fn reading_an_mcap_file_goes_on_behind_damage() {
+fn reading_an_mcap_file_continues_after_damage() {
     let bytes = unsummed(Some(::mcap::Compression::Lz4));
     let truth = short().messages.len();
     let second = bytes
@@ -288,7 +288,7 @@ fn halves() -> [Recording; 2] {
 }
 
 #[test]
-fn chunks_that_a_lying_summary_does_not_name_are_read() {
+fn chunks_missing_from_a_wrong_summary_are_read() {
     let truth = short().counts();
     let [first, second] = halves().map(|half| mcap::write(&half, &mcap::Options::default()));
     let number =
@@ -312,7 +312,7 @@ fn chunks_that_a_lying_summary_does_not_name_are_read() {
 }
 
 #[test]
-fn chunks_that_a_lying_tail_does_not_name_are_read() {
+fn chunks_missing_from_a_wrong_tail_are_read() {
     let truth = short().counts();
     let [first, second] = halves().map(|half| rosbag1::write(&half, Pack::None, 1_000_000));
     let place = |bytes: &[u8]| {
@@ -345,7 +345,7 @@ fn chunks_that_a_lying_tail_does_not_name_are_read() {
 }
 
 #[test]
-fn a_cut_database_keeps_its_rows() {
+fn rows_of_a_truncated_database_are_read() {
     let recording = support::small();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.db3");
@@ -370,7 +370,7 @@ fn a_cut_database_keeps_its_rows() {
 }
 
 #[test]
-fn tables_may_be_named_in_capitals() {
+fn table_names_are_case_insensitive() {
     let recording = short();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.db3");
@@ -390,7 +390,7 @@ fn tables_may_be_named_in_capitals() {
 }
 
 #[test]
-fn messages_at_the_end_of_time_count() {
+fn messages_at_the_end_of_time_are_counted() {
     let mut recording = Recording::default();
     let clock = recording.publisher("/clock", "/clock", "std_msgs/String");
     for at in [i64::MAX - 1_000_000_000, i64::MAX] {
@@ -417,7 +417,7 @@ fn messages_at_the_end_of_time_count() {
 }
 
 #[test]
-fn what_is_set_aside_is_told_by_the_exit_code() {
+fn messages_set_aside_set_the_exit_code() {
     let mut recording = short();
     recording.messages[5].1 += 1 << 62;
     recording.messages.sort_by_key(|m| m.1);
@@ -521,7 +521,7 @@ fn the_head_of_a_record_beyond_its_chunk_stops_the_second_reader() {
 }
 
 #[test]
-fn what_no_second_reader_reads_is_said() {
+fn unverified_bags_are_reported() {
     let bytes = rosbag1::unindexed(&rosbag1::write(&short(), Pack::Lz4, 4000));
     let (_dir, path) = placed("killed.bag.active", &bytes);
     let (_, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
@@ -530,7 +530,7 @@ fn what_no_second_reader_reads_is_said() {
 }
 
 #[test]
-fn a_bag_named_twice_counts_once_and_is_said() {
+fn a_bag_given_twice_counts_once_and_is_reported() {
     let recording = short();
     let (_dir, path) = placed(
         "x.mcap",
@@ -551,7 +551,7 @@ fn a_bag_named_twice_counts_once_and_is_said() {
 }
 
 #[test]
-fn a_survey_has_a_row_for_a_bag_that_cannot_be_read_and_says_so() {
+fn a_survey_reports_and_lists_unreadable_bags() {
     let (dir, _) = placed(
         "good.mcap",
         &mcap::write(&short(), &mcap::Options::default()),
@@ -572,7 +572,7 @@ fn a_survey_has_a_row_for_a_bag_that_cannot_be_read_and_says_so() {
 
 #[test]
 #[cfg(unix)]
-fn more_parts_than_files_may_be_open_are_all_read() {
+fn more_parts_than_the_limit_of_open_files_are_all_read() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("run");
     fs::create_dir(&folder).unwrap();
@@ -641,7 +641,7 @@ fn bombs() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
-fn a_bomb_is_given_up_wherever_it_is_opened() {
+fn a_decompression_bomb_is_refused_in_every_format() {
     for (name, bytes) in bombs() {
         assert!(bytes.len() < 1_000_000, "{name}");
         let (_dir, path) = placed("bomb.bag", &bytes);
@@ -652,7 +652,7 @@ fn a_bomb_is_given_up_wherever_it_is_opened() {
 
 /// The numbers of the reports that come with the hostile files, where those are.
 #[test]
-fn hostile_files_are_read_as_far_as_they_go() {
+fn hostile_files_are_read_as_far_as_possible() {
     let Some(folder) = support::shared("data/hostile") else {
         return;
     };

@@ -170,7 +170,7 @@ fn every_command_of_readme_and_docs_runs() {
 }
 
 #[test]
-fn links_of_readme_and_docs_lead_to_files() {
+fn links_in_readme_and_docs_are_valid() {
     let mut seen = 0;
     for (path, text) in pages() {
         let folder = path.parent().unwrap();

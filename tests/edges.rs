@@ -183,7 +183,7 @@ fn copies(bag: &Recording) -> Vec<String> {
 }
 
 #[test]
-fn payloads_are_compared_unasked_where_others_are_read_anyway() {
+fn payloads_are_compared_by_default_if_others_are_read_anyway() {
     let mut bag = throttled();
     assert!(edges(&bag, "payload").is_empty());
     bag.publisher("/camera", "/rosout", "rosgraph_msgs/Log");
@@ -191,12 +191,12 @@ fn payloads_are_compared_unasked_where_others_are_read_anyway() {
 }
 
 #[test]
-fn who_sends_copies_subscribes_the_originals() {
+fn a_publisher_of_copies_subscribes_to_the_originals() {
     assert_eq!(copies(&throttled()), ["/image > /throttle inferred"]);
 }
 
 #[test]
-fn payloads_are_not_read_where_none_may_be_compared() {
+fn payloads_are_not_read_if_none_can_be_compared() {
     let options = CollectOptions {
         payload_bytes: 0,
         ..CollectOptions::default()
@@ -205,7 +205,7 @@ fn payloads_are_not_read_where_none_may_be_compared() {
 }
 
 #[test]
-fn a_mux_subscribes_all_its_inputs() {
+fn a_mux_subscribes_to_all_its_inputs() {
     let mut bag = Recording::default();
     let teleop = bag.publisher("/teleop", "/cmd_teleop", "geometry_msgs/Twist");
     let nav = bag.publisher("/nav", "/cmd_nav", "geometry_msgs/Twist");
@@ -223,7 +223,7 @@ fn a_mux_subscribes_all_its_inputs() {
 }
 
 #[test]
-fn equal_constants_are_no_copies() {
+fn equal_constants_are_not_copies() {
     let mut bag = Recording::default();
     for (node, topic, from) in [("/a", "/beat_a", 0), ("/b", "/beat_b", 3)] {
         let beat = bag.publisher(node, topic, "std_msgs/Bool");
@@ -257,7 +257,7 @@ fn chatter(says: &str, hears: &str) -> Recording {
 }
 
 #[test]
-fn log_texts_that_repeat_a_message_tell_who_sends_and_who_hears_it() {
+fn log_texts_that_repeat_a_message_reveal_its_publisher_and_subscriber() {
     let expected = ["/speaker > /chatter stated", "/chatter > /hearer stated"];
     assert_eq!(
         edges(&chatter("Publishing: '%'", "I heard: [%]"), "echo"),
@@ -305,7 +305,7 @@ fn log_texts_name_topics() {
 }
 
 #[test]
-fn parameters_tell_the_ends_and_the_clock_of_their_node() {
+fn parameters_reveal_topics_and_clock_of_their_node() {
     let mut bag = Recording::default();
     let events = bag.topic2("/parameter_events", "rcl_interfaces/msg/ParameterEvent");
     let set = [
@@ -343,7 +343,7 @@ fn logging(nodes: &[(&str, &str)], topics: &[(&str, &str)]) -> Recording {
 }
 
 #[test]
-fn a_topic_below_a_node_is_the_nodes() {
+fn a_topic_in_a_private_namespace_belongs_to_its_node() {
     let bag = logging(
         &[("/arm", "a.cpp"), ("/r1/nav", "b.cpp")],
         &[
@@ -392,7 +392,7 @@ fn a_contract_claims_no_more_publishers_than_the_bag_counts() {
 }
 
 #[test]
-fn publishers_that_nobody_names_are_counted() {
+fn unnamed_publishers_are_counted() {
     let mut bag = logging(
         &[("/rplidar_node", "a.cpp")],
         &[("/scan", "sensor_msgs/msg/LaserScan")],
@@ -425,7 +425,7 @@ fn publishers_that_nobody_names_are_counted() {
 }
 
 #[test]
-fn a_box_stands_for_publishers_only_while_they_are_counted() {
+fn unnamed_publishers_have_a_box_only_while_counted() {
     let topics = [("/scan", "sensor_msgs/msg/LaserScan")];
     let mut bag = logging(&[("/rplidar_node", "a.cpp")], &topics);
     assert!(edges(&bag, "unknown").is_empty());
@@ -436,7 +436,7 @@ fn a_box_stands_for_publishers_only_while_they_are_counted() {
 }
 
 #[test]
-fn a_peculiar_type_names_its_program() {
+fn a_unique_type_identifies_its_program() {
     let topics = [
         ("/turtle1/pose", "turtlesim/msg/Pose"),
         ("/turtle1/color_sensor", "turtlesim/msg/Color"),
@@ -454,7 +454,7 @@ fn a_peculiar_type_names_its_program() {
 }
 
 #[test]
-fn conventions_bow_to_complete_lists() {
+fn complete_lists_override_conventions() {
     let mut bag = Recording::default();
     let goal = bag.publisher("/boss", "/go/goal", "test_msgs/GoActionGoal");
     let log = bag.publisher("/boss", "/rosout", "rosgraph_msgs/Log");
@@ -485,7 +485,7 @@ fn listed(node: &str, topics: &[&str]) -> Recording {
 }
 
 #[test]
-fn a_closed_list_speaks_against_rules() {
+fn a_complete_list_contradicts_rules() {
     // The node listens to `/tf_static` by its own list, which leaves `/tf` out.
     assert!(edges(&listed("/amcl", &["/rosout", "/tf_static"]), "tf_pair").is_empty());
     // roscpp's list holds no subscriptions, so it says nothing against them.
@@ -498,7 +498,7 @@ fn a_closed_list_speaks_against_rules() {
 }
 
 #[test]
-fn a_twin_in_another_namespace_subscribes_the_same() {
+fn a_twin_in_another_namespace_has_the_same_subscriptions() {
     let mut bag = Recording::default();
     for robot in ["/r1", "/r2"] {
         for topic in ["plan", "costmap"] {
@@ -529,7 +529,7 @@ fn a_twin_in_another_namespace_subscribes_the_same() {
 }
 
 #[test]
-fn an_anonymous_node_lives_since_the_moment_in_its_name() {
+fn an_anonymous_node_starts_at_the_time_in_its_name() {
     let mut bag = Recording::default();
     let start = ORIGIN / 1_000_000 + 2_000;
     let beat = bag.publisher("/base", "/beat", "std_msgs/Empty");
@@ -545,7 +545,7 @@ fn an_anonymous_node_lives_since_the_moment_in_its_name() {
 }
 
 #[test]
-fn the_recorder_is_known_by_its_file_in_any_folder() {
+fn the_recorder_is_recognized_by_its_file_in_any_folder() {
     for file in [
         "/tmp/ros-noetic-rosbag-1.16.0/src/recorder.cpp",
         "/ws/src/rosbag/src/recorder.cpp",
@@ -567,7 +567,7 @@ fn the_recorder_is_known_by_its_file_in_any_folder() {
 }
 
 #[test]
-fn diagnostics_speak_before_lists_are_read() {
+fn diagnostics_count_before_lists_are_read() {
     let mut bag = Recording::default();
     // One connection for all, as tools that merge connections leave it.
     let log = bag.publisher("/a", "/rosout", "rosgraph_msgs/Log");
@@ -600,7 +600,7 @@ fn diagnostics_speak_before_lists_are_read() {
 }
 
 #[test]
-fn every_degree_but_measured_stays_what_it_is_while_messages_come() {
+fn only_measured_edges_depend_on_messages() {
     let bag = logging(&[("/arm", "a.cpp")], &[("/arm/state", "a/msg/State")]);
     let (built, _) = concluded(&bag, CollectOptions::default());
     let degrees: Vec<_> = built.graphs[0].publishes.iter().map(|s| s.degree).collect();
@@ -608,7 +608,7 @@ fn every_degree_but_measured_stays_what_it_is_while_messages_come() {
 }
 
 #[test]
-fn conclusions_are_among_the_evidence_of_those_who_ask_why() {
+fn why_lists_conclusions_as_evidence() {
     let options = CollectOptions {
         why: vec!["/throttle".to_owned(), "/image".to_owned()],
         payload_bytes: u64::MAX,
@@ -662,7 +662,7 @@ fn entry(element: NamedElement, to_s: Option<i64>) -> TopologyEntry {
 }
 
 #[test]
-fn the_end_that_the_user_gives_is_exclusive() {
+fn an_end_given_by_the_user_is_exclusive() {
     let node = || NamedElement::Node("/slam".to_owned());
     let there = |end| {
         let built = told(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
@@ -675,7 +675,7 @@ fn the_end_that_the_user_gives_is_exclusive() {
 }
 
 #[test]
-fn names_of_the_users_that_the_bag_does_not_know_are_told_with_the_nearest() {
+fn unknown_names_are_reported_with_the_nearest() {
     let entries = vec![
         entry(
             NamedElement::Subscribe("/slam".to_owned(), "/scna".to_owned()),
@@ -699,7 +699,7 @@ fn names_of_the_users_that_the_bag_does_not_know_are_told_with_the_nearest() {
 }
 
 #[test]
-fn what_the_user_states_and_headers_say_is_among_the_evidence() {
+fn topology_files_and_headers_are_listed_as_evidence() {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
     bag.send(scan, (0, 1000), 100, &[1; 8]);
@@ -727,7 +727,7 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
 }
 
 #[test]
-fn who_sends_nothing_in_the_time_that_is_read_is_declared() {
+fn publishers_without_messages_in_the_range_are_declared() {
     let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json");
@@ -749,7 +749,7 @@ fn who_sends_nothing_in_the_time_that_is_read_is_declared() {
 }
 
 #[test]
-fn the_log_that_is_passed_on_is_read_only_where_there_is_no_other() {
+fn the_aggregated_log_is_only_read_without_another() {
     let mut bag = Recording::default();
     let beat = bag.publisher("/base", "/beat", "std_msgs/Empty");
     bag.send(beat, (0, 30_000), 100, &[]);

@@ -198,7 +198,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn every_animation_shows_what_the_images_show() {
+fn every_animation_has_the_frames_of_the_images() {
     let folder = tempfile::tempdir().unwrap();
     let outputs = ["a.gif", "b.apng", "p{n}.png", "w{n}.webp", "s/{n}.svg"];
     let written = show(folder.path(), &outputs, SequenceOptions::default()).unwrap();
@@ -224,7 +224,7 @@ fn every_animation_shows_what_the_images_show() {
 }
 
 #[test]
-fn two_runs_write_the_same_bytes() {
+fn output_is_deterministic() {
     let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
     let outputs = [
         "a.gif",
@@ -253,7 +253,7 @@ fn two_runs_write_the_same_bytes() {
 }
 
 #[test]
-fn staged_frames_are_played_and_not_kept_as_images() {
+fn staged_frames_are_played_and_not_written_as_images() {
     let folder = tempfile::tempdir().unwrap();
     let options = SequenceOptions {
         tween: 3,
@@ -267,7 +267,7 @@ fn staged_frames_are_played_and_not_kept_as_images() {
 }
 
 #[test]
-fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
+fn a_size_limit_is_met_and_reductions_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let whole = SequenceOptions {
         tween: 3,
@@ -298,7 +298,7 @@ fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
 }
 
 #[test]
-fn an_interrupted_run_leaves_nothing_behind() {
+fn an_interrupted_run_leaves_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let output =
         |name: &str| Output::parse(&folder.path().join(name).to_string_lossy(), None).unwrap();
@@ -327,7 +327,7 @@ fn a_full_disk_ends_the_run_and_names_the_file() {
 }
 
 #[test]
-fn formats_that_hold_all_windows_refuse_a_number() {
+fn formats_with_all_windows_refuse_a_window_number() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["{n}.gif", "{n}.apng", "{n}.json", "{n}.csv"] {
         let result = show(folder.path(), &[name], SequenceOptions::default());
@@ -378,7 +378,7 @@ fn a_pdf_has_a_page_per_window_that_looks_like_the_image() {
 }
 
 #[test]
-fn a_video_shows_every_window_as_long_as_it_lasts() {
+fn a_video_shows_every_window_for_its_duration() {
     if !has("ffmpeg") || !has("ffprobe") {
         return;
     }
@@ -416,7 +416,7 @@ fn a_video_shows_every_window_as_long_as_it_lasts() {
 }
 
 #[test]
-fn a_poster_is_the_first_image_alone() {
+fn a_poster_is_the_first_image() {
     let folder = tempfile::tempdir().unwrap();
     show(folder.path(), &["p{n}.png"], SequenceOptions::default()).unwrap();
     let poster = Output::poster(&folder.path().join("poster.png"));
@@ -429,7 +429,7 @@ fn a_poster_is_the_first_image_alone() {
 }
 
 #[test]
-fn a_folder_that_vanishes_is_told_and_nothing_is_left() {
+fn a_deleted_folder_is_reported_and_no_files_remain() {
     let folder = tempfile::tempdir().unwrap();
     let inside = folder.path().join("gone");
     let outputs = [Output::parse(&inside.join("a.gif").to_string_lossy(), None).unwrap()];

@@ -146,7 +146,7 @@ fn assert_promise(counts: &[[u32; 2]; 4], of: &str) {
 }
 
 #[test]
-fn every_degree_keeps_its_promise() {
+fn every_degree_has_its_stated_precision() {
     let (warehouse, mini) = ("warehouse/truth_windows.json", "mini/truth_windows.json");
     let recordings = [
         ("warehouse/warehouse.bag", warehouse),
@@ -195,7 +195,7 @@ fn merged(tape: &mut Tape) {
 }
 
 #[test]
-fn a_node_ends_though_its_topic_goes_on_under_its_name() {
+fn a_node_ends_although_its_topic_continues() {
     let (Some(bag), Some(truth)) = (
         shared("warehouse/warehouse.bag"),
         shared("warehouse/truth_windows.json"),
@@ -272,7 +272,7 @@ fn scores(bag: &str, truth: &str) -> Option<[(f64, f64); 3]> {
 }
 
 #[test]
-fn a_real_mission_is_seen_as_it_was() {
+fn a_real_mission_is_reconstructed() {
     let score = scores("warehouse/warehouse.bag", "warehouse/truth_windows.json");
     let Some([nodes, publishes, subscribes]) = score else {
         return;
@@ -288,7 +288,7 @@ fn a_real_mission_is_seen_as_it_was() {
 }
 
 #[test]
-fn compressed_recordings_tell_as_much() {
+fn compressed_recordings_have_the_same_evidence() {
     for bag in ["mini/mini_lz4.bag", "mini/mini_bz2.bag"] {
         let score = scores(bag, "mini/truth_windows.json");
         let Some([nodes, publishes, subscribes]) = score else {
@@ -307,7 +307,7 @@ fn compressed_recordings_tell_as_much() {
 }
 
 #[test]
-fn a_recording_without_log_records_still_tells_something() {
+fn a_recording_without_log_records_still_has_evidence() {
     let score = scores(
         "warehouse/warehouse_norosout.bag",
         "warehouse/truth_windows.json",
@@ -323,7 +323,7 @@ fn a_recording_without_log_records_still_tells_something() {
 }
 
 #[test]
-fn a_rewritten_bag_does_not_believe_its_headers() {
+fn headers_of_a_rewritten_bag_are_not_trusted() {
     for bag in ["warehouse/warehouse_lz4.bag", "warehouse/warehouse_bz2.bag"] {
         let score = scores(bag, "warehouse/truth_windows.json");
         let Some([nodes, publishes, subscribes]) = score else {
@@ -351,7 +351,7 @@ fn life(built: &Built, node: &str) -> Vec<usize> {
 }
 
 #[test]
-fn every_start_stop_crash_and_restart_is_seen_and_none_invented() {
+fn starts_stops_crashes_and_restarts_are_detected_exactly() {
     let Some(path) = shared("bags/mission/mission.bag") else {
         return;
     };

@@ -104,7 +104,7 @@ fn losses_starved_subscribers_and_double_names_are_events_and_findings() {
 }
 
 #[test]
-fn any_key_of_a_channel_that_names_a_node_names_the_publisher() {
+fn any_channel_metadata_key_with_a_node_names_the_publisher() {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/msg/LaserScan");
     bag.send(scan, (0, 5_000), 100, &Cdr::default().u32(1).done());
@@ -190,7 +190,7 @@ fn near(seen: Option<f64>, truth: f64) -> bool {
 }
 
 #[test]
-fn bytes_drops_jitter_and_age_are_true_to_one_per_cent() {
+fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     fs::write(&path, rosbag1::write(&measured(), Pack::Lz4, 16_384)).unwrap();
@@ -321,7 +321,7 @@ fn seen(mission: &Mission) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn our_own_graph_read_back_is_the_same_in_every_window() {
+fn an_exported_graph_is_the_same_after_import() {
     let folder = tempfile::tempdir().unwrap();
     for bag in ["warehouse.bag", "courier.mcap"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -52,7 +52,7 @@ fn size_mm(svg: &str) -> (f64, f64) {
 }
 
 #[test]
-fn lives_tell_what_happened_in_words() {
+fn lifetimes_are_labelled_with_events() {
     let svg = figure(&example(), &["--kind", "lives"]).unwrap();
     for expected in [
         "8 nodes throughout",
@@ -74,7 +74,7 @@ const FIGURES: [(&str, &str, f64); 6] = [
 ];
 
 #[test]
-fn every_figure_is_as_wide_as_asked_and_no_higher_than_it_may_be() {
+fn every_figure_has_the_requested_width_and_a_limited_height() {
     for ((kind, width, most), svg) in FIGURES.iter().zip(drawn()) {
         let (w, h) = size_mm(svg);
         let asked: f64 = width.trim_end_matches("mm").parse().unwrap();
@@ -95,7 +95,7 @@ fn left_out(svg: &str) -> (u32, u32) {
 }
 
 #[test]
-fn few_topic_names_are_left_out_of_a_map_and_they_are_told() {
+fn a_map_omits_few_topic_names_and_reports_them() {
     let maps = FIGURES.iter().zip(drawn()).filter(|(of, _)| of.0 == "map");
     for ((_, width, _), svg) in maps {
         let (lost, all) = left_out(svg);
@@ -104,7 +104,7 @@ fn few_topic_names_are_left_out_of_a_map_and_they_are_told() {
 }
 
 #[test]
-fn steps_show_what_was_asked_for_or_say_what_there_is() {
+fn steps_show_the_requested_phases_or_list_the_available() {
     let svg = figure(&example(), &["--kind", "steps", "--steps", "3"]).unwrap();
     assert!(svg.contains("2 → 3") && !svg.contains("3 → 4"));
     // The log knows of no hand-over here: the planner went on.
@@ -117,7 +117,7 @@ fn steps_show_what_was_asked_for_or_say_what_there_is() {
 }
 
 #[test]
-fn phases_are_named_by_a_file_or_replaced_by_it() {
+fn a_file_names_or_replaces_phases() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("phases.txt");
     let flags = ["--kind", "lives", "--phases", file.to_str().unwrap()];
@@ -173,7 +173,7 @@ fn boxes(svg: &str) -> Vec<(f64, f64, f64, f64, String)> {
 }
 
 #[test]
-fn no_text_stands_on_another() {
+fn texts_do_not_overlap() {
     for ((kind, width, _), svg) in FIGURES.iter().zip(drawn()) {
         let all = boxes(svg);
         for (k, a) in all.iter().enumerate() {
@@ -186,7 +186,7 @@ fn no_text_stands_on_another() {
 }
 
 #[test]
-fn a_figure_for_latex_says_what_it_shows_and_is_compiled_where_latex_is_at_hand() {
+fn a_latex_figure_has_a_caption_and_compiles() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
@@ -226,7 +226,7 @@ fn a_figure_for_latex_says_what_it_shows_and_is_compiled_where_latex_is_at_hand(
 
 /// The page of the examples: its script makes the figures and sets it.
 #[test]
-fn the_paper_of_the_examples_is_made_by_its_script() {
+fn the_example_paper_is_built_by_its_script() {
     let latex = Command::new("pdflatex").arg("--version").output();
     if !latex.is_ok_and(|done| done.status.success()) {
         return println!("skipped: `pdflatex` is not installed");
@@ -279,7 +279,7 @@ fn no_text_is_below_six_points() {
 }
 
 #[test]
-fn no_letter_of_a_pdf_is_below_six_points_on_paper() {
+fn no_letter_in_a_pdf_is_below_six_points() {
     let folder = tempfile::tempdir().unwrap();
     let pdf = folder.path().join("figure.pdf");
     for (kind, width, _) in FIGURES {
@@ -336,7 +336,7 @@ fn large() -> Value {
 }
 
 #[test]
-fn what_is_too_much_for_nodes_is_drawn_in_groups_of_ever_shorter_namespaces() {
+fn too_many_nodes_are_grouped_by_shorter_namespaces() {
     let folder = tempfile::tempdir().unwrap();
     let mission = folder.path().join("large.json");
     std::fs::write(&mission, large().to_string()).unwrap();
@@ -360,7 +360,7 @@ fn what_is_too_much_for_nodes_is_drawn_in_groups_of_ever_shorter_namespaces() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_with_what_would() {
+fn a_figure_that_does_not_fit_is_refused_with_an_alternative() {
     let narrow = figure(&example(), &["--kind", "lives", "--width", "21mm"]).unwrap_err();
     let enough = narrow
         .split("--width ")
@@ -379,7 +379,7 @@ fn what_does_not_fit_is_refused_with_what_would() {
 }
 
 #[test]
-fn options_that_say_nothing_to_a_figure_are_refused() {
+fn options_without_effect_on_a_figure_are_refused() {
     for flags in [
         &["--kind", "lives", "--strip", "3x2"][..],
         &["--kind", "lives", "--style", "dark"],
@@ -392,7 +392,7 @@ fn options_that_say_nothing_to_a_figure_are_refused() {
 }
 
 #[test]
-fn render_still_draws_figures_and_says_what_to_write_instead() {
+fn render_still_draws_figures_and_suggests_the_new_command() {
     let folder = tempfile::tempdir().unwrap();
     let run = |args: &[&str], name: &str| {
         let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))

@@ -165,7 +165,7 @@ fn every_bag_has_exactly_one_row() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn odd_names_are_counted_too() {
+fn bags_with_unusual_names_are_counted() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt as _;
     let dir = tempfile::tempdir().unwrap();
@@ -196,7 +196,7 @@ fn odd_names_are_counted_too() {
 }
 
 #[test]
-fn columns_are_those_that_are_promised() {
+fn columns_match_the_help() {
     let dir = tempfile::tempdir().unwrap();
     ends(dir.path(), &["tables", WAREHOUSE, "-o", "t"], 0);
     let names = |name: &str| {
@@ -213,7 +213,7 @@ fn columns_are_those_that_are_promised() {
 }
 
 #[test]
-fn shards_make_the_whole() {
+fn shards_add_up_to_the_whole() {
     let dir = tempfile::tempdir().unwrap();
     fleet(dir.path());
     bagreel(dir.path(), &["tables", "bags", "-o", "whole"]);
@@ -240,7 +240,7 @@ fn shards_make_the_whole() {
 }
 
 #[test]
-fn what_is_there_is_kept_and_what_has_changed_is_replaced() {
+fn existing_counts_are_kept_and_outdated_ones_replaced() {
     let dir = tempfile::tempdir().unwrap();
     fleet(dir.path());
     let args = ["tables", "bags", "-o", "t", "--skip-existing"];
@@ -270,7 +270,7 @@ fn what_is_there_is_kept_and_what_has_changed_is_replaced() {
 
 #[test]
 #[cfg(unix)]
-fn a_killed_run_leaves_whole_files_and_the_next_one_finishes_it() {
+fn a_killed_run_leaves_complete_files_and_can_be_resumed() {
     let dir = tempfile::tempdir().unwrap();
     let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
     fs::create_dir(dir.path().join("bags")).unwrap();
@@ -319,7 +319,7 @@ fn a_killed_run_leaves_whole_files_and_the_next_one_finishes_it() {
 }
 
 #[test]
-fn parts_of_a_split_recording_share_their_windows() {
+fn parts_of_a_split_recording_have_common_windows() {
     let dir = tempfile::tempdir().unwrap();
     let mut halves = [support::small(), support::small()];
     halves[0]
@@ -420,7 +420,7 @@ proptest! {
 }
 
 #[test]
-fn merging_a_whole_changes_nothing() {
+fn merging_a_complete_table_changes_nothing() {
     for whole in wholes() {
         assert_eq!(merge(whole.counts.clone()), whole.counts);
         let n: u64 = whole.counts.iter().map(|count| count.n).sum();
@@ -430,7 +430,7 @@ fn merging_a_whole_changes_nothing() {
 
 /// Counts, rates, bytes and gaps of each topic and publication per window: those of the mission that `render` reads.
 #[test]
-fn the_end_is_the_mission_that_one_machine_reads() {
+fn finished_counts_equal_the_mission_read_directly() {
     for path in [WAREHOUSE, COURIER, FOLDER] {
         let mut reading = Reading::of([path]);
         reading.division.length = Length::Fixed(Period::parse("10").unwrap());
@@ -486,7 +486,7 @@ fn the_end_is_the_mission_that_one_machine_reads() {
 }
 
 #[test]
-fn counts_of_several_missions_are_not_finished_as_one() {
+fn counts_of_several_missions_are_not_merged() {
     let mut counts = counted(WAREHOUSE, None, CountDetail::Index).counts;
     let mut other = counts[0].clone();
     other.mission = "other".into();
@@ -501,7 +501,7 @@ fn counts_of_several_missions_are_not_finished_as_one() {
 }
 
 #[test]
-fn whole_chunks_count_the_same_messages() {
+fn counting_by_chunks_gives_the_same_totals() {
     let dir = tempfile::tempdir().unwrap();
     let mut paths: Vec<String> = vec![WAREHOUSE.to_owned(), COURIER.to_owned()];
     for pack in [rosbag1::Pack::None, rosbag1::Pack::Lz4] {

@@ -137,7 +137,7 @@ fn a_folder_is_one_recording_or_an_error_that_lists_them() {
 }
 
 #[test]
-fn a_folder_of_one_recording_counts_as_its_files_do() {
+fn a_folder_of_one_recording_has_the_counts_of_its_files() {
     let all = made();
     let messages = |what: &str| {
         let (_, _, text) = bagreel(all.path(), "info F --format json", what);

@@ -340,7 +340,7 @@ fn following_to_the_end_equals_reading_the_closed_recording() {
 /// `cargo test --release --test tests follow -- --ignored --nocapture`
 #[test]
 #[ignore = "takes an hour"]
-fn a_thousand_recordings_of_each_kind_are_followed_to_what_they_tell() {
+fn a_thousand_followed_recordings_of_each_kind_equal_the_closed_ones() {
     for seed in 0..1000 {
         std::thread::scope(|scope| {
             for (name, what, recorder) in RECORDERS {
@@ -360,7 +360,7 @@ fn seconds() -> u64 {
 }
 
 #[test]
-fn a_database_that_is_followed_is_never_busy() {
+fn following_a_database_never_locks_it() {
     for pragmas in [OPTIMISED, RESILIENT] {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("r.db3");
@@ -413,7 +413,7 @@ fn a_signal_ends_following_and_writes_the_outputs() {
 }
 
 #[test]
-fn findings_are_told_when_they_are_sure_and_decide_the_exit_code() {
+fn findings_are_printed_once_certain_and_set_the_exit_code() {
     let folder = TempDir::new().unwrap();
     fs::write(
         folder.path().join("r.bag"),

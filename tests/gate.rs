@@ -35,7 +35,7 @@ fn run(folder: &Path, args: &[&str]) -> (i32, String) {
 }
 
 #[test]
-fn an_expectation_of_another_robot_is_not_brought_up_to_date() {
+fn an_expectation_of_another_robot_is_not_updated() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
@@ -126,7 +126,7 @@ fn bag(folder: &Path, name: &str, recording: &Recording) -> PathBuf {
 }
 
 #[test]
-fn a_second_healthy_run_keeps_it_too_and_each_fault_breaks_what_it_should() {
+fn a_second_healthy_run_passes_and_each_fault_breaks_its_rules() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "first.bag", &recording(HEALTHY, 0));
@@ -185,7 +185,7 @@ fn a_second_healthy_run_keeps_it_too_and_each_fault_breaks_what_it_should() {
 }
 
 #[test]
-fn what_several_runs_have_in_common_holds_in_each() {
+fn a_baseline_of_several_runs_passes_on_each() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let runs = [
@@ -232,7 +232,7 @@ fn what_several_runs_have_in_common_holds_in_each() {
 }
 
 #[test]
-fn an_update_changes_what_no_longer_holds_and_nothing_else() {
+fn an_update_only_changes_broken_rules() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(
@@ -296,7 +296,7 @@ rules:
 }
 
 #[test]
-fn what_the_mission_ended_before_is_not_broken() {
+fn rules_about_times_after_the_mission_are_not_broken() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let crashed = Robot {
@@ -354,7 +354,7 @@ fn outcomes() -> tempfile::TempDir {
 }
 
 #[test]
-fn every_exit_code_of_check_means_what_its_help_says() {
+fn exit_codes_of_check_match_its_help() {
     let dir = outcomes();
     let here = dir.path();
     let table: [(&[&str], i32, &str); 14] = [
@@ -435,7 +435,7 @@ fn every_exit_code_of_check_means_what_its_help_says() {
 }
 
 #[test]
-fn every_exit_code_of_diff_and_baseline_means_what_their_help_says() {
+fn exit_codes_of_diff_and_baseline_match_their_help() {
     let dir = outcomes();
     let here = dir.path();
     bag(here, "same.bag", &recording(HEALTHY, 3));
@@ -487,7 +487,7 @@ fn help_begins(here: &Path, command: &str, first: &str, holds: &str) {
 }
 
 #[test]
-fn allowances_forgive_until_their_day_and_unused_ones_are_told() {
+fn allowances_expire_and_unused_ones_are_reported() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
@@ -522,7 +522,7 @@ fn allowances_forgive_until_their_day_and_unused_ones_are_told() {
 }
 
 #[test]
-fn an_expectation_that_unfolds_without_end_is_refused() {
+fn an_expectation_with_an_alias_bomb_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
@@ -544,7 +544,7 @@ fn an_expectation_that_unfolds_without_end_is_refused() {
 }
 
 #[test]
-fn a_silence_across_the_edge_of_a_window_is_told_to_the_millisecond() {
+fn a_silence_across_windows_is_reported_to_the_millisecond() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let mut robot = Recording::default();

@@ -50,7 +50,7 @@ const PRINTING: &[&[&str]] = &[
 ];
 
 #[test]
-fn a_closed_pipe_has_read_enough() {
+fn a_closed_pipe_is_not_an_error() {
     let dir = tempfile::tempdir().unwrap();
     for args in PRINTING {
         let mut child = command(dir.path(), args)
@@ -94,7 +94,7 @@ fn a_full_disk_is_a_failure_of_every_command() {
 }
 
 #[test]
-fn nothing_of_the_users_is_overwritten() {
+fn user_files_are_not_overwritten() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     fs::create_dir(path("bag")).unwrap();
@@ -176,7 +176,7 @@ fn nothing_of_the_users_is_overwritten() {
 }
 
 #[test]
-fn tables_in_a_folder_replace_no_bag_that_is_read() {
+fn tables_in_a_folder_do_not_replace_input_bags() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let first = bagreel(dir.path(), &["tables", COURIER, "-o", "fleet"]);
@@ -212,7 +212,7 @@ fn tables_in_a_folder_replace_no_bag_that_is_read() {
 }
 
 #[test]
-fn tables_without_an_ending_are_called_csv() {
+fn tables_without_an_extension_get_csv() {
     let dir = tempfile::tempdir().unwrap();
     let output = bagreel(
         dir.path(),
@@ -227,7 +227,7 @@ fn tables_without_an_ending_are_called_csv() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn tables_do_not_go_into_a_device() {
+fn tables_are_not_written_to_devices() {
     let dir = tempfile::tempdir().unwrap();
     let output = bagreel(
         dir.path(),
@@ -257,7 +257,7 @@ fn an_output_may_have_any_name() {
 
 #[cfg(unix)]
 #[test]
-fn files_that_never_end_are_refused() {
+fn endless_files_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let zero = |name: &str| std::os::unix::fs::symlink("/dev/zero", dir.path().join(name)).unwrap();
     zero("zero.yaml");
@@ -290,7 +290,7 @@ fn counted(path: &str) -> (Option<i32>, Option<u64>) {
 }
 
 #[test]
-fn damaged_recordings_come_to_an_end_and_lose_nothing_without_a_word() {
+fn damaged_recordings_terminate_and_report_all_losses() {
     // The messages that each had before it was damaged; `None` where it never had any, or none is left.
     for (name, all) in [
         ("n0_hang.bag", None),
@@ -316,7 +316,7 @@ fn damaged_recordings_come_to_an_end_and_lose_nothing_without_a_word() {
 }
 
 #[test]
-fn a_recording_cut_behind_the_head_of_a_chunk_comes_to_an_end() {
+fn a_recording_cut_after_a_chunk_head_terminates() {
     let whole = fs::read(concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/examples/warehouse.bag"
@@ -339,7 +339,7 @@ fn a_recording_cut_behind_the_head_of_a_chunk_comes_to_an_end() {
 }
 
 #[test]
-fn a_mission_of_three_hundred_years_is_none() {
+fn a_mission_of_three_hundred_years_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let bag = crafted("06_span292.mcap");
     for args in [
@@ -363,7 +363,7 @@ fn a_mission_of_three_hundred_years_is_none() {
 }
 
 #[test]
-fn a_clock_that_is_set_late_makes_no_windows_of_fifty_years() {
+fn a_clock_set_late_does_not_create_fifty_years_of_windows() {
     let dir = tempfile::tempdir().unwrap();
     let args = ["render", &crafted("08_jump1970.bag"), "-o", "x.json"];
     let output = bagreel(dir.path(), &args);

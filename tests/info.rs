@@ -42,7 +42,7 @@ fn recorded() -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn the_recorder_is_no_subscriber_and_withholds_no_advice() {
+fn the_recorder_is_not_a_subscriber_and_suppresses_no_advice() {
     let (_folder, inputs) = recorded();
     let info = told(inputs);
     assert_eq!(info.subscribes_by_degree.total(), 0);
@@ -62,7 +62,7 @@ fn the_recorder_is_no_subscriber_and_withholds_no_advice() {
 }
 
 #[test]
-fn advice_on_ros2_says_what_is_missing_what_files_add_and_what_would_have_told_all() {
+fn advice_on_ros2_lists_gaps_files_and_record_options() {
     let info = told(example("courier.mcap"));
     let missing = format!(
         "{} without a known publisher, {} without a known subscriber",
@@ -80,7 +80,7 @@ fn advice_on_ros2_says_what_is_missing_what_files_add_and_what_would_have_told_a
 }
 
 #[test]
-fn the_evidence_of_an_edge_includes_what_was_concluded() {
+fn the_evidence_of_an_edge_includes_conclusions() {
     let mut reading = Reading::of([example("warehouse.bag")]);
     let mut why = |names: [&str; 2]| {
         reading.collect.why = names.map(str::to_owned).to_vec();
@@ -96,7 +96,7 @@ fn the_evidence_of_an_edge_includes_what_was_concluded() {
 }
 
 #[test]
-fn the_figure_that_fits_is_named() {
+fn info_suggests_a_figure_that_fits() {
     let words = |inputs| -> Vec<&str> { told(inputs).figures.iter().map(|f| f.figure).collect() };
     assert_eq!(words(example("warehouse.bag")), ["lives", "map", "steps"]);
     // One log record and one scan: nobody is known to talk to anybody.

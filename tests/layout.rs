@@ -78,7 +78,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
-    fn everything_keeps_out_of_the_way(plan in plans(), down in any::<bool>()) {
+    fn nothing_overlaps(plan in plans(), down in any::<bool>()) {
         let orientation = if down { Orientation::TopBottom } else { Orientation::LeftRight };
         let layout = laid_out(&plan, Some(orientation));
         let found = measure::measure(&plan, &layout);
@@ -96,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn frames_are_nested_or_apart(plan in plans()) {
+    fn frames_are_nested_or_disjoint(plan in plans()) {
         let layout = laid_out(&plan, None);
         for (c, frame) in layout.clusters.iter().enumerate() {
             prop_assert!(frame.w == 0.0 || frame.w >= plan.clusters[c].title.w, "no room for the title");
@@ -116,7 +116,7 @@ proptest! {
     }
 
     #[test]
-    fn everything_is_on_the_page(plan in plans()) {
+    fn everything_is_inside_the_page(plan in plans()) {
         let layout = laid_out(&plan, None);
         let page = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
         for rect in layout.boxes.iter().chain(&layout.clusters) {
@@ -125,7 +125,7 @@ proptest! {
     }
 
     #[test]
-    fn known_boxes_stay(plan in plans(), known in prop::collection::vec(any::<bool>(), 30)) {
+    fn known_boxes_keep_their_positions(plan in plans(), known in prop::collection::vec(any::<bool>(), 30)) {
         let before = laid_out(&plan, None);
         let places: Vec<Option<Rect>> =
             before.boxes.iter().zip(known).map(|(rect, known)| known.then_some(*rect)).collect();
@@ -138,7 +138,7 @@ proptest! {
     }
 
     #[test]
-    fn the_second_engine_keeps_boxes_apart(plan in plans()) {
+    fn the_second_engine_does_not_overlap_boxes(plan in plans()) {
         let layout = layout::lay_out(&plan, &options(None), layout::engine("layout-rs").unwrap());
         let found = measure::measure(&plan, &layout);
         prop_assert_eq!((found.overlaps, found.label_overlaps), (0, 0));
@@ -185,7 +185,7 @@ fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
 }
 
 #[test]
-fn a_graph_too_large_for_layers_is_laid_out_all_the_same() {
+fn a_graph_too_large_for_layers_is_still_laid_out() {
     // A chain with every tenth vertex linked back to its start, in namespaces nested ever deeper.
     let n = 2000;
     let vertex = |v| Vertex {
@@ -219,7 +219,7 @@ fn a_graph_too_large_for_layers_is_laid_out_all_the_same() {
 }
 
 #[test]
-fn nothing_needs_no_room() {
+fn an_empty_graph_has_no_size() {
     for (word, _) in layout::ENGINES {
         let layout = layout::lay_out(
             &Plan::default(),
@@ -231,7 +231,7 @@ fn nothing_needs_no_room() {
 }
 
 #[test]
-fn a_broken_plan_is_laid_out_all_the_same() {
+fn an_inconsistent_plan_is_still_laid_out() {
     let odd = Size::new(f64::NAN, f64::INFINITY);
     let vertex = |size, cluster| Vertex {
         size,
@@ -283,7 +283,7 @@ fn a_broken_plan_is_laid_out_all_the_same() {
 }
 
 #[test]
-fn an_unknown_engine_is_a_usage_error_with_the_words() {
+fn an_unknown_engine_is_a_usage_error_that_lists_the_engines() {
     let error = layout::engine("circo").err().unwrap();
     assert!(
         error.hint().contains("layered, layout-rs"),

@@ -97,7 +97,7 @@ fn two_boxes_share_one_line_that_names_its_topics() {
 }
 
 #[test]
-fn plumbing_draws_no_line_and_nodes_without_one_stand_as_words() {
+fn plumbing_has_no_lines_and_nodes_without_lines_are_text() {
     let (_, pictures) = film();
     for picture in &pictures {
         for (edge, _) in groups(picture, "edge")
@@ -129,7 +129,7 @@ fn plumbing_draws_no_line_and_nodes_without_one_stand_as_words() {
 }
 
 #[test]
-fn nothing_that_changes_is_folded() {
+fn changing_elements_are_not_collapsed() {
     let (mission, pictures) = film();
     let mut drawn = BTreeSet::new();
     for picture in &pictures {
@@ -162,7 +162,7 @@ fn nothing_that_changes_is_folded() {
 }
 
 #[test]
-fn a_namespace_that_is_not_on_yet_says_so() {
+fn a_namespace_that_is_not_running_yet_is_marked() {
     let (_, pictures) = film();
     let title = |picture: &str| {
         let titles = groups(picture, "namespace-title");

@@ -102,7 +102,7 @@ fn a_ros_1_master_is_watched() {
 }
 
 #[test]
-fn what_is_no_master_is_said() {
+fn a_server_that_is_not_a_master_is_reported() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("ros1://{}", listener.local_addr().unwrap());
     spawn(move || {
@@ -120,7 +120,7 @@ fn what_is_no_master_is_said() {
 }
 
 #[test]
-fn rates_are_refused_where_no_messages_come() {
+fn rates_are_refused_without_messages() {
     let folder = TempDir::new().unwrap();
     let done = follow(folder.path(), &["ros1://localhost:1", "--rates", "/scan"]);
     assert_eq!(done.status.code(), Some(2));
@@ -195,7 +195,7 @@ mod bridge {
     }
 
     #[test]
-    fn a_bridge_tells_its_graph_and_the_rates_asked_for() {
+    fn a_bridge_yields_its_graph_and_the_requested_rates() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("ws://{}", listener.local_addr().unwrap());
         let server = spawn(move || serve(listener.accept().unwrap().0));

@@ -178,7 +178,7 @@ fn numbers(sentence: &str) -> Option<String> {
 }
 
 #[test]
-fn every_mark_of_a_figure_is_an_event_in_the_words_of_the_log() {
+fn every_mark_of_a_figure_is_an_event_of_the_log() {
     for bag in bags() {
         let log = Log::of(&bag);
         for (figure, width) in [
@@ -213,7 +213,7 @@ fn every_mark_of_a_figure_is_an_event_in_the_words_of_the_log() {
 }
 
 #[test]
-fn every_headline_has_its_mark_on_the_row_of_its_element() {
+fn every_headline_is_marked_in_the_row_of_its_element() {
     for bag in bags() {
         let log = Log::of(&bag);
         for rows in ["nodes", "topics"] {
@@ -240,7 +240,7 @@ fn every_headline_has_its_mark_on_the_row_of_its_element() {
 }
 
 #[test]
-fn a_mission_tells_the_same_lives_rates_and_hand_overs_in_all_pictures() {
+fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
     // The table that showed the fault: log, figure, film and page of the example side by side.
     let bag = &bags()[0];
     let log = Log::of(bag);

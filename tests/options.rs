@@ -555,7 +555,7 @@ fn every_option_of_check_changes_something() {
 }
 
 #[test]
-fn what_an_option_says_is_said_only_with_it() {
+fn notes_of_an_option_are_printed_only_with_it() {
     let folder = folder();
     for (command, args, with, says) in SAYS {
         let said = |with| text(&bagreel(folder.path(), command, args, with).stderr);
@@ -566,7 +566,7 @@ fn what_an_option_says_is_said_only_with_it() {
 }
 
 #[test]
-fn options_that_say_nothing_are_refused_with_a_hint() {
+fn options_without_effect_are_refused_with_a_hint() {
     let folder = folder();
     for (command, args, with, hint) in REFUSED {
         let output = bagreel(folder.path(), command, args, with);

@@ -119,7 +119,7 @@ const HOSTILE: [&str; 31] = [
 ];
 
 #[test]
-fn a_browser_plays_the_page_as_the_evolution_says() {
+fn the_page_in_a_browser_shows_the_mission() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mission = running(&ROBOT, 50);
     let pages = rendered(&mission, &["html", "svg", "json", "md"]);
@@ -186,7 +186,7 @@ fn rendered_with(mission: &Value, extensions: &[&str], more: &[&str]) -> TempDir
 }
 
 #[test]
-fn what_the_picture_folds_is_in_page_and_report() {
+fn collapsed_elements_are_listed_in_page_and_report() {
     let mission = running(&ROBOT, 20);
     let open = rendered(&mission, &["md"]);
     let folded = rendered_with(&mission, &["html", "md"], &["--collapse", "/nav,/sensors"]);
@@ -210,7 +210,7 @@ fn what_the_picture_folds_is_in_page_and_report() {
 }
 
 #[test]
-fn arrows_between_nodes_say_what_they_carry() {
+fn arrows_between_nodes_list_their_topics() {
     let pages = rendered_with(&running(&ROBOT, 20), &["html", "svg"], &["--mode", "nodes"]);
     let page = read(&pages, "x.html");
     let arrows = data_of(&page)["graphs"][0]["arrows"]
@@ -223,7 +223,7 @@ fn arrows_between_nodes_say_what_they_carry() {
 }
 
 #[test]
-fn phases_that_the_user_names_stand_everywhere() {
+fn phases_named_by_the_user_are_shown_everywhere() {
     let folder = TempDir::new().unwrap();
     let names = folder.path().join("names");
     fs::write(&names, "0|setting out\n60|coming home\n").unwrap();
@@ -299,7 +299,7 @@ fn holds_its_windows(data: &Value, mission: &Value) {
 }
 
 #[test]
-fn windows_that_overlap_are_told_with_their_own_spans() {
+fn overlapping_windows_are_shown_with_their_own_spans() {
     let (data, mission, frame) = divided(&["--period", "10", "--step", "5"]);
     holds_its_windows(&data, &mission);
     assert_eq!(
@@ -310,7 +310,7 @@ fn windows_that_overlap_are_told_with_their_own_spans() {
 }
 
 #[test]
-fn windows_that_were_merged_are_told_with_their_own_spans() {
+fn merged_windows_are_shown_with_their_own_spans() {
     let (data, mission, frame) = divided(&["--period", "2", "--skip-unchanged"]);
     holds_its_windows(&data, &mission);
     assert!(data["starts"].as_array().unwrap().len() < 30);
@@ -366,7 +366,7 @@ fn bars_and_jumps_count_headlines() {
 }
 
 #[test]
-fn a_link_in_a_report_runs_nothing() {
+fn links_in_a_report_cannot_execute_code() {
     let folder = TempDir::new().unwrap();
     let input = folder.path().join("in.json");
     fs::write(&input, running(&ROBOT, 3).to_string()).unwrap();
@@ -383,7 +383,7 @@ fn a_link_in_a_report_runs_nothing() {
 }
 
 #[test]
-fn a_page_asks_for_nothing_and_lets_nothing_in() {
+fn a_page_makes_no_requests_and_has_a_strict_policy() {
     let pages = rendered(&running(&HOSTILE, 12), &["html", "svg"]);
     let page = fs::read_to_string(pages.path().join("x.html")).unwrap();
     assert!(page.contains("default-src 'none';script-src 'sha256-"));
@@ -413,7 +413,7 @@ fn a_page_asks_for_nothing_and_lets_nothing_in() {
 }
 
 #[test]
-fn a_report_carries_no_markup_from_names() {
+fn names_in_a_report_are_escaped() {
     let pages = rendered(&running(&HOSTILE, 12), &["md", "mmd"]);
     let report = fs::read_to_string(pages.path().join("x.md")).unwrap();
     // Mermaid has entities of its own.
@@ -440,7 +440,7 @@ fn a_report_carries_no_markup_from_names() {
 }
 
 #[test]
-fn a_job_summary_is_added_to() {
+fn a_report_is_appended_to_a_job_summary() {
     let folder = TempDir::new().unwrap();
     let (input, summary) = (folder.path().join("in.json"), folder.path().join("summary"));
     fs::write(&input, running(&ROBOT, 9).to_string()).unwrap();
@@ -465,7 +465,7 @@ fn a_job_summary_is_added_to() {
 }
 
 #[test]
-fn pages_keep_their_weight() {
+fn pages_stay_within_their_size() {
     let medium = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/graphs/medium.json");
     if !medium.exists() {
         eprintln!("skipped: {} is not there", medium.display());

@@ -201,7 +201,7 @@ fn expected(folder: &Path, bag: &str) {
 type Fault = fn(&mut Recording);
 
 #[test]
-fn each_fault_of_the_warehouse_breaks_what_it_should_and_nothing_else() {
+fn each_fault_of_the_warehouse_breaks_exactly_its_rules() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let run = loaded(concat!(
@@ -281,7 +281,7 @@ fn each_fault_of_the_warehouse_breaks_what_it_should_and_nothing_else() {
 }
 
 #[test]
-fn a_second_run_of_the_courier_keeps_the_expectation() {
+fn a_second_run_of_the_courier_passes_the_check() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let run = mission::mission();
@@ -387,7 +387,7 @@ fn counted(readers: &[&str]) -> Recording {
 }
 
 #[test]
-fn a_subscriber_that_statistics_no_longer_tell_of_is_missing() {
+fn a_subscriber_that_disappears_from_statistics_is_missing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     written(here, "first.bag", &counted(&["/amcl", "/slam"]));
@@ -402,7 +402,7 @@ fn a_subscriber_that_statistics_no_longer_tell_of_is_missing() {
 
 /// A bag whose connections name nobody, and a log in which few nodes write.
 #[test]
-fn a_rewritten_bag_that_lost_its_senders_proves_no_node_missing() {
+fn a_rewritten_bag_without_publishers_proves_no_node_missing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let run = |named: bool| {

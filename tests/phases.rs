@@ -30,7 +30,7 @@ fn example() -> std::path::PathBuf {
 }
 
 #[test]
-fn the_example_has_the_phases_of_its_script_and_counts_their_nodes() {
+fn the_example_has_the_phases_of_its_script() {
     let mission = mission(&example(), Length::Auto);
     assert_eq!(boundaries(&mission), TRUTH);
     let counts: Vec<(u32, u32)> = mission

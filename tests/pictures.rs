@@ -62,7 +62,7 @@ fn word(path: &str) -> &str {
 }
 
 #[test]
-fn pictures_of_every_style_are_what_they_were() {
+fn pictures_of_every_style_match_their_snapshots() {
     for mission in MISSIONS {
         for (style, _) in BUILTIN {
             let folder = tempfile::tempdir().unwrap();
@@ -80,7 +80,7 @@ fn pictures_of_every_style_are_what_they_were() {
 }
 
 #[test]
-fn pixels_are_what_they_were() {
+fn pixels_match_the_reference_pictures() {
     for mission in MISSIONS {
         for style in ["light", "dark"] {
             let folder = tempfile::tempdir().unwrap();

@@ -74,7 +74,7 @@ fn graph() -> impl Strategy<Value = Graph> {
 
 proptest! {
     #[test]
-    fn a_graph_does_not_differ_from_itself(graph in graph()) {
+    fn a_graph_has_no_difference_from_itself(graph in graph()) {
         prop_assert!(diff(&graph, &graph).is_empty());
     }
 
@@ -157,7 +157,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn changes_make_each_window_of_the_one_before_and_the_ledger_knows_no_period(bag in recording()) {
+    fn changes_yield_each_next_window_and_the_ledger_ignores_the_period(bag in recording()) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bag");
         std::fs::write(&path, rosbag1::write(&bag, Pack::None, 4096)).unwrap();
@@ -172,7 +172,7 @@ proptest! {
 }
 
 #[test]
-fn the_examples_follow_from_their_changes_and_their_ledger_knows_no_period() {
+fn the_examples_follow_from_their_changes() {
     for bag in ["warehouse.bag", "courier.mcap"] {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("examples")

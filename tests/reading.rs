@@ -50,7 +50,7 @@ fn everywhere(recording: &Recording) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn one_description_counts_the_same_in_every_format() {
+fn the_same_mission_has_the_same_counts_in_every_format() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         let (_dir, path) = placed(&name, &bytes);
@@ -70,7 +70,7 @@ fn one_description_counts_the_same_in_every_format() {
 }
 
 #[test]
-fn publishers_are_known_where_the_format_names_them() {
+fn publishers_are_known_if_the_format_records_them() {
     let recording = support::small();
     let publishers = |kept: &Kept| {
         kept.count(|c| {
@@ -115,7 +115,7 @@ fn the_span_is_known_before_reading() {
 }
 
 #[test]
-fn a_range_holds_what_lies_inside_and_nothing_else() {
+fn a_range_contains_exactly_the_messages_inside() {
     let recording = support::small();
     let at = |s: i64| Stamp(ORIGIN + s * 1_000_000_000);
     let range = Span {
@@ -140,7 +140,7 @@ fn a_range_holds_what_lies_inside_and_nothing_else() {
 }
 
 #[test]
-fn the_second_reader_finds_the_same() {
+fn the_second_reader_agrees() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         let (_dir, path) = placed(&name, &bytes);
@@ -161,7 +161,7 @@ fn the_second_reader_finds_the_same() {
 }
 
 #[test]
-fn without_an_index_a_bag_is_read_from_the_front() {
+fn a_bag_without_index_is_read_from_the_front() {
     let recording = support::small();
     for how in [Pack::None, Pack::Bz2, Pack::Lz4] {
         let whole = rosbag1::write(&recording, how, 4000);
@@ -202,7 +202,7 @@ fn without_an_index_a_bag_is_read_from_the_front() {
 }
 
 #[test]
-fn a_cut_bag_keeps_what_came_before_the_cut() {
+fn messages_before_the_cut_are_read() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         if name.contains(".db3") {
@@ -228,7 +228,7 @@ fn a_cut_bag_keeps_what_came_before_the_cut() {
 }
 
 #[test]
-fn reading_from_the_front_goes_on_behind_damage() {
+fn reading_from_the_front_continues_after_damage() {
     let recording = support::small();
     let mut bytes = rosbag1::unindexed(&rosbag1::write(&recording, Pack::Lz4, 4000));
     let chunks: Vec<usize> = (0..bytes.len())
@@ -245,7 +245,7 @@ fn reading_from_the_front_goes_on_behind_damage() {
 }
 
 #[test]
-fn a_wrong_index_costs_time_and_no_message() {
+fn a_wrong_index_loses_no_message() {
     let recording = support::small();
     let mut bytes = rosbag1::write(&recording, Pack::Lz4, 4000);
     // The count of the first index record lies.
@@ -260,7 +260,7 @@ fn a_wrong_index_costs_time_and_no_message() {
 }
 
 #[test]
-fn rows_in_a_leftover_log_are_read_and_nothing_appears_beside_the_bag() {
+fn rows_in_a_leftover_log_are_read_without_creating_files() {
     let recording = support::small();
     let source = tempfile::tempdir().unwrap();
     let path = source.path().join("x.db3");
@@ -287,7 +287,7 @@ fn rows_in_a_leftover_log_are_read_and_nothing_appears_beside_the_bag() {
 }
 
 #[test]
-fn rows_that_say_nothing_are_counted_and_left_out() {
+fn invalid_rows_are_counted_and_skipped() {
     let recording = support::small();
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.db3");
@@ -313,7 +313,7 @@ fn rows_that_say_nothing_are_counted_and_left_out() {
 }
 
 #[test]
-fn a_database_that_computes_is_refused() {
+fn a_database_with_views_or_computed_columns_is_refused() {
     let schemas = [
         "CREATE TABLE topics(id, name, type); CREATE VIEW messages AS WITH RECURSIVE n(x) AS (VALUES(1) UNION ALL SELECT x FROM n) \
          SELECT x AS topic_id, x AS timestamp, x AS data FROM n",
@@ -367,7 +367,7 @@ fn split(recording: &Recording) -> TempDir {
 }
 
 #[test]
-fn a_folder_is_one_recording_though_its_parts_number_their_topics_anew() {
+fn parts_with_different_topic_ids_are_one_recording() {
     let recording = support::small();
     let dir = split(&recording);
     let (report, kept) = read(dir.path(), Want::Payload).unwrap();
@@ -382,7 +382,7 @@ fn a_folder_is_one_recording_though_its_parts_number_their_topics_anew() {
 }
 
 #[test]
-fn missing_and_renamed_parts_are_found_or_named() {
+fn missing_and_renamed_parts_are_found_or_reported() {
     let recording = support::small();
     let dir = split(&recording);
     fs::remove_file(dir.path().join("run_1.db3")).unwrap();
@@ -421,7 +421,7 @@ fn a_path_that_leaves_the_folder_is_not_followed() {
 }
 
 #[test]
-fn files_compressed_as_a_whole_are_read_through() {
+fn files_compressed_as_a_whole_are_read() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         let packed = zstd::encode_all(&bytes[..], 1).unwrap();
@@ -442,7 +442,7 @@ fn files_compressed_as_a_whole_are_read_through() {
 }
 
 #[test]
-fn what_is_no_bag_is_named_with_a_way_out() {
+fn files_that_are_not_bags_are_reported_with_advice() {
     let cases: &[(&[u8], &str)] = &[
         (b"", "empty"),
         (
@@ -546,7 +546,7 @@ fn damage(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
 }
 
 #[test]
-fn no_damage_makes_a_reader_panic_hang_or_invent() {
+fn damage_never_causes_panics_hangs_or_invented_messages() {
     let mut recording = support::small();
     recording.messages.retain(|m| m.1 % 7 < 3 || m.0 == 0);
     recording.messages.truncate(150);
@@ -589,7 +589,7 @@ fn with_number(bytes: &[u8], field: &[u8], value: &[u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn numbers_that_lie_are_read_around_or_told() {
+fn wrong_numbers_are_tolerated_or_reported() {
     let recording = support::small();
     let bag = rosbag1::write(&recording, Pack::Lz4, 20_000);
     let huge = [0xff; 8];
@@ -624,7 +624,7 @@ fn numbers_that_lie_are_read_around_or_told() {
 }
 
 #[test]
-fn offsets_of_an_mcap_summary_are_not_believed() {
+fn offsets_of_an_mcap_summary_are_not_trusted() {
     let recording = support::small();
     let bytes = mcap::write(&recording, &mcap::Options::default());
     let footer = bytes.len() - 8 - 20;
@@ -651,7 +651,7 @@ fn offsets_of_an_mcap_summary_are_not_believed() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_bomb_takes_no_memory() {
+fn a_decompression_bomb_takes_no_memory() {
     let mut recording = Recording::default();
     let bomb = recording.publisher("/bomb", "/bomb", "std_msgs/String");
     recording.send(bomb, (0, 1), 1, &vec![0; 500 << 20]);
@@ -752,7 +752,7 @@ fn bags_below(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn real_bags_count_as_independent_readers_count_and_by_their_index() {
+fn real_bags_have_the_counts_of_independent_readers() {
     let Some(folder) = support::shared("data") else {
         return;
     };

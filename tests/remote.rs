@@ -259,7 +259,7 @@ fn server_of_large() -> Server {
 }
 
 #[test]
-fn an_object_counts_like_the_file() {
+fn an_object_has_the_counts_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let own = |name: &str| fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
     let bag = rosbag1::write(&support::small(), rosbag1::Pack::Lz4, 4000);
@@ -333,7 +333,7 @@ fn mission(bag: &str) -> String {
 }
 
 #[test]
-fn the_mission_of_an_object_is_that_of_the_file() {
+fn an_object_yields_the_mission_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let own = |name: &str| fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
     let small = support::small();
@@ -362,7 +362,7 @@ fn the_mission_of_an_object_is_that_of_the_file() {
 }
 
 #[test]
-fn a_mission_of_a_large_bag_takes_a_request_for_each_chunk_and_many_at_a_time() {
+fn a_large_mission_takes_one_request_per_chunk_in_parallel() {
     let server = server_of_large();
     server.state().late = Duration::from_millis(5);
     let mut reading = Reading::of([server.url("large.bag")]);
@@ -391,7 +391,7 @@ fn the_beginning_of_a_large_bag_takes_few_requests() {
 }
 
 #[test]
-fn a_server_that_stumbles_is_asked_again() {
+fn transient_server_errors_are_retried() {
     let server = server_of_large();
     let whole = server.count("large.bag", CountDetail::Auto).unwrap();
     server.state().stumbles = Some(3);
@@ -399,7 +399,7 @@ fn a_server_that_stumbles_is_asked_again() {
 }
 
 #[test]
-fn what_is_refused_is_an_error_and_no_row() {
+fn a_refused_object_is_an_error_without_a_row() {
     let server = server_of_large();
     server.state().refuses = Some(403);
     let said = server.refusal("large.bag");
@@ -417,7 +417,7 @@ fn what_is_refused_is_an_error_and_no_row() {
 }
 
 #[test]
-fn a_prefix_is_no_bag() {
+fn a_prefix_is_not_a_bag() {
     let server = server_of_large();
     let error = read(&Reading::of([server.url("day/")])).unwrap_err();
     assert!(
@@ -429,7 +429,7 @@ fn a_prefix_is_no_bag() {
 
 /// A bag of four chunks with one message each: the tail, and one request for each chunk's index and the next one's head.
 #[test]
-fn sizes_cost_no_request_of_their_own_where_a_chunk_holds_one_message() {
+fn sizes_need_no_request_if_a_chunk_has_one_message() {
     let server = Server::with(&[("a.bag", one_message_in_each_chunk())]);
     let output = Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .args([
@@ -486,7 +486,7 @@ fn an_object_that_is_replaced_while_it_is_read_is_an_error() {
 }
 
 #[test]
-fn no_server_leads_to_a_file() {
+fn redirects_to_files_are_not_followed() {
     let server = server_of_large();
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("a.bag");
@@ -516,7 +516,7 @@ fn no_server_leads_to_a_file() {
 }
 
 #[test]
-fn a_signature_is_sent_and_not_told() {
+fn a_signature_is_sent_but_not_printed() {
     let server = server_of_large();
     let signed = "large.bag?X-Amz-Signature=secret#part";
     server.count(signed, CountDetail::Auto).unwrap();
@@ -538,7 +538,7 @@ fn a_signature_is_sent_and_not_told() {
 }
 
 #[test]
-fn the_command_tells_of_an_object_as_of_a_file() {
+fn the_command_prints_the_same_for_an_object_and_a_file() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let server = Server::with(&[("warehouse.bag", fs::read(&path).unwrap())]);
     let tells = |args: &[&str]| {
@@ -570,7 +570,7 @@ fn the_command_tells_of_an_object_as_of_a_file() {
 }
 
 #[test]
-fn the_command_says_what_a_store_refused_and_finishes_later() {
+fn refused_objects_are_reported_and_counted_later() {
     let dir = tempfile::tempdir().unwrap();
     let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
     let server = Server::with(&[("a.bag", bag.clone()), ("b.bag", bag)]);

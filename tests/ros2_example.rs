@@ -36,7 +36,7 @@ fn write_the_ros2_examples() {
 }
 
 #[test]
-fn both_hold_the_mission_and_are_small() {
+fn both_contain_the_mission_and_are_small() {
     let mission = mission();
     for name in ["courier", "courier.mcap"] {
         let (report, kept) = read(&examples().join(name), Want::Payload).unwrap();
@@ -56,7 +56,7 @@ fn both_hold_the_mission_and_are_small() {
 }
 
 #[test]
-fn both_hold_the_same_payloads() {
+fn both_have_the_same_payloads() {
     let payloads = |name| {
         read(&examples().join(name), Want::Payload)
             .unwrap()

@@ -220,7 +220,7 @@ fn cpp_classes_are_found_through_cmake_headers_and_bases() {
 }
 
 #[test]
-fn of_several_programs_of_one_name_the_one_counts_whose_topics_are_recorded() {
+fn among_programs_of_one_name_the_one_with_recorded_topics_counts() {
     let folder = folder(
         &[("/a", STRING), ("/b", STRING), ("/c", STRING)],
         &["/n"],
@@ -235,7 +235,7 @@ fn of_several_programs_of_one_name_the_one_counts_whose_topics_are_recorded() {
 }
 
 #[test]
-fn the_code_of_the_recordings_day_is_read_out_of_git() {
+fn the_code_as_of_the_recording_is_read_from_git() {
     let folder = folder(
         &[("/old", STRING), ("/new", STRING)],
         &["/n"],
@@ -308,7 +308,7 @@ fn the_code_of_the_recordings_day_is_read_out_of_git() {
 /// Everything that a repository could make git or us run leaves a file behind.
 #[cfg(unix)]
 #[test]
-fn a_hostile_repository_does_nothing() {
+fn a_hostile_repository_executes_nothing() {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = folder(
         &[("/out", STRING)],
@@ -399,7 +399,7 @@ fn a_hostile_repository_does_nothing() {
 
 #[cfg(unix)]
 #[test]
-fn a_git_file_leads_only_to_a_repository_that_knows_the_folder() {
+fn a_git_file_must_be_referenced_by_its_repository() {
     let folder = folder(
         &[("/out", STRING)],
         &["/n"],
@@ -477,7 +477,7 @@ fn said(folder: &Path, more: &[&str]) -> String {
 }
 
 #[test]
-fn the_only_place_that_can_be_meant_is_inferred_when_asked_for() {
+fn the_only_possible_declaration_is_inferred_on_request() {
     let folder = folder(
         &[("/out", STRING), ("/in", STRING)],
         &[],
@@ -515,7 +515,7 @@ fn the_only_place_that_can_be_meant_is_inferred_when_asked_for() {
 }
 
 #[test]
-fn what_speaks_against_a_place_is_told() {
+fn reasons_against_a_declaration_are_reported() {
     let logging = node("talker", "out", "in").replace(
         "        self.create_pub",
         "        self.get_logger().info('x')\n        self.create_pub",
@@ -551,7 +551,7 @@ fn what_speaks_against_a_place_is_told() {
 }
 
 #[test]
-fn messages_of_another_programs_own_type_are_not_inferred() {
+fn types_owned_by_another_program_are_not_inferred() {
     let code = node("fake", "turtle1/pose", "in")
         .replace("std_msgs.msg import String", "turtlesim.msg import Pose")
         .replace("create_publisher(String", "create_publisher(Pose");
@@ -564,7 +564,7 @@ fn messages_of_another_programs_own_type_are_not_inferred() {
 }
 
 #[test]
-fn code_outside_git_is_read_as_it_lies_and_said_to_be() {
+fn code_outside_git_is_read_and_reported_as_such() {
     let code = node("n", "out", "x");
     let folder = folder(
         &[("/out", STRING)],
@@ -579,7 +579,7 @@ fn code_outside_git_is_read_as_it_lies_and_said_to_be() {
 }
 
 #[test]
-fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes() {
+fn a_simulation_is_rejected_if_another_launch_file_starts_the_same_nodes() {
     let launch = |nodes: &[&str]| {
         let node = |n: &&str| format!("Node(package='p', executable='{n}', name='{n}')");
         let nodes: Vec<String> = nodes.iter().map(node).collect();
@@ -618,7 +618,7 @@ fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes(
 }
 
 #[test]
-fn what_else_the_code_tells_is_listed() {
+fn remarks_about_the_code_are_listed() {
     let more = "\n        self.create_publisher(String, 'lost', 1)\n\ndef";
     let code = node("talker", "out", "in").replace("\n\ndef", more);
     let folder = folder(
@@ -637,7 +637,7 @@ fn what_else_the_code_tells_is_listed() {
 }
 
 #[test]
-fn events_do_not_tell_what_only_the_code_says() {
+fn events_exclude_what_only_the_code_declares() {
     let folder = folder(
         &[("/out", STRING), ("/in", STRING)],
         &["/talker_late"],
@@ -657,7 +657,7 @@ fn events_do_not_tell_what_only_the_code_says() {
 }
 
 #[test]
-fn what_cannot_apply_is_refused() {
+fn inapplicable_options_are_refused() {
     let folder = folder(&[("/out", STRING)], &["/n"], &[PACKAGE]);
     fs::write(
         folder.path().join("x.json"),

@@ -49,7 +49,7 @@ fn near(told: &[(String, i64)], name: &str, second: i64) -> bool {
 }
 
 #[test]
-fn the_warehouse_tells_its_crashes_restarts_and_rates() {
+fn crashes_restarts_and_rates_of_the_warehouse_are_logged() {
     // Times from the scripts that ran the mission; every line was compared with the master's own state.
     let mission = mission("warehouse.bag", 60);
     let restarted = told(&mission, Kind::Restarted);
@@ -94,7 +94,7 @@ fn the_log_is_the_same_for_every_period() {
 }
 
 #[test]
-fn a_mission_read_back_tells_the_same() {
+fn a_mission_read_from_json_has_the_same_log() {
     for file in ["warehouse.bag", "courier.mcap"] {
         let first = mission(file, 10);
         let mut text = Vec::new();
@@ -117,7 +117,7 @@ fn a_mission_read_back_tells_the_same() {
 }
 
 #[test]
-fn every_difference_of_two_windows_points_at_its_entry() {
+fn every_window_difference_refers_to_its_log_entry() {
     for seconds in [1, 10, 60] {
         let mission = mission("warehouse.bag", seconds);
         let later = mission.graphs.iter().skip(1);
@@ -151,7 +151,7 @@ fn every_difference_of_two_windows_points_at_its_entry() {
 }
 
 #[test]
-fn the_log_never_runs_backwards_and_parts_have_no_parts() {
+fn the_log_is_sorted_and_parts_are_not_nested() {
     let mission = mission("warehouse.bag", 60);
     let entries = &mission.ledger.entries;
     assert!(entries.is_sorted_by_key(|e| e.time));
@@ -199,7 +199,7 @@ fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
 }
 
 #[test]
-fn starts_and_stops_are_told_in_time_whatever_the_period() {
+fn starts_and_stops_are_timed_independent_of_the_period() {
     let truth = truth();
     for seconds in [1, 10, 30, 60] {
         let mission = mission("warehouse.bag", seconds);
@@ -246,7 +246,7 @@ fn starts_and_stops_are_told_in_time_whatever_the_period() {
 }
 
 #[test]
-fn commanded_rates_and_take_overs_are_told_with_their_numbers() {
+fn commanded_rates_and_take_overs_are_logged_with_numbers() {
     let (mission, truth) = (mission("warehouse.bag", 60), truth());
     let second = |at| mission.offset(at) as f64 / 1e9;
     let name = |what| match mission.elements.ends(what) {

@@ -37,7 +37,7 @@ fn csv(path: &Path) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn a_row_per_message_in_order_of_time() {
+fn each_message_is_a_row_sorted_by_time() {
     let dir = tempfile::tempdir().unwrap();
     ends(dir.path(), &["extract", WAREHOUSE, "-o", "m.csv"], 0);
     let rows = csv(&dir.path().join("m.csv"));
@@ -53,7 +53,7 @@ fn a_row_per_message_in_order_of_time() {
 }
 
 #[test]
-fn topics_and_times_choose_rows_with_their_sizes() {
+fn rows_are_filtered_by_topic_and_time() {
     let dir = tempfile::tempdir().unwrap();
     let filter = ["--topic-filter", "/robot1/odom"];
     let all = [&["extract", WAREHOUSE, "-o", "all.csv"], &filter[..]].concat();
@@ -94,7 +94,7 @@ fn topics_and_times_choose_rows_with_their_sizes() {
 }
 
 #[test]
-fn several_bags_are_one_table_in_order() {
+fn several_bags_make_one_sorted_table() {
     let dir = tempfile::tempdir().unwrap();
     ends(
         dir.path(),
@@ -153,7 +153,7 @@ fn every_field_has_a_column() {
 }
 
 #[test]
-fn what_cannot_be_decoded_is_said() {
+fn undecodable_messages_are_reported() {
     let dir = tempfile::tempdir().unwrap();
     let mut bag = crate::support::Recording::default();
     let place = bag.publisher("/a", "/known", "std_msgs/String");
@@ -189,7 +189,7 @@ fn what_cannot_be_decoded_is_said() {
 }
 
 #[test]
-fn recordings_without_definitions_have_tables_of_common_types_and_of_known_ones() {
+fn recordings_without_definitions_use_common_and_given_types() {
     let dir = tempfile::tempdir().unwrap();
     let mut bag = crate::support::Recording::default();
     let known = bag.publisher("", "/point", "geometry_msgs/msg/Point");
@@ -233,7 +233,7 @@ fn recordings_without_definitions_have_tables_of_common_types_and_of_known_ones(
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_requests_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let refused = |args: &[&str], says: &str| {
         let said = ends(dir.path(), &[&["extract", WAREHOUSE], args].concat(), 2);
@@ -271,7 +271,7 @@ fn mixed(folder: &Path) {
 }
 
 #[test]
-fn a_survey_loses_no_recording() {
+fn a_survey_lists_every_recording() {
     let dir = tempfile::tempdir().unwrap();
     mixed(dir.path());
     let output = bagreel(dir.path(), &["info", ".", "--format", "csv"]);
@@ -315,7 +315,7 @@ fn a_survey_loses_no_recording() {
 
 #[test]
 #[cfg(unix)]
-fn a_link_to_a_bag_is_a_bag_and_a_link_to_a_folder_is_none() {
+fn links_to_bags_are_followed_and_links_to_folders_are_not() {
     use std::os::unix::fs::symlink;
     let dir = tempfile::tempdir().unwrap();
     fs::create_dir(dir.path().join("fleet")).unwrap();
@@ -337,7 +337,7 @@ fn a_link_to_a_bag_is_a_bag_and_a_link_to_a_folder_is_none() {
 }
 
 #[test]
-fn a_recorder_is_no_subscriber() {
+fn a_recorder_is_not_a_subscriber() {
     let dir = tempfile::tempdir().unwrap();
     let counted = |nodes: &str| -> u64 {
         let text = format!("Name,Publish,Subscribe\n{nodes}");
@@ -355,7 +355,7 @@ fn a_recorder_is_no_subscriber() {
 }
 
 #[test]
-fn graphs_of_other_tools_hold_every_element_once() {
+fn graphs_for_other_tools_contain_every_element_once() {
     let dir = tempfile::tempdir().unwrap();
     let outputs = ["-o", "x.gexf", "-o", "x.graphml", "-o", "x.json"];
     ends(
@@ -419,7 +419,7 @@ mod parquet {
     }
 
     #[test]
-    fn parquet_holds_what_csv_holds() {
+    fn parquet_and_csv_have_the_same_contents() {
         let dir = tempfile::tempdir().unwrap();
         for name in ["m.csv", "m.parquet", "again.parquet"] {
             ends(dir.path(), &["extract", WAREHOUSE, COURIER, "-o", name], 0);

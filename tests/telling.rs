@@ -25,7 +25,7 @@ fn all(seen: &SeenWindow) -> impl Iterator<Item = &Shown> {
 }
 
 #[test]
-fn every_headline_is_counted_said_and_marked() {
+fn every_headline_is_counted_captioned_and_marked() {
     let all_examples = [
         ("warehouse.bag", None),
         ("warehouse.bag", Some("10")),
@@ -77,7 +77,7 @@ fn a_window_without_a_headline_looks_like_the_one_before() {
 }
 
 #[test]
-fn a_crash_is_drawn_before_while_and_after() {
+fn a_crash_is_drawn_before_during_and_after() {
     let view = example("warehouse.bag", Some("10"));
     let of = |k: usize| {
         let frame = &view.frames[k];
@@ -115,7 +115,7 @@ fn a_crash_is_drawn_before_while_and_after() {
 }
 
 #[test]
-fn an_element_shows_the_rates_of_its_event_and_not_their_mean() {
+fn an_element_shows_the_rates_of_its_event_instead_of_their_mean() {
     let view = example("warehouse.bag", Some("10"));
     let mut events = 0;
     for (k, frame) in view.frames.iter().enumerate() {

@@ -196,7 +196,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 #[test]
-fn nothing_but_results_and_messages_is_left_on_the_screen() {
+fn only_results_and_messages_stay_on_the_screen() {
     let folder = folder();
     let mut bars = 0;
     for line in COMMANDS {
@@ -249,7 +249,7 @@ fn results_fit_the_terminal() {
 }
 
 #[test]
-fn tables_have_heads_that_stay_above_their_columns() {
+fn table_headers_align_with_their_columns() {
     let folder = folder();
     let written = typed(folder.path(), &["info", WAREHOUSE], On::Output, 80, true);
     let lines = screen(&written, 1000);
@@ -269,7 +269,7 @@ fn tables_have_heads_that_stay_above_their_columns() {
 }
 
 #[test]
-fn long_events_hang_below_their_own_words() {
+fn long_events_have_a_hanging_indent() {
     let folder = folder();
     let written = typed(folder.path(), &["events", WAREHOUSE], On::Output, 60, true);
     let lines = screen(&written, 1000);
@@ -280,7 +280,7 @@ fn long_events_hang_below_their_own_words() {
 }
 
 #[test]
-fn events_are_sorted_by_the_time_that_they_show() {
+fn events_are_sorted_by_their_printed_time() {
     let folder = folder();
     let written = typed(folder.path(), &["events", WAREHOUSE], On::Output, 500, true);
     let shown = screen(&written, 1000).into_iter().map(|line| {
@@ -293,7 +293,7 @@ fn events_are_sorted_by_the_time_that_they_show() {
 }
 
 #[test]
-fn colours_tell_kinds_unless_they_are_not_wanted() {
+fn events_are_coloured_by_kind_unless_disabled() {
     let folder = folder();
     let run = |args: &[&str], colour| typed(folder.path(), args, On::Output, 80, colour);
     let coloured = run(&["events", WAREHOUSE], true);
@@ -380,7 +380,7 @@ fn progress_counts_the_bytes_of_the_files() {
 }
 
 #[test]
-fn notes_about_what_is_left_out_are_one_line_unless_all_are_asked_for() {
+fn routine_notes_are_one_line_unless_verbose() {
     let folder = folder();
     let notes = |args: &[&str]| {
         let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
@@ -408,7 +408,7 @@ fn notes_about_what_is_left_out_are_one_line_unless_all_are_asked_for() {
 }
 
 #[test]
-fn names_that_match_nothing_are_told_with_the_nearest_name() {
+fn names_without_a_match_are_reported_with_the_nearest() {
     let folder = folder();
     for (option, value, says) in [
         ("--collapse", "/robt1", "`/robot1`"),
@@ -469,7 +469,7 @@ fn every_command_has_a_manual_page() {
 }
 
 #[test]
-fn a_closed_pipe_is_silent_for_every_command() {
+fn every_command_is_silent_on_a_closed_pipe() {
     let folder = folder();
     for line in [
         "info W",

@@ -61,7 +61,7 @@ type Case = (
 );
 
 #[test]
-fn its_own_json_renders_to_the_same_bytes() {
+fn rendering_exported_json_gives_the_same_bytes() {
     const FRAMES: [&str; 5] = ["x.svg", "x.html", "x.md", "x.json", "x.png"];
     const TWENTY: [&str; 2] = ["--period", "20"];
     let cases: [Case; 8] = [
@@ -162,7 +162,7 @@ fn bagreel(arguments: &[&str], input: &[u8]) -> (bool, String, String) {
 }
 
 #[test]
-fn captions_come_from_a_bag_that_can_be_read_only_once() {
+fn captions_are_read_from_a_pipe() {
     let arguments = [
         "render",
         "-",
@@ -189,7 +189,7 @@ fn captions_come_from_a_bag_that_can_be_read_only_once() {
 }
 
 #[test]
-fn captions_that_cannot_be_are_refused() {
+fn invalid_captions_are_refused() {
     let bag = telling();
     let asked = |from: &str| {
         bagreel(
@@ -253,7 +253,7 @@ fn windows(arguments: &[&str]) -> Vec<(i64, i64)> {
 }
 
 #[test]
-fn windows_may_be_cut_by_phases_and_by_changes() {
+fn windows_are_cut_by_phases_or_changes() {
     let phases = windows(&["--cut", "phases"]);
     let starts: Vec<i64> = phases.iter().map(|(start, _)| *start).collect();
     assert_eq!(starts, [0, 38, 97, 163, 177, 200, 296]);
@@ -273,7 +273,7 @@ fn windows_may_be_cut_by_phases_and_by_changes() {
 }
 
 #[test]
-fn a_cut_is_refused_where_it_cannot_apply() {
+fn a_cut_is_refused_if_inapplicable() {
     let bag = example("courier.mcap").display().to_string();
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json").display().to_string();

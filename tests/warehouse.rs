@@ -23,7 +23,7 @@ fn counted_by_others() -> serde_json::Value {
 }
 
 #[test]
-fn every_count_equals_that_of_an_independent_reader() {
+fn all_counts_match_an_independent_reader() {
     let (mission, expected) = (mission(), counted_by_others());
     assert_eq!(mission.span.start.0, expected["start_ns"].as_i64().unwrap());
     assert_eq!(mission.messages, expected["messages"].as_u64().unwrap());
@@ -63,7 +63,7 @@ fn alive(mission: &Mission, node: &str, second: usize) -> bool {
 }
 
 #[test]
-fn nodes_come_and_go_when_they_did() {
+fn nodes_start_and_stop_at_the_true_times() {
     let mission = mission();
     let life = |node: &str| -> Vec<usize> {
         (0..330)

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_needs_no_room() {
+    fn an_empty_graph_has_no_size() {
         assert_eq!(
             pack(&[], Size::new(1.0, 1.0), 10.0),
             (Vec::new(), Size::default())

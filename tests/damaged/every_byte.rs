@@ -107,7 +107,7 @@ fn flip(name: &str, bytes: &[u8], bits: impl Fn(usize) -> Range<usize>) {
 }
 
 #[test]
-fn a_bit_of_any_byte_costs_no_message_without_a_word() {
+fn a_flipped_bit_in_any_byte_loses_no_message_silently() {
     for (name, bytes) in tiny() {
         flip(name, &bytes, |at| at % 8..at % 8 + 1);
     }
@@ -115,14 +115,14 @@ fn a_bit_of_any_byte_costs_no_message_without_a_word() {
 
 #[test]
 #[ignore = "minutes; by hand after changes to a reader"]
-fn no_bit_at_all_costs_a_message_without_a_word() {
+fn no_flipped_bit_loses_a_message_silently() {
     for (name, bytes) in tiny() {
         flip(name, &bytes, |_| 0..8);
     }
 }
 
 #[test]
-fn a_bag_cut_behind_any_byte_has_the_messages_before_it() {
+fn a_bag_cut_at_any_byte_has_the_messages_before_it() {
     for (name, bytes) in tiny() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(name);
@@ -153,7 +153,7 @@ fn a_bag_cut_behind_any_byte_has_the_messages_before_it() {
 }
 
 #[test]
-fn a_bit_of_any_byte_that_only_the_checksum_of_the_data_knows_is_said() {
+fn a_flipped_bit_seen_only_by_the_data_checksum_is_reported() {
     let (name, bytes) = tiny().pop().unwrap();
     assert_eq!(name, "front_unchunked.mcap");
     // Behind the first eight bytes, and before the end of the data, the end of the file and the closing bytes.
@@ -186,7 +186,7 @@ fn values(bytes: &[u8], field: &[u8]) -> Vec<usize> {
 }
 
 #[test]
-fn chunk_infos_that_count_too_few_connections_lose_no_message() {
+fn chunk_infos_with_too_few_connections_lose_no_message() {
     let bytes = rosbag1::write(&super::short(), Pack::None, 4000);
     let truth = super::short().messages.len();
     let infos = values(&bytes, b"op=\x06");
@@ -215,7 +215,7 @@ fn chunk_infos_that_count_too_few_connections_lose_no_message() {
 }
 
 #[test]
-fn what_is_no_message_in_a_chunk_is_said_by_both_readings() {
+fn foreign_records_in_a_chunk_are_reported_by_both_readers() {
     let recording = super::short();
     let truth = recording.messages.len();
     let mut bytes = rosbag1::unindexed(&rosbag1::write(&recording, Pack::None, 4000));

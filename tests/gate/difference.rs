@@ -5,7 +5,7 @@ use std::fs;
 use super::{HEALTHY, Robot, bag, recording, run};
 
 #[test]
-fn a_difference_is_told_of_what_both_could_have_told() {
+fn differences_are_limited_to_what_both_can_show() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "a.bag", &recording(HEALTHY, 0));
@@ -91,7 +91,7 @@ fn a_difference_is_told_of_what_both_could_have_told() {
 }
 
 #[test]
-fn what_one_recording_cannot_tell_is_folded_below_the_differences() {
+fn unobservable_elements_are_listed_below_the_differences() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "a.bag", &recording(HEALTHY, 0));

@@ -10,7 +10,7 @@ const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mca
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 
 #[test]
-fn a_run_keeps_the_expectation_written_from_it() {
+fn a_run_passes_its_own_expectation() {
     let dir = tempfile::tempdir().unwrap();
     let mut bags = vec![PathBuf::from(COURIER), PathBuf::from(WAREHOUSE)];
     bags.push(bag(dir.path(), "robot.bag", &recording(HEALTHY, 0)));
@@ -60,7 +60,7 @@ fn recordings(folder: &Path, all: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn every_bag_at_hand_keeps_its_own_expectation() {
+fn every_available_bag_passes_its_own_expectation() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let mut bags = Vec::new();
@@ -88,7 +88,7 @@ fn every_bag_at_hand_keeps_its_own_expectation() {
 }
 
 #[test]
-fn names_that_are_no_keys_find_no_room_in_an_expectation() {
+fn names_that_are_not_valid_keys_are_left_out() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let mut robot = recording(HEALTHY, 0);
@@ -104,7 +104,7 @@ fn names_that_are_no_keys_find_no_room_in_an_expectation() {
 }
 
 #[test]
-fn other_recordings_of_one_mission_keep_its_expectation() {
+fn other_recordings_of_one_mission_pass_its_expectation() {
     let pairs = [
         (
             "data/warehouse/warehouse.bag",
@@ -141,7 +141,7 @@ fn other_recordings_of_one_mission_keep_its_expectation() {
 
 /// Nodes of ROS 2 are named as they start, and by what they log.
 #[test]
-fn a_recorder_that_came_late_proves_no_node_missing() {
+fn a_late_recorder_proves_no_node_missing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     assert_eq!(run(here, &["baseline", COURIER, "-o", "g.yaml"]).0, 0);

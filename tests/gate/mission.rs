@@ -115,7 +115,7 @@ type Step = (
 );
 
 #[test]
-fn from_one_reconfiguration_to_the_next_exactly_its_rule_breaks() {
+fn each_reconfiguration_breaks_exactly_its_rule() {
     let Some(bag) = shared("data/bags/mission/mission.bag") else {
         return;
     };

@@ -116,7 +116,7 @@ fn hostile_names_are_inert_in_every_format() {
 }
 
 #[test]
-fn every_result_stands_at_a_line_and_annotations_are_few() {
+fn every_result_has_a_line_and_annotations_are_few() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
@@ -163,7 +163,7 @@ fn every_result_stands_at_a_line_and_annotations_are_few() {
 }
 
 #[test]
-fn no_report_is_larger_than_its_reader_takes() {
+fn no_report_exceeds_its_readers_limit() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let mut robot = recording(HEALTHY, 0);
@@ -237,7 +237,7 @@ fn no_report_is_larger_than_its_reader_takes() {
 }
 
 #[test]
-fn services_find_the_file_by_its_path_in_the_repository() {
+fn reports_use_paths_in_the_repository() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));

@@ -53,7 +53,7 @@ fn recording(mission: Mission, shift: i64) -> Recording {
 }
 
 #[test]
-fn each_fault_of_time_is_found_and_a_third_healthy_run_is_not() {
+fn each_timing_fault_is_found_and_a_third_healthy_run_passes() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "a.bag", &recording(GOOD, 0));
@@ -149,7 +149,7 @@ fn each_fault_of_time_is_found_and_a_third_healthy_run_is_not() {
 }
 
 #[test]
-fn a_topic_that_is_named_and_has_no_message_is_missing() {
+fn a_listed_topic_without_messages_is_missing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     // Its action client publishes it, and never cancels.
@@ -174,7 +174,7 @@ fn a_topic_that_is_named_and_has_no_message_is_missing() {
 }
 
 #[test]
-fn a_node_that_only_its_log_names_is_unknown_without_it() {
+fn a_node_named_only_by_its_log_is_unknown_without_it() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(GOOD, 0));
@@ -199,7 +199,7 @@ fn a_node_that_only_its_log_names_is_unknown_without_it() {
 }
 
 #[test]
-fn two_healthy_runs_do_not_differ_in_order_or_by_seconds() {
+fn two_healthy_runs_do_not_differ_in_order_or_timing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "a.bag", &recording(GOOD, 0));

@@ -39,7 +39,7 @@ fn every_format_of_every_command_is_honoured() {
 }
 
 #[test]
-fn events_are_rows_lines_and_cells() {
+fn events_are_printed_in_every_format() {
     let dir = tempfile::tempdir().unwrap();
     let events = |format: &str| printed(dir.path(), &["events", COURIER, "--format", format]);
     let many = events("text").lines().count();
@@ -134,7 +134,7 @@ fn no_name_is_raw_in_a_text_on_standard_output() {
 }
 
 #[test]
-fn nothing_that_is_typed_steers_the_terminal() {
+fn arguments_cannot_control_the_terminal() {
     let dir = tempfile::tempdir().unwrap();
     let bad = "\u{1b}[2J\u{202e}\n::error::x\u{9b}";
     let option = format!("--{bad}");
@@ -160,7 +160,7 @@ fn nothing_that_is_typed_steers_the_terminal() {
 }
 
 #[test]
-fn json_that_is_printed_holds_the_names_as_they_are() {
+fn printed_json_contains_the_exact_names() {
     let dir = tempfile::tempdir().unwrap();
     let bag = steering(dir.path());
     let json: serde_json::Value =
@@ -171,7 +171,7 @@ fn json_that_is_printed_holds_the_names_as_they_are() {
 }
 
 #[test]
-fn tables_hold_no_formulas() {
+fn tables_contain_no_formulas() {
     let dir = tempfile::tempdir().unwrap();
     let bag = steering(dir.path());
     let output = bagreel(dir.path(), &["render", &bag, "-o", "x.csv"]);

@@ -74,7 +74,7 @@ fn ignores_hangups(child: &Child) -> bool {
 }
 
 #[test]
-fn every_signal_ends_what_waits_with_its_own_code() {
+fn every_signal_ends_waiting_with_its_exit_code() {
     let dir = tempfile::tempdir().unwrap();
     fifo(&dir.path().join("pipe.bag"));
     fifo(&dir.path().join("pipe.toml"));
@@ -118,7 +118,7 @@ fn a_second_signal_ends_at_once() {
 }
 
 #[test]
-fn a_signal_while_files_are_written_leaves_none() {
+fn a_signal_while_writing_leaves_no_files() {
     let dir = tempfile::tempdir().unwrap();
     let warehouse = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     let args = [
@@ -138,7 +138,7 @@ fn a_signal_while_files_are_written_leaves_none() {
 }
 
 #[test]
-fn what_is_to_be_ignored_stays_so() {
+fn ignored_signals_stay_ignored() {
     let dir = tempfile::tempdir().unwrap();
     if Command::new("nohup").arg("true").status().is_err() {
         println!("skipped: there is no nohup");
@@ -178,7 +178,7 @@ fn with_program(folder: &Path, name: &str, text: &str) -> String {
 }
 
 #[test]
-fn a_chattering_ffmpeg_is_heard_out() {
+fn a_verbose_ffmpeg_does_not_block() {
     let dir = tempfile::tempdir().unwrap();
     let bin = tempfile::tempdir().unwrap();
     let chatter = "head -c 200000 /dev/zero | tr '\\0' x >&2; echo >&2; echo 'last words' >&2";
@@ -234,7 +234,7 @@ fn a_hundred_thousand_nodes_fit_into_memory() {
 }
 
 #[test]
-fn a_video_that_holds_nothing_is_an_error() {
+fn an_empty_video_is_an_error() {
     let dir = tempfile::tempdir().unwrap();
     let bin = tempfile::tempdir().unwrap();
     for (then, code, told) in [
