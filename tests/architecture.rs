@@ -1,19 +1,18 @@
-//! Keeps the house in order: the stations of the line, what may use what inside each of them, one dependency in one
-//! folder, and a first sentence for every file.
+//! Checks the architecture: the order of the stations, the layers inside each of them, one folder per dependency, and a
+//! first sentence in every file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The stations, lowest first: each uses only itself and those before it. These are all the doors below `src`.
+/// The stations, lowest first: each uses only itself and those before it. These are all modules directly below `src`.
 const STATIONS: &[&str] = &[
     "base", "bag", "evidence", "graph", "mission", "view", "layout", "draw", "export", "gate",
     "pipeline", "cli",
 ];
 
-/// What stands directly inside a station, floor by floor, lowest first: a file uses only files of lower floors, so
-/// that those of one floor do not know each other. The station's own file, which holds its nouns or its table, is
-/// known to all.
+/// The modules directly inside a station, layer by layer, lowest first: a file only uses files of lower layers, so
+/// files of one layer do not use each other. The station's own file, with its types or its table, may be used by all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
@@ -91,12 +90,12 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
 ];
 
-/// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
+/// Folders whose files do not use each other: kinds of evidence. Steps of engines are listed in their parent instead.
 const SIBLINGS: &[&str] = &["evidence/source"];
 
-/// Where a dependency may be named. What is not listed here may stand in one file, or in one folder with its file.
+/// Where a dependency may be used. One that is not listed may be used in one file, or in one folder and its file.
 const EXCEPTIONS: &[(&str, &[&str])] = &[
-    // Its derives stand on the types that they describe.
+    // Its derives are on the types that they describe.
     ("serde", &[]),
     // Missions, summaries and pages are JSON; YAML becomes its values.
     (
@@ -114,7 +113,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "pipeline/live/bridge",
         ],
     ),
-    // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
+    // Temporary files: outputs, decompressed bags, and times that exceed the memory limit.
     (
         "tempfile",
         &[
@@ -124,17 +123,17 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "export/tables",
         ],
     ),
-    // Bags are read with it, and the graph is written.
+    // Reads bags, writes the graph.
     ("mcap", &["bag/mcap", "export/mcap"]),
     // Launch files, and the answers of a ROS master.
     ("roxmltree", &["evidence/topology", "pipeline/live/master"]),
-    // Names are filtered as in `rqt_graph`; missions are named by a part of a path.
+    // Filters names as in `rqt_graph`; extracts mission names from paths.
     ("regex", &["pipeline/fleet/plan", "view/filter"]),
-    // Times are read and spelled.
+    // Parses and formats times.
     ("chrono", &["base"]),
-    // Plain functions on numbers, as the standard library's would be.
+    // Mathematical functions, like the standard library's.
     ("libm", &[]),
-    // Named for their features alone, so that tests build nothing again.
+    // Listed only for their features, so that tests rebuild nothing.
     ("getrandom", &[]),
     ("once_cell", &[]),
     ("regex_syntax", &[]),
@@ -146,7 +145,7 @@ struct File {
     /// The code without its tests and comments.
     code: String,
     first_line: String,
-    /// Every path inside this crate that it names, in full: `bag::model::Sink`.
+    /// Every path inside this crate that it uses, in full: `bag::model::Sink`.
     uses: Vec<Vec<String>>,
 }
 
@@ -199,7 +198,7 @@ fn file(src: &Path, path: &Path) -> File {
     }
 }
 
-/// Every path of this crate in the code, groups taken apart: `use crate::{bag, base::error::Error}` is two of them.
+/// Every path of this crate in the code, with groups split: `use crate::{bag, base::error::Error}` is two of them.
 fn uses(path: &str, code: &str) -> Vec<Vec<String>> {
     let own: Vec<String> = path.split('/').map(str::to_owned).collect();
     let mut found = Vec::new();
@@ -253,7 +252,7 @@ fn expand(text: &str) -> Vec<Vec<String>> {
     }
 }
 
-/// The members of a group whose opening brace is behind us.
+/// The members of a group after its opening brace.
 fn members(text: &str) -> Vec<&str> {
     let (mut depth, mut start, mut found) = (0, 0, Vec::new());
     for (at, c) in text.char_indices() {
@@ -318,7 +317,7 @@ fn the_top_level_modules_are_the_stations() {
     );
 }
 
-/// Every word behind `prefix` in the code.
+/// Every word after `prefix` in the code.
 fn words_after<'a>(code: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
     code.split(prefix).skip(1).map(|rest| {
         rest.split(|c: char| !c.is_alphanumeric() && c != '_')
@@ -445,7 +444,7 @@ fn each_dependency_is_used_in_one_folder() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Whether this file is `place` or stands in the folder of that name.
+/// Whether this file is `place` or in the folder of that name.
 fn is_below(path: &str, place: &str) -> bool {
     path == place
         || path
@@ -453,7 +452,7 @@ fn is_below(path: &str, place: &str) -> bool {
             .is_some_and(|rest| rest.starts_with('/'))
 }
 
-/// Whether the code names this crate: `name::` that is no module declared or imported here.
+/// Whether the code uses this crate: `name::` that is not a module declared or imported here.
 fn names_crate(file: &File, name: &str) -> bool {
     let own = [
         format!("mod {name};"),
@@ -499,23 +498,23 @@ fn files_stay_short() {
     assert!(long.is_empty(), "{long:#?}");
 }
 
-/// What formats for people, and where else it may stand with a reason.
+/// Code that formats for people, and the other places where it may occur for a reason.
 const SPELLINGS: &[(&str, &[&str])] = &[
-    // A rate. The log of events holds the numbers before it makes a sentence of them.
+    // A rate. The event log has the numbers before it formats them as a sentence.
     (" Hz\"", &["mission/events"]),
     ("} Hz", &["mission/events"]),
     ("} kHz", &[]),
     // A size.
     ("} MB", &[]),
     ("} kB", &[]),
-    // A clock or an offset. The player's script has its own, which a browser runs.
+    // A clock or an offset. The player's script has its own for the browser.
     (":02}:{", &[]),
     // A plural.
     ("{ \"s\" }", &[]),
     ("\"s\" } else", &[]),
-    // A character that nobody sees; names of characters that the font lacks are told in a note.
+    // An invisible character; names of characters that the font lacks are reported in a note.
     ("escape_unicode", &["draw/picture", "evidence/topology"]),
-    // A name that is cut. Labels are cut by their width in the font, not by characters.
+    // A shortened name. Labels are cut by their width in the font, not by characters.
     ("'…'", &["draw/text", "export/report/escape"]),
     ("}…\"", &[]),
 ];

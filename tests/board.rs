@@ -1,4 +1,4 @@
-//! The topic board, and pages for where they are seen: what is drawn, what is refused, what can be read.
+//! Tests of the topic board and of page sizes: what is drawn, refused and legible.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -63,12 +63,12 @@ fn a_mission_without_known_publishers_is_a_board_of_topics() {
         assert!(svg.contains("most publishers are unknown"), "it says why");
         assert!(smallest(svg) >= 9.0);
     }
-    // The head goes on by a window from frame to frame, and all have the width of one.
+    // The playhead advances by a window per frame, and always has the width of one.
     let heads: Vec<(f64, f64)> = frames.iter().map(|svg| head(svg)).collect();
     for pair in heads.windows(2) {
         assert!((pair[1].0 - pair[0].0 - pair[0].1).abs() < 1.0, "{heads:?}");
     }
-    // The rate now: the scan is silent at 1:10, and drives on.
+    // The current rate: the scan is silent at 1:10, and continues.
     assert!(frames[0].contains("5 Hz"));
     assert!(
         text(&folder, "all.svg").contains("attributeName=\"visibility\" calcMode=\"discrete\"")
@@ -86,7 +86,7 @@ fn the_user_chooses_between_graph_and_board() {
         text(&folder, "0.svg").contains("class=\"node"),
         "a graph has nodes"
     );
-    // What only a graph has asks for one, and is refused beside a board.
+    // Options for graphs select a graph, and are refused with a board.
     let (_folder, done) = rendered("courier.mcap", &["--orientation", "TB"], &["{n}.svg"]);
     assert!(done.status.success() && !said(&done).contains("board"));
     for flags in [

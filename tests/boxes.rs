@@ -1,4 +1,4 @@
-//! What boxes say about a window is what its JSON says.
+//! Tests that boxes of a window agree with its JSON.
 
 use std::collections::BTreeMap;
 use std::path::Path;

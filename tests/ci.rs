@@ -1,4 +1,4 @@
-//! The jobs of `examples/ci/`: the commands that stand in them run, and write what lies beside them.
+//! Tests of the jobs in `examples/ci/`: their commands run and reproduce the stored outputs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/ci")
 }
 
-/// A place as a job finds it: the recording, the expectations, and an empty summary.
+/// A job's working folder: the recording, the expectations, and an empty summary.
 fn place() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     fs::create_dir(dir.path().join("out")).unwrap();
@@ -20,7 +20,7 @@ fn place() -> tempfile::TempDir {
     dir
 }
 
-/// Every command of ours in a job, in order.
+/// Every `bagreel` command in a job, in order.
 fn commands(job: &str) -> Vec<String> {
     let text = fs::read_to_string(folder().join(job)).unwrap();
     let lines = text
@@ -32,7 +32,7 @@ fn commands(job: &str) -> Vec<String> {
         .collect()
 }
 
-/// Runs a command as a job does; its exit code and what it printed.
+/// Runs a command as a job does; returns its exit code and output.
 #[cfg(unix)]
 fn run(dir: &Path, command: &str) -> (Option<i32>, String) {
     assert!(!command.contains("${{"), "{command}");
@@ -55,7 +55,7 @@ fn run(dir: &Path, command: &str) -> (Option<i32>, String) {
     )
 }
 
-/// Compares with what lies in `examples/ci/out`; with `ACCEPT=1` puts it there.
+/// Compares with a file in `examples/ci/out`; `ACCEPT=1` overwrites it.
 fn same(name: &str, text: &str) {
     let path = folder().join("out").join(name);
     if std::env::var_os("ACCEPT").is_some() {
@@ -140,8 +140,8 @@ fn third_party_actions_are_pinned() {
     }
 }
 
-/// Runs the script of `setup-bagreel` where a stand-in for `curl` hands out an archive; whether it succeeded, the path it
-/// added, and what it said.
+/// Runs the script of `setup-bagreel` with a fake `curl` that returns an archive: whether it succeeded, the path it
+/// added, and its output.
 #[cfg(target_os = "linux")]
 fn set_up(dir: &Path, sha256: &str) -> (bool, String, String) {
     use std::os::unix::fs::PermissionsExt as _;

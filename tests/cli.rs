@@ -1,4 +1,4 @@
-//! The command as a process: what it answers, where it writes, and what it leaves behind.
+//! Tests of the command as a process: its exit codes, outputs and leftovers.
 
 use std::fs;
 use std::io::Write as _;
@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 
-/// Runs the command in a folder of its own.
+/// Runs the command in its own folder.
 fn bagreel(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .current_dir(folder)
@@ -190,7 +190,7 @@ fn standard_input_has_the_same_counts_as_the_file() {
     assert!(counts(&piped.stdout) == counts(&from_file.stdout));
 }
 
-/// The count of every topic in every window; payload sizes are known only where payloads pass by.
+/// The count of every topic in every window; payload sizes are only known if payloads are read.
 fn counts(json: &[u8]) -> Vec<(String, u64)> {
     let json: serde_json::Value = serde_json::from_slice(json).unwrap();
     let windows = json["windows"].as_array().unwrap();

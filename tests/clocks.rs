@@ -1,5 +1,5 @@
-//! Recordings whose time is no straight line, made of a healthy one: what the robot did is reported as for that one, and
-//! what the recorder did as an interruption.
+//! Tests with recordings whose time is not monotonic, derived from a healthy one: the robot's events are reported as
+//! for that one, and the recorder's as interruptions.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::support::{Publisher, Recording};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A sink that makes a recording of everything.
+/// A sink that copies everything into a recording.
 #[derive(Default)]
 struct Copied(Recording);
 
@@ -98,7 +98,7 @@ impl Healthy {
     }
 }
 
-/// A line about one mission: the numbers of headlines, the restarts, the interruptions, the notes.
+/// One line per mission: the number of headlines, the restarts, the interruptions, the notes.
 fn told(name: &str, recordings: &[Recording]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let place = |(at, recording): (usize, &Recording)| -> PathBuf {

@@ -1,5 +1,5 @@
-//! Every frame counted by script against the data, as it lies in the files: headlines, marks and timeline of SVG frames,
-//! the page, the report, and what a GIF is drawn from.
+//! Compares the counts in every output with the data: headlines, marks and timeline of SVG frames, the page, the
+//! report, and the source of a GIF.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// What the data says of each window: the places of the headlines that lie in it.
+/// For each window in the data: the indices of its headlines.
 fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
     let ledger = mission["ledger"].as_array().unwrap();
     let parts = ledger
@@ -55,7 +55,7 @@ fn groups<'a>(svg: &'a str, class: &'a str) -> impl Iterator<Item = Vec<u64>> + 
     })
 }
 
-/// Renders an example; answers what the terminal says.
+/// Renders an example; returns the terminal output.
 fn rendered(bag: &str, period: &str, folder: &Path) -> String {
     let input = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
@@ -142,7 +142,7 @@ fn alive(svg: &str, window: &Value, at: &str) {
         let (classes, rest) = tag.split_once("\" data-name=\"").unwrap();
         let name = &rest[..rest.find('"').unwrap()];
         let classes: Vec<&str> = classes.split(' ').collect();
-        // An unknown publisher is a box, and no node; so is a namespace that is one box.
+        // Unknown publishers and collapsed namespaces are boxes, not nodes.
         let is_drawn = classes.contains(&"active") && !classes.contains(&"removed");
         if is_drawn && !name.contains(" ?") && !rest.contains(" data-members=") {
             assert!(names.iter().any(|n| is_run(n, name)), "{name} of {at}");
@@ -157,7 +157,7 @@ fn timeline(svg: &str, expected: &[BTreeSet<u64>], at: &str) {
     assert_eq!(marks, all, "timeline of {at}");
 }
 
-/// What the page's chips and jumps are made of, and the elements that it marks in each window.
+/// The data of the page's chips and jumps, and the elements that it marks in each window.
 fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
     let (_, rest) = html
         .split_once(" id=\"data\"")
@@ -240,10 +240,10 @@ fn terminal(said: &str, expected: &[BTreeSet<u64>]) {
     );
 }
 
-/// The strip has room for so many windows.
+/// The most windows in a strip.
 const MOST_PANELS: usize = 12;
 
-/// The strip shows the first window and those with headlines, or those of them with most; others where there is room.
+/// The strip shows the first window and those with headlines, or with most of them; others if there is room.
 fn strip(bag: &str, period: &str, expected: &[BTreeSet<u64>], folder: &Path) {
     let input = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
@@ -286,7 +286,7 @@ fn strip(bag: &str, period: &str, expected: &[BTreeSet<u64>], folder: &Path) {
     assert_eq!(panels.len(), MOST_PANELS.min(expected.len()));
 }
 
-/// Every group of a frame by its id, but for the clock and what tells the time; numbers that people read are gone.
+/// Every group of a frame by its id, except the clock and the timeline; visible numbers are removed.
 fn drawn(svg: &str) -> BTreeMap<&str, String> {
     let mut all = BTreeMap::new();
     for line in svg.lines() {
@@ -294,7 +294,7 @@ fn drawn(svg: &str) -> BTreeMap<&str, String> {
             continue;
         };
         let id = &rest[..rest.find('"').unwrap()];
-        // Labels of rates are numbers all over.
+        // Rate labels consist of numbers.
         if ["clock", "past", "playhead"].contains(&id) || id.ends_with("..over") {
             continue;
         }
@@ -303,7 +303,7 @@ fn drawn(svg: &str) -> BTreeMap<&str, String> {
     all
 }
 
-/// A line of SVG whose texts have one sign for a rate or a count, and that has no tooltip.
+/// A line of SVG with placeholders for rates and counts, without tooltip.
 fn without_numbers(line: &str) -> String {
     let (head, rest) = line.split_once("<title>").unwrap_or((line, ""));
     let rest = rest.split_once("</title>").map_or("", |(_, rest)| rest);
@@ -319,7 +319,7 @@ fn without_numbers(line: &str) -> String {
     out
 }
 
-/// A window without a headline after another such is drawn as that one, but for its clock and its numbers.
+/// A window without a headline after another one is drawn the same, except for clock and numbers.
 fn settled(stem: &Path, expected: &[BTreeSet<u64>], digits: usize) {
     let read = |k: usize| {
         let path = format!("{}{k:0digits$}.svg", stem.display());
@@ -335,8 +335,8 @@ fn settled(stem: &Path, expected: &[BTreeSet<u64>], digits: usize) {
     }
 }
 
-/// The events of earlier windows that are drawn in each: absences that last into it, and whatever ends in it; and
-/// those of them that end.
+/// The events of earlier windows that are drawn in each window: absences that last into it, and those that end in it;
+/// and the latter alone.
 fn lasting(mission: &Value) -> (Vec<BTreeSet<u64>>, Vec<BTreeSet<u64>>) {
     let headlines: BTreeSet<u64> = headlines(mission).into_iter().flatten().collect();
     let ledger = mission["ledger"].as_array().unwrap().iter();

@@ -1,4 +1,4 @@
-//! Damage and deceit: what is left is read, nothing is invented, and what is missing is said.
+//! Tests of damaged and manipulated bags: intact data is read, nothing is invented, and losses are reported.
 
 mod every_byte;
 
@@ -28,7 +28,7 @@ fn read_bytes(name: &str, bytes: &[u8]) -> (Report, Kept) {
     read(&path, Want::Payload).unwrap()
 }
 
-/// Runs the command; answers its exit code and what it said, results first.
+/// Runs the command; returns its exit code and output, results first.
 fn bagreel(args: &[&str]) -> (Option<i32>, String) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
     said(&run.args(args).output().unwrap())
@@ -109,7 +109,7 @@ fn a_flipped_bit_neither_loses_nor_invents_messages_silently() {
             bytes[at] ^= bit;
             let (_dir, path) = placed(name, &bytes);
             let Ok((report, kept)) = read(&path, Want::Payload) else {
-                // The first bytes say what it is, and there is no second copy of them.
+                // The magic bytes identify the format and have no second copy.
                 assert!(at < 16, "{name}: bit {bit} of byte {at}");
                 continue;
             };
@@ -175,7 +175,7 @@ fn messages_lost_from_a_chunk_are_counted_by_its_index() {
         bytes[at] ^= 0x10;
         let (report, kept) = read_bytes("x.mcap", &bytes);
         assert_eq!(kept.stamps.len(), truth, "byte {at}: {:?}", kept.notices);
-        // Some bits of a Zstandard frame mean nothing.
+        // Some bits of a Zstandard frame are ignored.
         let harmless = kept.payloads() == whole.payloads();
         assert!(
             harmless || !report.complete,
@@ -271,7 +271,7 @@ fn connections_that_only_the_chunks_describe_are_found_there() {
     let options = mcap::Options::default();
     let mut bytes = mcap::write(&recording, &options);
     let topic = bytes.windows(5).rposition(|w| w == b"/scan").unwrap();
-    // Before a topic stand its length, the schema, the channel.
+    // A topic is preceded by its length, the schema, the channel.
     bytes[topic - 8] ^= 0x40;
     let (_, kept) = read_bytes("x.mcap", &bytes);
     assert_eq!(kept.counts(), recording.counts(), "{:?}", kept.notices);
@@ -441,7 +441,7 @@ fn a_second_reader_that_stops_verifies_nothing() {
         code == Some(0) && told.contains("counts the same"),
         "{told}"
     );
-    // The checksum of the last chunk stands before the name of its compression.
+    // The checksum of the last chunk precedes the name of its compression.
     let last = bytes
         .windows(4)
         .enumerate()
@@ -625,14 +625,14 @@ fn a_link_out_of_a_folder_is_not_followed() {
             why.contains("link.db3") && why.contains("not followed"),
             "{why}"
         );
-        // Beside a file of the folder's own it stays out as well.
+        // It is also ignored beside a file of the folder's own.
         sqlite3::write(&recording, &dir.path().join("own.db3"));
         let (_, kept) = read(dir.path(), Want::Stamps).unwrap();
         assert_eq!(kept.stamps.len(), recording.messages.len());
     }
 }
 
-/// A chunk whose compressed zeros unfold to terabytes, in a ROS 1 bag that is read in each of the three ways.
+/// A chunk whose compressed zeros expand to terabytes, in a ROS 1 bag that is read in each of the three ways.
 fn bombs() -> Vec<(&'static str, Vec<u8>)> {
     let mut recording = Recording::default();
     let bomb = recording.publisher("/rosout", "/rosout", "rosgraph_msgs/Log");
@@ -650,7 +650,7 @@ fn a_decompression_bomb_is_refused_in_every_format() {
     }
 }
 
-/// The numbers of the reports that come with the hostile files, where those are.
+/// Compares with the reports that come with the hostile files, if available.
 #[test]
 fn hostile_files_are_read_as_far_as_possible() {
     let Some(folder) = support::shared("data/hostile") else {

@@ -1,4 +1,4 @@
-//! The README and the docs are true: their commands run, their links lead somewhere, and their tables are the code's tables.
+//! Tests of README and docs: their commands run, their links are valid, and their tables match the code.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -75,7 +75,7 @@ fn words(command: &str) -> Vec<String> {
     words.into_iter().filter(|word| !word.is_empty()).collect()
 }
 
-/// A folder that holds what the commands of README and docs name: the examples, and an expectations file.
+/// A folder with the files used in README and docs: the examples, and an expectations file.
 fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let examples = root().join("examples");
@@ -156,7 +156,7 @@ fn every_command_of_readme_and_docs_runs() {
         for command in commands(text) {
             let output = run(command, dir.path());
             let said = String::from_utf8_lossy(&output.stderr);
-            // Equal missions differ in nothing, and a run matches its own baseline.
+            // Equal missions have no differences, and a run matches its own baseline.
             assert_eq!(
                 output.status.code(),
                 Some(0),
@@ -174,7 +174,7 @@ fn links_in_readme_and_docs_are_valid() {
     let mut seen = 0;
     for (path, text) in pages() {
         let folder = path.parent().unwrap();
-        // Blocks of code hold examples.
+        // Code blocks contain examples.
         let text: String = text.split("```").step_by(2).collect();
         let targets = text
             .split("](")

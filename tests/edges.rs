@@ -1,4 +1,4 @@
-//! Edges that no header names: hand-made missions, and what is concluded from each.
+//! Tests of edges that no header names: hand-made missions and the conclusions from each.
 
 use std::collections::BTreeSet;
 
@@ -52,7 +52,7 @@ fn recorded(bag: &Recording, options: CollectOptions) -> Recorded {
     collector.finish().unwrap()
 }
 
-/// What is concluded from a recording, with the pieces of evidence on `why`.
+/// The conclusions from a recording, with the evidence for `why`.
 fn concluded(bag: &Recording, options: CollectOptions) -> (Built, Vec<EvidenceLine>) {
     let recorded = recorded(bag, options);
     let span = recorded.span.unwrap();
@@ -173,7 +173,7 @@ fn throttled() -> Recording {
     bag
 }
 
-/// The edges by equal payloads, where they were asked for.
+/// The edges by equal payloads, if requested.
 fn copies(bag: &Recording) -> Vec<String> {
     let options = CollectOptions {
         payload_bytes: u64::MAX,
@@ -232,7 +232,7 @@ fn equal_constants_are_not_copies() {
     assert!(copies(&bag).is_empty());
 }
 
-/// A talker and a listener of ROS 2 that log what they send and hear, and a node that counts.
+/// A ROS 2 talker and listener that log what they send and receive, and a node that counts.
 fn chatter(says: &str, hears: &str) -> Recording {
     let mut bag = Recording::default();
     let topic = bag.topic2("/chatter", "std_msgs/msg/String");
@@ -263,9 +263,9 @@ fn log_texts_that_repeat_a_message_reveal_its_publisher_and_subscriber() {
         edges(&chatter("Publishing: '%'", "I heard: [%]"), "echo"),
         expected
     );
-    // Without a verb the one who is first sends.
+    // Without a verb, the first to log is the publisher.
     assert_eq!(edges(&chatter("say %", "and %"), "echo"), expected);
-    // Without a verb nothing is known of who comes later, unless somebody is known to send.
+    // Without a verb, the later node's role is unknown unless the publisher is known.
     assert!(edges(&chatter("idle", "and %"), "echo").is_empty());
 }
 
@@ -409,7 +409,7 @@ fn unnamed_publishers_are_counted() {
         .collect();
     assert_eq!(unknown, [None, Some(2)]);
     assert_eq!(edges(&bag, "unknown"), ["/scan ? ×2 > /scan declared"]);
-    // The box says nothing of its topic's life.
+    // The box implies nothing about its topic's lifetime.
     let mut bag = logging(&[("/boss", "a.cpp")], &[]);
     let scan = bag.topic2("/scan", "sensor_msgs/msg/LaserScan");
     bag.publishers[scan].qos = offer.to_owned();
@@ -465,7 +465,7 @@ fn complete_lists_override_conventions() {
         let edges = edges(bag, "action");
         edges.contains(&"/go/status > /boss inferred".to_owned())
     };
-    // A list at a node's start may lack what comes later.
+    // A list at a node's start may lack later topics.
     assert!(of_boss(&bag));
     bag.at(log, 9000, log1("/boss", "still up", "boss.py", own));
     assert!(!of_boss(&bag));
@@ -486,9 +486,9 @@ fn listed(node: &str, topics: &[&str]) -> Recording {
 
 #[test]
 fn a_complete_list_contradicts_rules() {
-    // The node listens to `/tf_static` by its own list, which leaves `/tf` out.
+    // The node's own list contains `/tf_static` but not `/tf`.
     assert!(edges(&listed("/amcl", &["/rosout", "/tf_static"]), "tf_pair").is_empty());
-    // roscpp's list holds no subscriptions, so it says nothing against them.
+    // roscpp's list contains no subscriptions, so it does not contradict them.
     let mut bag = listed("/amcl", &["/rosout"]);
     let log = bag.publishers.len() - 1;
     bag.messages.retain(|m| m.0 != log);
@@ -625,7 +625,7 @@ fn why_lists_conclusions_as_evidence() {
     );
 }
 
-/// A robot of two nodes, with what the user tells of it besides.
+/// A robot of two nodes, with additional entries from the user.
 fn told(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
@@ -669,7 +669,7 @@ fn an_end_given_by_the_user_is_exclusive() {
         let nodes = built.graphs.iter().map(|g| g.nodes.len());
         nodes.collect::<Vec<_>>()
     };
-    // With the node `/rosout`, which every mission of ROS 1 has.
+    // Including the node `/rosout`, which every ROS 1 mission has.
     assert_eq!(there(5), [3, 2]);
     assert_eq!(there(6), [3, 3]);
 }
@@ -738,10 +738,10 @@ fn publishers_without_messages_in_the_range_are_declared() {
         serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     let nodes = mission["windows"][0]["nodes"].as_array().unwrap();
     let state = |name: &str| nodes.iter().find(|n| n["name"] == name).unwrap()["state"].clone();
-    // It starts in the fifth minute; the bag names it in its headers.
+    // It starts in the fifth minute and is named in the bag's headers.
     assert_eq!(state("/robot1/dock_controller"), "declared");
     assert_eq!(state("/robot1/amcl"), "active");
-    // What follows from a node's name still tells of its topic.
+    // Conclusions from a node's name still apply to its topic.
     let topics = mission["windows"][0]["topics"].as_array().unwrap();
     let joints = topics.iter().find(|t| t["name"] == "/robot1/joint_states");
     let evidence = joints.unwrap()["evidence"].as_array().unwrap();

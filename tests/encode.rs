@@ -1,4 +1,4 @@
-//! All formats of one run against each other: decoded by libraries of their own, every frame, every pixel.
+//! Compares all formats of one run with each other, decoded by independent libraries: every frame, every pixel.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -88,7 +88,7 @@ fn mission(windows: usize) -> (Mission, View) {
     )
 }
 
-/// Shows a mission of eight windows to these outputs, all in `folder`.
+/// Writes a mission of eight windows to these outputs, all in `folder`.
 fn show(folder: &Path, names: &[&str], options: SequenceOptions) -> Result<Vec<Written>> {
     let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
     shown(
@@ -322,7 +322,7 @@ fn a_full_disk_ends_the_run_and_names_the_file() {
     )
     .unwrap_err();
     assert!(error.to_string().contains("full.gif"), "{error}");
-    // The other one was whole before.
+    // The other one was complete before.
     assert_eq!(names(folder.path()), ["a.apng", "full.gif"]);
 }
 
@@ -335,7 +335,7 @@ fn formats_with_all_windows_refuse_a_window_number() {
     }
 }
 
-/// Whether a program of another project is there to check with; says so if not.
+/// Whether a third-party program is available for the check; prints a line if not.
 fn has(program: &str) -> bool {
     let run = Command::new(program).arg("-version").output();
     let run = run.or_else(|_| Command::new(program).arg("-v").output());

@@ -1,4 +1,4 @@
-//! What bags say about the graph, against what really happened where that is known.
+//! Compares the graph reconstructed from bags with the ground truth, if known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use bagreel::internals::graph::{self, Built};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A file of the project or of the shared data, or a line that says why the test is skipped.
+/// A file of the project or of the shared data; otherwise prints why the test is skipped.
 fn shared(file: &str) -> Option<PathBuf> {
     let below = match file {
         "warehouse/warehouse.bag" => "examples/warehouse.bag",
@@ -62,7 +62,7 @@ fn built(collector: Collector) -> (Built, Vec<Span>) {
 /// Names of nodes, or of both ends of edges, in one window.
 type Names = BTreeSet<Vec<String>>;
 
-/// Nodes, publications and subscriptions of one window, in the words of the truth.
+/// Nodes, publications and subscriptions of one window, in the ground truth's notation.
 fn names(built: &Built, window: usize) -> [Names; 3] {
     let (all, graph) = (&built.elements, &built.graphs[window]);
     let node = |id: u32| all.nodes[id as usize].name.as_str().to_owned();
@@ -130,7 +130,7 @@ fn degrees((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]; 4]
     counts
 }
 
-/// Asserts that each degree is as often right as it promises.
+/// Asserts that each degree has its stated precision.
 fn assert_promise(counts: &[[u32; 2]; 4], of: &str) {
     for (degree, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
         let [right, wrong] = counts[degree].map(f64::from);
@@ -171,7 +171,7 @@ fn every_degree_has_its_stated_precision() {
     assert_promise(&counts, "all");
 }
 
-/// One connection per topic, with the header of the first: so tools write bags anew.
+/// One connection per topic, with the header of the first, as in bags rewritten by tools.
 fn merged(tape: &mut Tape) {
     let mut first: BTreeMap<String, ConnectionId> = BTreeMap::new();
     let mut order: Vec<_> = tape
@@ -208,7 +208,7 @@ fn a_node_ends_although_its_topic_continues() {
     let found = replayed(&tape, |connection| used.contains(&connection.id));
     assert_promise(&degrees(&found, &truth), "merged");
     let (built, _) = &found;
-    // It was ended after three minutes; half a minute later another node took its status topic over.
+    // It was stopped after three minutes; half a minute later another node took over its status topic.
     let windows: Vec<usize> = (0..33)
         .filter(|w| names(built, *w)[0].contains(&vec!["/mission_executor".to_owned()]))
         .collect();
@@ -294,7 +294,7 @@ fn compressed_recordings_have_the_same_evidence() {
         let Some([nodes, publishes, subscribes]) = score else {
             return;
         };
-        // What is wrong in one of the two comes from its windows, which begin a quarter of a second after the truth's.
+        // Errors in one of the two come from its windows, which begin a quarter of a second after the truth's.
         assert!(
             nodes.0 >= 0.979 && nodes.1 >= 0.979 && publishes.0 >= 0.98 && publishes.1 >= 0.98,
             "{bag}: {score:?}"
@@ -340,7 +340,7 @@ fn headers_of_a_rewritten_bag_are_not_trusted() {
     }
 }
 
-/// The windows in which a node is there.
+/// The windows in which a node is alive.
 fn life(built: &Built, node: &str) -> Vec<usize> {
     let there = |window: &usize| {
         names(built, *window)[0]
@@ -388,7 +388,7 @@ fn starts_stops_crashes_and_restarts_are_detected_exactly() {
     assert_eq!(restarts, ["/planner", "/localizer"]);
 }
 
-/// Keeps what a reader says, so that it can be said again in another order.
+/// Records a reader's calls, so that they can be replayed in another order.
 #[derive(Default)]
 struct Tape {
     connections: Vec<Connection>,
@@ -417,7 +417,7 @@ impl Sink for Tape {
     fn notice(&mut self, _: Notice) {}
 }
 
-/// A fixed disorder.
+/// A deterministic shuffle.
 fn shuffle<T>(list: &mut [T]) {
     let mut seed = 1_u64;
     for at in (1..list.len()).rev() {
@@ -449,7 +449,7 @@ fn taped(path: &Path) -> Tape {
     tape
 }
 
-/// The graphs of what was taped, with the connections that are wanted.
+/// The graphs of the recorded calls, for the wanted connections.
 fn replayed(tape: &Tape, wanted: impl Fn(&Connection) -> bool) -> (Built, Vec<Span>) {
     let mut collector = Collector::new(CollectOptions::default());
     let mut progress = |_, _| ();

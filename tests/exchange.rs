@@ -1,4 +1,4 @@
-//! What the field's tools record about the graph, read; and the graph in the field's formats, written.
+//! Tests of reading graph data recorded by other tools, and of writing the graph in exchange formats.
 
 use std::fs;
 use std::path::Path;
@@ -24,7 +24,7 @@ fn written(bag: &Recording, folder: &Path, name: &str) -> std::path::PathBuf {
     path
 }
 
-/// A lidar of which the recorder loses five seconds, and which nobody with reliable transport can hear.
+/// A lidar of which the recorder loses five seconds, and which is incompatible with reliable subscribers.
 fn lossy() -> Recording {
     let mut bag = Recording::default();
     let scan = bag.publisher("", "/scan", "sensor_msgs/msg/LaserScan");
@@ -83,7 +83,7 @@ fn losses_starved_subscribers_and_double_names_are_events_and_findings() {
     ] {
         assert!(log.contains(line), "{line}: {log}");
     }
-    // The gap is the recorder's.
+    // The recorder caused the gap.
     assert!(!log.contains("silent"), "{log}");
     let expect = folder.path().join("graph.yaml");
     fs::write(

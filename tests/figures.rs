@@ -1,4 +1,4 @@
-//! Figures for papers: exact on paper, never too small to read, nothing over anything.
+//! Tests of figures for papers: exact size, legible text, no overlaps.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::support::{pdf::letters_pt, shared};
 
-/// The text of a figure as SVG, or what the command said against it.
+/// A figure as SVG text, or the command's error.
 fn figure(bag: &Path, flags: &[&str]) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
     let svg = folder.path().join("figure.svg");
@@ -42,7 +42,7 @@ fn drawn() -> &'static [String] {
     })
 }
 
-/// The width and height in millimetres that the page says.
+/// The stated width and height of the page in millimetres.
 fn size_mm(svg: &str) -> (f64, f64) {
     let of = |name: &str| {
         let from = svg.find(&format!(" {name}=\"")).unwrap() + name.len() + 3;
@@ -83,7 +83,7 @@ fn every_figure_has_the_requested_width_and_a_limited_height() {
     }
 }
 
-/// How many topic names a map says that it leaves out, and of how many.
+/// The number of topic names that a map reports as left out, and their total.
 fn left_out(svg: &str) -> (u32, u32) {
     let between = svg.split('<').filter_map(|tag| tag.split_once('>'));
     let text = between.map(|(_, text)| text).collect::<Vec<_>>().join(" ");
@@ -107,7 +107,7 @@ fn a_map_omits_few_topic_names_and_reports_them() {
 fn steps_show_the_requested_phases_or_list_the_available() {
     let svg = figure(&example(), &["--kind", "steps", "--steps", "3"]).unwrap();
     assert!(svg.contains("2 → 3") && !svg.contains("3 → 4"));
-    // The log knows of no hand-over here: the planner went on.
+    // The log has no hand-over here: the planner continued.
     assert!(!svg.contains("plan: planner → replanner"));
     assert!(svg.contains("5 smaller steps left out"));
     let last = figure(&example(), &["--kind", "steps", "--steps", "7"]).unwrap();
@@ -224,7 +224,7 @@ fn a_latex_figure_has_a_caption_and_compiles() {
     }
 }
 
-/// The page of the examples: its script makes the figures and sets it.
+/// The example paper: its script draws the figures and typesets it.
 #[test]
 fn the_example_paper_is_built_by_its_script() {
     let latex = Command::new("pdflatex").arg("--version").output();
@@ -300,7 +300,7 @@ fn no_letter_in_a_pdf_is_below_six_points() {
     }
 }
 
-/// A mission of many nodes in nested namespaces, two of which come and one of which goes half way.
+/// A mission of many nodes in nested namespaces, two of which start and one of which stops halfway.
 fn large() -> Value {
     let start = 1_700_000_000_000_000_000_i64;
     let second = 1_000_000_000_i64;
@@ -349,7 +349,7 @@ fn too_many_nodes_are_grouped_by_shorter_namespaces() {
             together.iter().any(|words| svg.contains(words)),
             "{kind} draws no two as one"
         );
-        // What comes and goes is no member of a group that stays.
+        // Nodes that start or stop are not in a constant group.
         assert!(svg.contains("node33"), "{kind} hides who goes");
     }
     let Some(huge) = shared("data/graphs/huge.json") else {

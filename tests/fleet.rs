@@ -1,5 +1,5 @@
-//! The tables of many bags: a row for every bag, shards and interrupted runs that make the same whole, parts of a bag
-//! that merge to it, and counts that are those of a mission read on one machine.
+//! Tests of the tables of many bags: a row per bag, shards and interrupted runs that add up, parts that merge, and
+//! counts that equal those of a mission read at once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,7 +23,7 @@ use crate::support::{self, parquet_rows, rosbag1};
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier");
-/// Of ours in the project: several chunks or one, every storage, damaged ones, empty ones.
+/// Bags in the project: several chunks or one, every storage, damaged ones, empty ones.
 const OURS: &[&str] = &[
     WAREHOUSE,
     COURIER,
@@ -59,13 +59,13 @@ fn files(folder: &Path, table: &str) -> Vec<PathBuf> {
     files
 }
 
-/// All rows of a table, whatever its files.
+/// All rows of a table, from all its files.
 fn table(folder: &Path, table: &str) -> impl Iterator<Item = Row> {
     let files = files(folder, table).into_iter();
     files.flat_map(|file| parquet_rows(&file))
 }
 
-/// The rows of a table as text, sorted: whatever the files, the same rows are the same.
+/// The rows of a table as text, sorted, so that the division into files does not matter.
 fn rows(folder: &Path, name: &str) -> Vec<String> {
     let mut all: Vec<String> = table(folder, name).map(|row| row.to_string()).collect();
     all.sort();
@@ -99,7 +99,7 @@ fn sum(folder: &Path, name: &str, of: &str) -> i64 {
     column(folder, name, of).map(number).sum()
 }
 
-/// A folder of bags: good ones, an empty one, a cut one, a foreign file that calls itself a bag.
+/// A folder of bags: good ones, an empty one, a cut one, a foreign file with a bag's extension.
 fn fleet(folder: &Path) {
     let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
     let put = |name: &str, bytes: &[u8]| {
@@ -250,7 +250,7 @@ fn existing_counts_are_kept_and_outdated_ones_replaced() {
     let said = ends(dir.path(), &args, 0);
     assert!(said.contains("0 bags (7 there already)"), "{said}");
     assert_eq!(rows(&table, "counts"), before);
-    // Another period is another table, and takes the place of the old one.
+    // A table with another period replaces the old one.
     let said = ends(dir.path(), &[&args[..], &["--period", "5s"]].concat(), 3);
     assert!(
         said.contains("7 bags (2 unreadable") || said.contains("7 bags (1 unreadable"),
@@ -297,7 +297,7 @@ fn a_killed_run_leaves_complete_files_and_can_be_resumed() {
     {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    // A signal that nobody can catch.
+    // A signal that cannot be caught.
     child.kill().unwrap();
     child.wait().unwrap();
     let table = dir.path().join("t");
@@ -368,7 +368,7 @@ fn counted(path: &str, part: Option<Span>, detail: CountDetail) -> CountedBag {
     count(&planned(path), &tally).unwrap()
 }
 
-/// The whole of each bag of ours, counted once.
+/// The complete counts of each bag in the project, made once.
 fn wholes() -> &'static Vec<CountedBag> {
     static ALL: OnceLock<Vec<CountedBag>> = OnceLock::new();
     ALL.get_or_init(|| {
@@ -387,8 +387,8 @@ fn json(mission: &Mission) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever the bag and wherever its time is cut, in whatever order the parts come: the whole, and the mission made
-    /// of it, to the last byte.
+    /// For any bag, any cuts of its time and any order of the parts, the merged counts and the mission are identical to
+    /// the byte.
     #[test]
     fn any_split_merges_to_the_whole(
         bag in 0..OURS.len(),
@@ -472,7 +472,7 @@ fn finished_counts_equal_the_mission_read_directly() {
                 sent.map(|e| (name(e.id), format!("{:?} {:?}", e.count, e.hz)))
                     .collect()
             };
-            // Of ROS 2, evidence beside the index names publishers.
+            // In ROS 2, other evidence than the index names publishers.
             if path == WAREHOUSE {
                 assert_eq!(
                     edges(&made, &a),

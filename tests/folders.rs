@@ -1,4 +1,4 @@
-//! What a folder is to each command: one recording, several, a copy, or nothing.
+//! Tests of what each command takes a folder for: one recording, several, a copy, or nothing.
 
 use std::fs;
 use std::path::Path;
@@ -34,18 +34,18 @@ fn mcap2(path: &Path, number: i64) {
 
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - run_0.mcap\n";
 
-/// What the commands that take one mission say of a folder.
+/// How commands that take one mission treat a folder.
 enum Is {
     /// One recording.
     One,
-    /// One recording, with a note that holds these words.
+    /// One recording, with a note that contains this text.
     Noted(&'static str),
-    /// An error that holds these words.
+    /// An error that contains this text.
     Refused(&'static str),
 }
 
-/// A name, what makes the folder, what it is to commands that take one mission, and the rows of a survey; 0 rows: `info`
-/// shows the one recording.
+/// The name, the function that creates the folder, the result of commands that take one mission, and the rows of a
+/// survey; 0 rows: `info` shows the one recording.
 type Row = (&'static str, fn(&Path), Is, usize);
 
 #[rustfmt::skip]

@@ -1,5 +1,5 @@
-//! Recordings that grow while they are followed: what is written at the end is what the closed recording tells, byte for byte,
-//! and the lines that held are its event log.
+//! Tests of following growing recordings: the final outputs equal those of the closed recording byte for byte, and the
+//! lines that were not revised are its event log.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -240,7 +240,7 @@ fn bagreel(folder: &Path, args: &[&str]) -> Command {
     run
 }
 
-/// Follows a recording from the time at which it can be told what it is.
+/// Follows a recording as soon as its format can be detected.
 fn follow(folder: &Path, what: &str) -> Child {
     bagreel(
         folder,
@@ -254,7 +254,7 @@ fn output(folder: &Path, args: &[&str]) -> Output {
     bagreel(folder, args).output().unwrap()
 }
 
-/// What a line of the log says, without its time, its rates, and the length of a silence: these are known better at the end.
+/// A line of the log without time, rates, and length of a silence, which are more precise at the end.
 fn what(line: &str) -> &str {
     let (_, words) = line.trim_start().split_once("  ").unwrap();
     let end = [" silent", " from ", " → "]
@@ -264,7 +264,7 @@ fn what(line: &str) -> &str {
     &words[..end.unwrap_or(words.len())]
 }
 
-/// What the lines say that held, sorted.
+/// The lines that were not revised, sorted.
 fn held(printed: &[u8]) -> Vec<String> {
     let printed = String::from_utf8(printed.to_vec()).unwrap();
     let mut held: Vec<(String, bool)> = Vec::new();
@@ -367,7 +367,7 @@ fn following_a_database_never_locks_it() {
         sqlite3::write(&mission(), &path);
         let db = Connection::open(&path).unwrap();
         db.execute_batch(pragmas).unwrap();
-        // As rosbag2: no patience at all.
+        // Like rosbag2, without any timeout.
         db.busy_timeout(Duration::ZERO).unwrap();
         let mut follower = bagreel(folder.path(), &["follow", "r.db3", "--idle", "1s"])
             .spawn()

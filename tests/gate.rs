@@ -1,4 +1,4 @@
-//! Expectations: written from runs, held against them, and what each fault of a robot breaks.
+//! Tests of expectations: generated from runs, checked against them, and broken by each fault of a robot.
 
 mod difference;
 mod kept;
@@ -27,7 +27,7 @@ fn said(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// The exit code and what was printed.
+/// The exit code and the output.
 fn run(folder: &Path, args: &[&str]) -> (i32, String) {
     let output = bagreel(folder, args);
     let errors = String::from_utf8(output.stderr.clone()).unwrap();
@@ -328,7 +328,7 @@ fn rules_about_times_after_the_mission_are_not_broken() {
     assert_eq!(check(presence, "25").0, 1);
 }
 
-/// A run, what is left of it after a cut, and expectations of every outcome.
+/// A run, a truncated copy of it, and expectations for every outcome.
 fn outcomes() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
@@ -475,7 +475,7 @@ fn exit_codes_of_diff_and_baseline_match_their_help() {
     );
 }
 
-/// The help of a command tells its exit codes, which begin so and hold that.
+/// Checks the exit codes in a command's help: how they begin, and a part of them.
 fn help_begins(here: &Path, command: &str, first: &str, holds: &str) {
     let (code, said) = run(here, &[command, "--help"]);
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -565,14 +565,14 @@ fn a_silence_across_windows_is_reported_to_the_millisecond() {
         "{said}"
     );
     assert_eq!(check("topics:\n  /scan: {max_gap: 1.9s}").0, 0);
-    // Only the part in the stretch that a rule means counts.
+    // Only the part within the rule's time range counts.
     let (code, said) = check("rules:\n  - {id: r, topic: /scan, max_gap: 0.5s, during: 20.2..}");
     assert!(code == 1 && said.contains("silent for 800 ms"), "{said}");
     assert_eq!(
         check("rules:\n  - {id: r, topic: /scan, max_gap: 0.5s, during: ..19}").0,
         0
     );
-    // What is accepted holds.
+    // Accepted findings do not fail.
     fs::write(
         here.join("g.yaml"),
         "schema: bagreel.expect/1\ntopics:\n  /scan: {max_gap: 0.2s}\n",

@@ -1,4 +1,4 @@
-//! The command under attack: signals, full disks, pipes, files that never end, names that are somebody else's.
+//! Tests of the command in hostile conditions: signals, full disks, pipes, endless files, foreign file names.
 
 use std::fs;
 use std::path::Path;
@@ -82,7 +82,7 @@ fn a_full_disk_is_a_failure_of_every_command() {
             "{args:?}: {}",
             errors(&output)
         );
-        // What clap prints itself has no words for it.
+        // clap's own output has no message for this.
         if !args.iter().any(|a| ["--help", "--version"].contains(a)) {
             let said = errors(&output);
             assert!(
@@ -151,7 +151,7 @@ fn user_files_are_not_overwritten() {
     for args in refused {
         let output = bagreel(dir.path(), args);
         let said = errors(&output);
-        // What is read before the outputs are checked may complain first.
+        // Inputs that are read before the outputs are checked may fail first.
         assert!(
             matches!(output.status.code(), Some(1 | 2)),
             "{args:?}: {said}"
@@ -282,7 +282,7 @@ fn crafted(name: &str) -> String {
     format!("{}/tests/data/hostile/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The exit code of `info`, and the messages that it counts, if it does.
+/// The exit code of `info`, and its message count, if any.
 fn counted(path: &str) -> (Option<i32>, Option<u64>) {
     let output = bagreel(Path::new("."), &["info", "--format", "json", path]);
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
@@ -291,7 +291,7 @@ fn counted(path: &str) -> (Option<i32>, Option<u64>) {
 
 #[test]
 fn damaged_recordings_terminate_and_report_all_losses() {
-    // The messages that each had before it was damaged; `None` where it never had any, or none is left.
+    // The number of messages before the damage; `None` if there never were any, or none is left.
     for (name, all) in [
         ("n0_hang.bag", None),
         ("n0_slow.bag", None),
@@ -350,7 +350,7 @@ fn a_mission_of_three_hundred_years_is_refused() {
     ] {
         let output = bagreel(dir.path(), args);
         let said = errors(&output);
-        // Messages were left out, which is told by the code too.
+        // Skipped messages set the exit code too.
         assert_eq!(output.status.code(), Some(3), "{args:?}: {said}");
         assert!(said.contains("impossible time, set aside"), "{said}");
     }

@@ -1,4 +1,4 @@
-//! What `info` tells of a recording, and what it advises.
+//! Tests of the summary and the advice of `info`.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ fn told(bag: PathBuf) -> Info {
     info(&read(&reading, &mut Unwatched).unwrap())
 }
 
-/// A recording of ROS 2 by a recorder that logs, as a file in a folder of its own.
+/// A ROS 2 recording by a recorder that logs, as a file in its own folder.
 fn recorded() -> (tempfile::TempDir, PathBuf) {
     let mut bag = Recording::default();
     let log = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
@@ -99,7 +99,7 @@ fn the_evidence_of_an_edge_includes_conclusions() {
 fn info_suggests_a_figure_that_fits() {
     let words = |inputs| -> Vec<&str> { told(inputs).figures.iter().map(|f| f.figure).collect() };
     assert_eq!(words(example("warehouse.bag")), ["lives", "map", "steps"]);
-    // One log record and one scan: nobody is known to talk to anybody.
+    // One log record and one scan: no connection is known.
     let (_folder, inputs) = recorded();
     let info = told(inputs);
     assert_eq!(info.figures.len(), 1);

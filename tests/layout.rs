@@ -1,4 +1,4 @@
-//! Any plan, however odd, is laid out so that boxes, routes, frames and labels keep out of each other's way.
+//! Property tests of the layout: in any plan, boxes, routes, frames and labels do not overlap.
 
 #[path = "bench/layout/measure.rs"]
 mod measure;

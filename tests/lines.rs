@@ -1,4 +1,4 @@
-//! Lines between boxes: one per pair, each with the names of its topics, and nothing that changes is folded.
+//! Tests of lines between boxes: one per pair, with the names of its topics; changing elements are not collapsed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;

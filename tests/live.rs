@@ -1,4 +1,4 @@
-//! Live systems: a master of ROS 1 and a server of Foxglove's protocol that play a script on this machine.
+//! Tests of live systems: scripted local servers for the ROS 1 master API and Foxglove's protocol.
 
 use std::collections::BTreeSet;
 use std::io::{Read as _, Write as _};
@@ -11,14 +11,14 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Follows a system until it has said nothing for two seconds.
+/// Follows a system until it has been silent for two seconds.
 fn follow(folder: &Path, more: &[&str]) -> Output {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
     run.current_dir(folder).arg("follow").args(more);
     run.args(["--idle", "2s", "-o", "f.json"]).output().unwrap()
 }
 
-/// What was written at the end: names of nodes, and the ends of edges, of all windows.
+/// The final output: names of nodes, and the ends of edges, of all windows.
 fn graph(folder: &Path) -> (BTreeSet<String>, BTreeSet<String>) {
     let text = std::fs::read_to_string(folder.join("f.json")).unwrap();
     let json: Value = serde_json::from_str(&text).unwrap();
@@ -44,7 +44,7 @@ fn string(text: &str) -> String {
     format!("<value><string>{text}</string></value>")
 }
 
-/// Answers as `rosmaster` does: `/talker` and `/listener` share `/chat`, and the talker is gone after `there`.
+/// Answers like `rosmaster`: `/talker` and `/listener` share `/chat`; the talker exists while `there`.
 fn answer(stream: &mut TcpStream, there: bool) {
     let mut asked = [0; 4096];
     let mut got = 0;
@@ -139,12 +139,12 @@ mod bridge {
 
     use super::{follow, graph};
 
-    /// Says something to the client.
+    /// Sends a message to the client.
     fn say(to: &mut WebSocket<TcpStream>, message: &Value) {
         to.send(Message::text(message.to_string())).unwrap();
     }
 
-    /// The next message of the client's.
+    /// Receives the client's next message.
     fn hear(from: &mut WebSocket<TcpStream>) -> Value {
         serde_json::from_str(from.read().unwrap().to_text().unwrap()).unwrap()
     }
@@ -158,7 +158,7 @@ mod bridge {
         })
     }
 
-    /// As `foxglove_bridge`: the graph comes when a subscription follows the one to the graph.
+    /// Like `foxglove_bridge`: sends the graph when a subscription follows the one to the graph.
     fn serve(stream: TcpStream) {
         #[expect(clippy::result_large_err, reason = "the type is the library's")]
         let protocol = |_: &Request, mut response: Response| {

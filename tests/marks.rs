@@ -1,4 +1,4 @@
-//! One history: every mark in every picture is an event of the log, in the log's words, and every headline has its mark
+//! Tests that pictures agree with the log: every mark is an event with the log's text, and every headline is marked
 //! wherever its element is drawn.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::support::shared;
 
-/// The log of a bag: its events by id, and the sentences in which it tells them.
+/// The log of a bag: its events by id, and their sentences.
 struct Log {
     events: BTreeMap<u64, Value>,
     sentences: BTreeSet<String>,
@@ -22,7 +22,7 @@ impl Log {
             .lines()
             .map(|row| serde_json::from_str::<Value>(row).unwrap());
         let text = said(bag, &["events", "--parts", "--all"]);
-        // A time of thirteen letters, two blanks, and the sentence, which is indented for parts.
+        // A time of thirteen characters, two spaces, and the sentence, which is indented for parts.
         let sentence = |line: &str| line.chars().skip(15).collect::<String>();
         Self {
             events: rows.map(|row| (row["id"].as_u64().unwrap(), row)).collect(),
@@ -61,7 +61,7 @@ fn said(bag: &Path, arguments: &[&str]) -> String {
     String::from_utf8(done.stdout).unwrap()
 }
 
-/// The bags of the examples, and those beside the project.
+/// The bags of the examples and of the shared data.
 fn bags() -> Vec<PathBuf> {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let mut all = vec![
@@ -73,7 +73,7 @@ fn bags() -> Vec<PathBuf> {
     all
 }
 
-/// Renders a bag with these flags; the file's text, or `None` where the command refuses.
+/// Renders a bag with these flags; returns the file's text, or `None` if the command fails.
 fn rendered(bag: &Path, flags: &[&str], name: &str) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
@@ -98,7 +98,7 @@ struct Marked<'a> {
     title: String,
 }
 
-/// The groups that are marks, or may be: those that name events, and those whose class says that they must.
+/// The groups that are or should be marks: those that name events, and those whose class requires it.
 fn marks(svg: &str) -> Vec<Marked<'_>> {
     const SIGNS: [&str; 6] = ["start", "end", "event", "letter", "handover", "mark"];
     let tags = svg.split("<g class=\"").skip(1).map(|rest| {
@@ -241,7 +241,7 @@ fn every_headline_is_marked_in_the_row_of_its_element() {
 
 #[test]
 fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
-    // The table that showed the fault: log, figure, film and page of the example side by side.
+    // Compares log, figure, animation and page of the example.
     let bag = &bags()[0];
     let log = Log::of(bag);
     let headlines = log.headlines();

@@ -1,6 +1,6 @@
-//! Every option of every command changes what comes out, or is refused with a hint: one row for each, and none missing.
+//! Tests that every option of every command changes the output or is refused with a hint: one row each, none missing.
 //!
-//! A row is a command line and what is added to it; the option is the first word that is added.
+//! A row is a command line and the added arguments, of which the first word is the option.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -157,7 +157,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("diff", "r.bag s.mcap --source ws -o out/x.svg", "--source-at worktree"),
 ];
 
-/// Command, its arguments, an option, and what it makes the command say.
+/// Command, its arguments, an option, and the message that it causes.
 #[rustfmt::skip]
 const SAYS: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--verify", "a second reader counts the same"),
@@ -179,7 +179,7 @@ const SAYS: &[(&str, &str, &str, &str)] = &[
     ("tables", "gone.bag -o out", "--on-error fail", "error: cannot read `gone.bag`"),
 ];
 
-/// Command, its arguments, an option that says nothing to them, and the hint.
+/// Command, its arguments, an option without effect, and the hint.
 #[rustfmt::skip]
 const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.gif", "--font c.txt", "hint: give `--font` a .ttf"),
@@ -268,8 +268,8 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("figure", "old.json -o out/x.svg", "--source ws", "hint: give the bag itself"),
 ];
 
-/// Half a minute in which something happens for every option: a rate that falls, a sender that stops, one that comes
-/// back under another name, a filter that copies stamps, housekeeping, a recorder.
+/// Half a minute with something for every option: a rate that drops, a publisher that stops, one that returns under
+/// another name, a filter that copies stamps, housekeeping, a recorder.
 fn recording() -> Recording {
     let mut bag = Recording::default();
     let mut header = |node: &str, topic: &str| {
@@ -281,7 +281,7 @@ fn recording() -> Recording {
     let filtered = header("/ns/nav/filter", "/ns/nav/points");
     for (place, late) in [(image, 0), (filtered, 20_000_000)] {
         for k in 0..150_i64 {
-            // From ten a second to four.
+            // From 10 Hz to 4 Hz.
             let at = if k < 100 {
                 k * 100
             } else {
@@ -313,7 +313,7 @@ fn recording() -> Recording {
     bag
 }
 
-/// The same robot in another run: the log at half its rate, and nobody who talks again.
+/// Another run of the same robot: the log at half its rate, and no publisher that returns.
 fn slow() -> Recording {
     let mut bag = recording();
     let of = |node: &str| bag.publishers.iter().position(|p| p.node == node);
@@ -326,7 +326,7 @@ fn slow() -> Recording {
     bag
 }
 
-/// More than is read of payloads unless somebody asks: 70 messages of 1 MB that do not pack.
+/// More payloads than are read by default: 70 incompressible messages of 1 MB.
 fn large() -> Recording {
     let mut bag = Recording::default();
     let place = bag.publisher("/camera", "/image", "std_msgs/String");
@@ -345,7 +345,7 @@ fn large() -> Recording {
     bag
 }
 
-/// A folder with everything that the rows name.
+/// A folder with all files used in the rows.
 fn folder() -> TempDir {
     let folder = TempDir::new().unwrap();
     let bag = rosbag1::write(&recording(), rosbag1::Pack::Lz4, 4000);
@@ -419,7 +419,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Commits what lies there, long before it was recorded.
+/// Commits the workspace with a date long before the recording.
 fn git(workspace: &Path) {
     for args in [
         "init -q",
@@ -449,10 +449,10 @@ fn text(bytes: &[u8]) -> String {
 /// The results and the files of one run.
 type Outcome = (Vec<u8>, BTreeMap<String, Vec<u8>>);
 
-/// What a command line gives; `None` where it is refused.
+/// The outcome of a command line; `None` if it is refused.
 fn outcome(folder: &Path, command: &str, args: &str, with: &str) -> Option<Outcome> {
     let _ = fs::remove_dir_all(folder.join("out"));
-    // One that is there to be brought up to date.
+    // An existing file to update.
     if args.contains("out/few.yaml") {
         fs::create_dir(folder.join("out")).unwrap();
         fs::copy(folder.join("gone.yaml"), folder.join("out/few.yaml")).unwrap();
@@ -462,7 +462,7 @@ fn outcome(folder: &Path, command: &str, args: &str, with: &str) -> Option<Outco
     match output.status.code() {
         // 3: some topics cannot be decoded.
         Some(0 | 3) => {}
-        // What is found is a result.
+        // Findings are results.
         Some(1) if command == "check" || command == "diff" => {}
         Some(1 | 2) => return None,
         code => panic!("{command} {args} {with}: {code:?} {said}"),

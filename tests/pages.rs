@@ -1,4 +1,4 @@
-//! The page, the animated SVG and the report, as files: driven in a real browser where there is one, and weighed.
+//! Tests of the page, the animated SVG and the report: in a real browser if available, and by size.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -38,8 +38,8 @@ fn render_with(input: &Path, folder: &Path, extensions: &[&str], more: &[&str]) 
     );
 }
 
-/// A mission of windows of ten seconds in which everybody publishes a topic of their own to a listener; who is there
-/// and how fast depends on the window.
+/// A mission of ten-second windows in which every node publishes its own topic to a listener; presence and rates depend
+/// on the window.
 fn running(names: &[&str], windows: usize) -> Value {
     let start = 1_700_000_000_000_000_000_i64;
     let window = |w: usize| {
@@ -139,7 +139,7 @@ fn the_page_in_a_browser_shows_the_mission() {
             file(&pages, "x.md"),
         ])
         .output();
-    // Where `CI` says so, Chromium and axe are a must.
+    // In CI, Chromium and axe are required.
     let is_must =
         std::env::var_os("CI").is_some_and(|ci| !ci.is_empty() && ci != "0" && ci != "false");
     let Ok(driven) = driven else {
@@ -164,7 +164,7 @@ fn the_page_in_a_browser_shows_the_mission() {
     eprint!("{out}");
 }
 
-/// What the script of a page is given.
+/// The data of a page's script.
 fn data_of(page: &str) -> Value {
     let (_, rest) = page
         .split_once("<script id=\"data\" type=\"application/json\">")
@@ -176,7 +176,7 @@ fn read(folder: &TempDir, name: &str) -> String {
     fs::read_to_string(folder.path().join(name)).unwrap()
 }
 
-/// The mission rendered with more options into a folder of its own.
+/// Renders the mission with more options into its own folder.
 fn rendered_with(mission: &Value, extensions: &[&str], more: &[&str]) -> TempDir {
     let folder = TempDir::new().unwrap();
     let input = folder.path().join("in.json");
@@ -238,7 +238,7 @@ fn phases_named_by_the_user_are_shown_everywhere() {
     }
 }
 
-/// An example mission, divided in some way, as a page, data and frames.
+/// An example mission with these window options, as page, data and frames.
 fn divided(more: &[&str]) -> (Value, Value, String) {
     let folder = TempDir::new().unwrap();
     let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/courier.mcap");
@@ -263,7 +263,7 @@ fn divided(more: &[&str]) -> (Value, Value, String) {
     )
 }
 
-/// The windows of a page are those of the mission, and each headline stands in every window that holds its time.
+/// Checks that a page has the mission's windows, and each headline in every window that contains its time.
 fn holds_its_windows(data: &Value, mission: &Value) {
     let windows = mission["windows"].as_array().unwrap();
     let first = windows[0]["start_ns"].as_i64().unwrap();
@@ -322,7 +322,7 @@ fn an_animation_shows_every_rate_in_its_window() {
     let mission = running(&ROBOT, 50);
     let pages = rendered(&mission, &["svg"]);
     let svg = read(&pages, "x.svg");
-    // `/base/battery` sends slower in every second stretch of eleven windows, and is there throughout.
+    // `/base/battery` is slower in every second group of eleven windows, and present throughout.
     let has = |rate: &str| svg.contains(&format!(">{rate}</text>"));
     assert!(has("10 Hz") && has("7.4 Hz"), "{svg}");
     let stretches = |rate: &str| {
@@ -416,7 +416,7 @@ fn a_page_makes_no_requests_and_has_a_strict_policy() {
 fn names_in_a_report_are_escaped() {
     let pages = rendered(&running(&HOSTILE, 12), &["md", "mmd"]);
     let report = fs::read_to_string(pages.path().join("x.md")).unwrap();
-    // Mermaid has entities of its own.
+    // Mermaid has its own entities.
     let (before, rest) = report.split_once("```mermaid").unwrap();
     let words = before.to_owned() + rest.split_once("```").unwrap().1;
     for bad in [
@@ -481,14 +481,14 @@ fn pages_stay_within_their_size() {
         .and_then(|s| s.split("</style>").next())
         .unwrap();
     assert!(fonts.starts_with("@font-face"));
-    // Of which the script and its look are 66,000.
+    // Of which script and CSS are 66,000.
     assert!(
         page.len() - fonts.len() <= 125_000,
         "{}",
         page.len() - fonts.len()
     );
     assert!(page.len() <= 260_000, "{}", page.len());
-    // The drawings of a film, a tenth of it when compressed.
+    // The drawings of an animation; compressed, a tenth of that.
     assert!(
         size(folder.path().join("x.svg")) <= 250_000,
         "{}",

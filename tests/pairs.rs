@@ -1,5 +1,5 @@
-//! Pairs of runs of one mission: a second healthy run keeps the expectation written from the first, and each fault of a
-//! robot breaks what it should and nothing else.
+//! Tests with pairs of runs of one mission: a second healthy run passes the first one's expectation, and each fault
+//! breaks exactly its rules.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -53,8 +53,8 @@ fn loaded(bag: &str) -> Recording {
     run
 }
 
-/// The same mission, run again: events come a second earlier or later than they did, senders start a little later, every
-/// message jitters by 4 ms, and one of 500 is lost.
+/// Another run of the same mission: events are up to a second earlier or later, publishers start a little later, every
+/// message has 4 ms of jitter, and one in 500 is lost.
 fn again(run: &Recording, seed: u64) -> Recording {
     let mut noise = Noise(seed);
     let start = run.messages[0].1;
@@ -72,7 +72,7 @@ fn again(run: &Recording, seed: u64) -> Recording {
         #[expect(clippy::cast_possible_truncation, reason = "less than a second")]
         let wave = wave as i64;
         let moved = at + wave + SECOND + late[*place] + noise.next(8_000_000) - 4_000_000;
-        // One sender's messages stay in order.
+        // Messages of one publisher stay in order.
         let moved = moved.max(last[*place] + 1000);
         last[*place] = moved;
         counted[*place] += 1;
@@ -87,7 +87,7 @@ fn again(run: &Recording, seed: u64) -> Recording {
     }
 }
 
-/// The findings of a check as `id name`, how often each, and how many rules there are.
+/// The findings of a check as `id name` with their counts, and the number of rules.
 fn found(folder: &Path, bag: &str) -> (Vec<String>, usize) {
     let args = ["check", bag, "--expect", "graph.yaml", "--format", "json"];
     let output = bagreel(folder, &args);
@@ -109,7 +109,7 @@ fn found(folder: &Path, bag: &str) -> (Vec<String>, usize) {
     (all, rules.len())
 }
 
-/// The places of a node's publishers.
+/// The indices of a node's publishers.
 fn of(run: &Recording, node: &str) -> Vec<usize> {
     let places = 0..run.publishers.len();
     places
@@ -117,13 +117,13 @@ fn of(run: &Recording, node: &str) -> Vec<usize> {
         .collect()
 }
 
-/// A node that crashes so many seconds after the mission's start.
+/// Makes a node crash this many seconds after the mission's start.
 fn crash(run: &mut Recording, node: &str, second: i64) {
     let own = of(run, node);
     let end = run.messages[0].1 + second * SECOND;
     let is_log = |place: usize| run.publishers[place].topic.starts_with("/rosout");
     let logs: Vec<bool> = (0..run.publishers.len()).map(is_log).collect();
-    // Its own messages, and its log as others pass it on.
+    // Its own messages, and its log as forwarded by others.
     let is_own = |(place, _, payload): &(usize, i64, Vec<u8>)| {
         let told = || payload.windows(node.len()).any(|w| w == node.as_bytes());
         own.contains(place) || logs[*place] && told()
@@ -131,7 +131,7 @@ fn crash(run: &mut Recording, node: &str, second: i64) {
     run.messages.retain(|m| m.1 < end || !is_own(m));
 }
 
-/// A node under a name of the same length, in what it logs too.
+/// Renames a node, in its log too; the name has the same length.
 fn rename(run: &mut Recording, node: &str, name: &str) {
     assert_eq!(node.len(), name.len());
     for place in of(run, node) {
@@ -147,7 +147,7 @@ fn rename(run: &mut Recording, node: &str, name: &str) {
     }
 }
 
-/// A topic of which every second message is gone.
+/// Removes every second message of a topic.
 fn halve(run: &mut Recording, topic: &str) {
     let places: Vec<bool> = run.publishers.iter().map(|p| p.topic == topic).collect();
     let mut nth = 0;
@@ -157,7 +157,7 @@ fn halve(run: &mut Recording, topic: &str) {
     });
 }
 
-/// Somebody else who publishes a topic too, for so many seconds from a second on.
+/// Adds another publisher of a topic between two seconds.
 fn join(run: &mut Recording, node: &str, topic: &str, (from, to): (i64, i64)) {
     let model = run
         .publishers
@@ -364,7 +364,7 @@ fn statistics(topic: &str, from: &str, to: &str, at: i64) -> Vec<u8> {
     payload
 }
 
-/// A lidar whose scans two nodes read, as statistics tell; and who reads them.
+/// A lidar with these subscribers according to statistics.
 fn counted(readers: &[&str]) -> Recording {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
@@ -400,7 +400,7 @@ fn a_subscriber_that_disappears_from_statistics_is_missing() {
     assert_eq!(found(here, "deaf.bag").0, ["subscriber-missing /scan"]);
 }
 
-/// A bag whose connections name nobody, and a log in which few nodes write.
+/// A bag whose connections have no node names, with a log of few nodes.
 #[test]
 fn a_rewritten_bag_without_publishers_proves_no_node_missing() {
     let dir = tempfile::tempdir().unwrap();

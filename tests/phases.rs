@@ -1,4 +1,4 @@
-//! The phases of real missions against when their scripts really changed what ran.
+//! Compares the phases of real missions with the times at which their scripts changed the running nodes.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn mission(path: &Path, length: Length) -> Mission {
     read(&reading, &mut Unwatched).unwrap()
 }
 
-/// The seconds at which phases begin, but for the first.
+/// The seconds at which phases begin, except the first.
 fn boundaries(mission: &Mission) -> Vec<f64> {
     let phases = mission.ledger.phases.iter().skip(1);
     let seconds = phases.map(|p| mission.offset(p.span.start) as f64 / 1e9);

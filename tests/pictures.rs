@@ -1,7 +1,7 @@
-//! Pins what pictures are: SVG text of every style, and the pixels of a few frames.
+//! Snapshot tests of pictures: the SVG text of every style, and the pixels of a few frames.
 //!
-//! `INSTA_UPDATE=always cargo test --release --test tests pictures` accepts what is drawn now, after a look at it. Where pixels
-//! differ, `target/pictures/` shows expected, difference and actual side by side.
+//! `INSTA_UPDATE=always cargo test --release --test tests pictures` accepts the current pictures; check them first. If
+//! pixels differ, `target/pictures/` shows expected, difference and actual side by side.
 
 use std::path::{Path, PathBuf};
 
@@ -11,21 +11,21 @@ use bagreel::values::{Length, Period};
 use bagreel::{Output, Reading, Render, Style, render};
 use image::RgbaImage;
 
-/// Missions, with the period (a mission in JSON has its own) and the window that shows most of what can be shown.
+/// Missions, with the period (a mission in JSON has its own) and the window with the most features.
 const MISSIONS: &[(&str, &str, usize)] = &[
     ("examples/warehouse.bag", "10", 16),
     ("examples/courier.mcap", "10", 5),
     ("tests/data/marks.json", "", 2),
 ];
 
-/// How far a channel may differ: pixels are promised exactly on one kind of machine only.
+/// The tolerance per channel: pixels are only reproducible exactly on one kind of machine.
 const TOLERANCE: u8 = 2;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Draws every window of a mission; gives the file of one of them.
+/// Draws every window of a mission; returns the file of one of them.
 fn drawn(
     folder: &Path,
     mission: (&str, &str, usize),
@@ -97,7 +97,7 @@ fn pixels_match_the_reference_pictures() {
     }
 }
 
-/// Compares with the reference, or takes the picture as the new one.
+/// Compares with the reference picture, or replaces it.
 fn compare(name: &str, actual: &RgbaImage) {
     let reference = root().join(format!("tests/data/pictures/{name}.png"));
     if std::env::var("INSTA_UPDATE").is_ok_and(|v| v == "always") {

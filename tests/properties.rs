@@ -1,4 +1,4 @@
-//! What holds for every graph and every mission, tried on random ones.
+//! Property tests of graphs and missions.
 
 use bagreel::internals::evidence::Degree;
 use bagreel::internals::graph::diff::{apply, diff};
@@ -86,7 +86,7 @@ proptest! {
     }
 }
 
-/// Some nodes, each of which sends on a topic from one moment to another, and may come back.
+/// Some nodes, each of which publishes on a topic for some time and may return.
 fn recording() -> impl Strategy<Value = Recording> {
     let times = (0..90_000_i64, 500..60_000_i64);
     let period = prop::sample::select(vec![50_i64, 200, 1000, 7000]);
@@ -126,7 +126,7 @@ fn there(graph: &Graph) -> BTreeSet<Element> {
         .collect()
 }
 
-/// Whether the changes of every window make its elements of those of the window before, each by an entry that says so.
+/// Whether the changes of every window turn the previous window's elements into its own, each with a matching entry.
 fn follows(mission: &Mission) -> Result<(), TestCaseError> {
     let mut before: Option<BTreeSet<Element>> = None;
     for (window, graph) in mission.each() {

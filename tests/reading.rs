@@ -1,4 +1,4 @@
-//! Bags read in every way: healthy ones by their index and right, damaged ones as far as they go, hostile ones bounded.
+//! Tests of reading bags in every way: healthy ones by index, damaged ones as far as possible, hostile ones bounded.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,7 +21,7 @@ fn placed(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     (dir, path)
 }
 
-/// The description in every way that has an index.
+/// The recording in every format with an index.
 fn everywhere(recording: &Recording) -> Vec<(String, Vec<u8>)> {
     let mut all = Vec::new();
     for how in [Pack::None, Pack::Bz2, Pack::Lz4] {
@@ -248,7 +248,7 @@ fn reading_from_the_front_continues_after_damage() {
 fn a_wrong_index_loses_no_message() {
     let recording = support::small();
     let mut bytes = rosbag1::write(&recording, Pack::Lz4, 4000);
-    // The count of the first index record lies.
+    // The count of the first index record is wrong.
     let field = b"\x0a\0\0\0count=";
     let at = bytes.windows(field.len()).position(|w| w == field).unwrap() + field.len();
     bytes[at] = bytes[at].wrapping_add(1);
@@ -552,7 +552,7 @@ fn damage_never_causes_panics_hangs_or_invented_messages() {
     recording.messages.truncate(150);
     let mut dice = Dice(2026);
     for (name, bytes) in everywhere(&recording) {
-        // SQLite is slow to open; its own damage is its makers' business as well.
+        // SQLite is slow to open, and handles damage itself.
         let rounds = if name.contains(".db3") { 15 } else { 60 };
         for round in 0..rounds {
             let (_dir, path) = placed(&name, &damage(&bytes, &mut dice));
@@ -576,7 +576,7 @@ fn damage_never_causes_panics_hangs_or_invented_messages() {
     }
 }
 
-/// A described bag with the number behind `field` replaced wherever `which` says so.
+/// Copies of a bag, each with one occurrence of the number after `field` replaced.
 fn with_number(bytes: &[u8], field: &[u8], value: &[u8]) -> Vec<Vec<u8>> {
     let places = (0..bytes.len()).filter(|at| bytes[*at..].starts_with(field));
     let changed = places.map(|at| {
@@ -639,7 +639,7 @@ fn offsets_of_an_mcap_summary_are_not_trusted() {
         let (_dir, path) = placed("x.mcap", &bytes);
         let (report, kept) = read(&path, Want::Payload).unwrap();
         let all = kept.counts() == recording.counts();
-        // What a channel is called stands in the summary alone, if one relies on it.
+        // Channel names come from the summary alone if it is used.
         let renamed = kept.stamps.len() == recording.messages.len();
         assert!(
             all || renamed || !report.complete,
@@ -671,7 +671,7 @@ fn a_decompression_bomb_takes_no_memory() {
     }
 }
 
-/// Messages per topic by the crates `rosbag` and `mcap`, and by SQL: none of it our code. `None` where they refuse.
+/// Messages per topic according to the crates `rosbag` and `mcap`, and SQL, none of it our code. `None` if they fail.
 fn independent(path: &Path) -> Option<BTreeMap<String, u64>> {
     let mut counts = BTreeMap::new();
     let mut head = [0; 16];
@@ -738,7 +738,7 @@ fn bags_below(folder: &Path, found: &mut Vec<PathBuf>) {
     entries.sort();
     for path in entries {
         if path.is_dir() {
-            // What lies or is damaged on purpose has tests of its own.
+            // Intentionally damaged bags have their own tests.
             if path.file_name().is_none_or(|name| name != "hostile") {
                 bags_below(&path, found);
             }
@@ -765,7 +765,7 @@ fn real_bags_have_the_counts_of_independent_readers() {
         };
         let (report, kept) = read(path, Want::Stamps).unwrap();
         assert_eq!(kept.counts(), expected, "{}", path.display());
-        // These have no index to read by: no chunks, no summary, one that is cut off, and one that names half of the chunks.
+        // These have no usable index: no chunks, no summary, a truncated one, and one that lists half of the chunks.
         let name = path.to_string_lossy();
         let without = ["unchunked", "nosummary", "indexcut", "half_index"]
             .iter()

@@ -1,4 +1,4 @@
-//! Bags on a server: the same counts as from a file, in few requests for few bytes; what the server refuses is an error.
+//! Tests of bags on a server: the same counts as from a file, few requests, few bytes, and errors for refusals.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,7 +19,7 @@ use bagreel::{Error, Reading, read};
 use crate::support::rosbag1::{self, SparseBag};
 use crate::support::{self, ORIGIN, Recording};
 
-/// What a server holds, what it was asked, and how it behaves.
+/// A server's objects, requests and behaviour.
 #[derive(Default)]
 struct State {
     objects: BTreeMap<String, (SparseBag, u32)>,
@@ -27,37 +27,37 @@ struct State {
     bytes: usize,
     /// The first lines of all requests.
     asked: Vec<String>,
-    /// Answers every request so.
+    /// The status of every answer.
     refuses: Option<u16>,
     /// Answers every request of these numbers, modulo 5, with 503.
     stumbles: Option<usize>,
-    /// Puts another version in place when so many requests have come.
+    /// Replaces the object after this many requests.
     replaces_at: Option<usize>,
-    /// Sends every request there.
+    /// Redirects every request there.
     redirects: Option<String>,
     versions: Versions,
-    /// Answers so late.
+    /// The delay of every answer.
     late: Duration,
-    /// The requests that wait for an answer now, and the most that ever did.
+    /// The current and the highest number of pending requests.
     under_way: usize,
     most_under_way: usize,
 }
 
-/// What a server says of versions.
+/// How a server reports versions.
 #[derive(Clone, Copy, Default, PartialEq)]
 enum Versions {
     #[default]
     Told,
-    /// Told, and `If-Match` not looked at.
+    /// With an ETag, but ignoring `If-Match`.
     Careless,
-    /// Told as such that `If-Match` must not compare.
+    /// With a weak ETag, which `If-Match` must not compare.
     Weak,
-    /// Told by the time of the last change.
+    /// By modification time.
     Dated,
     Untold,
 }
 
-/// A server for parts of objects on this machine, with nothing but what the tests need.
+/// A minimal local server that supports range requests.
 struct Server {
     address: String,
     state: Arc<Mutex<State>>,
@@ -105,7 +105,7 @@ impl Server {
         counted(&self.url(name), detail)
     }
 
-    /// What is said where the store does not give an object.
+    /// The error message for a refused object.
     #[track_caller]
     fn refusal(&self, name: &str) -> String {
         match self.count(name, CountDetail::Auto) {
@@ -322,7 +322,7 @@ fn a_large_bag_takes_few_requests_and_few_bytes() {
     println!("12 GB: {requests} requests, {read} bytes");
 }
 
-/// The mission of a bag as JSON. Payloads that are far away are not compared with each other, so here none are.
+/// The mission of a bag as JSON. Payloads of remote bags are not compared, so neither are they here.
 fn mission(bag: &str) -> String {
     let mut reading = Reading::of([bag]);
     reading.collect.payload_bytes = 0;
@@ -411,7 +411,7 @@ fn a_refused_object_is_an_error_without_a_row() {
     server.state().refuses = Some(401);
     assert!(server.refusal("large.bag").contains("(401)"));
     server.state().refuses = None;
-    // What is not there is a fact about the bag.
+    // A missing object is a fact about the bag.
     let gone = server.count("gone.bag", CountDetail::Auto).unwrap();
     assert!(gone.bag.error.unwrap().contains("no such object"));
 }
@@ -427,7 +427,8 @@ fn a_prefix_is_not_a_bag() {
     assert_eq!(server.state().requests, 0);
 }
 
-/// A bag of four chunks with one message each: the tail, and one request for each chunk's index and the next one's head.
+/// A bag of four chunks with one message each: the tail, and one request for each chunk's index and the next one's
+/// head.
 #[test]
 fn sizes_need_no_request_if_a_chunk_has_one_message() {
     let server = Server::with(&[("a.bag", one_message_in_each_chunk())]);
@@ -479,7 +480,7 @@ fn an_object_that_is_replaced_while_it_is_read_is_an_error() {
                 .contains("replaced while it was read")
         );
     }
-    // Where nothing is told of versions, nothing can be asked of them.
+    // Without reported versions, none can be required.
     let server = server_of_large();
     server.state().versions = Untold;
     server.count("large.bag", CountDetail::Auto).unwrap();
@@ -502,7 +503,7 @@ fn redirects_to_files_are_not_followed() {
         server.state().redirects = Some(to);
         server.refusal("large.bag");
     }
-    // Another address is one.
+    // A different address is fine.
     let other = server_of_large();
     server.state().redirects = Some(other.url("large.bag"));
     assert_eq!(
@@ -551,8 +552,7 @@ fn the_command_prints_the_same_for_an_object_and_a_file() {
     let (far, near) = (server.url("warehouse.bag"), path.to_string_lossy());
     let rows = |bag: &str| tells(&["extract", bag, "-o", "-", "--format", "csv"]);
     assert_eq!(rows(&far), rows(&near));
-    // Payloads that are far away are not compared with each other, which tells one subscription more, unless they are
-    // asked for.
+    // Payloads of remote bags are only compared on request, which reveals one more subscription.
     let info = |bag: &str| -> Vec<String> {
         let row = tells(&["info", bag, "--format", "csv"]);
         let cells = row.lines().nth(1).unwrap().split(',');
@@ -562,7 +562,7 @@ fn the_command_prints_the_same_for_an_object_and_a_file() {
     let all = |bag: &str| -> serde_json::Value {
         let text = tells(&["info", bag, "--format", "json", "--infer", "payloads"]);
         let mut info: serde_json::Value = serde_json::from_str(&text).unwrap();
-        // The version of the object, which a file has not.
+        // The version of the object, which a file does not have.
         info["bags"][0]["facts"].take();
         info
     };

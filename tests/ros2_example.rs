@@ -1,6 +1,6 @@
-//! The ROS 2 recordings in `examples/`: they hold the mission that `support/mission.rs` describes.
+//! Tests that the ROS 2 recordings in `examples/` contain the mission that `support/mission.rs` describes.
 //!
-//! `cargo test --release --test tests -- --ignored write_the_ros2_examples` writes them anew.
+//! `cargo test --release --test tests -- --ignored write_the_ros2_examples` rewrites them.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Source code beside a bag: names from the bag, edges from the code, as of the recording's day, and nothing is run.
+//! Tests of source code with a bag: names from the bag, edges from the code as of the recording; nothing is executed.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,8 +12,8 @@ use crate::support::cdr::Cdr;
 use crate::support::mission::definition;
 use crate::support::{ORIGIN, Recording, mcap};
 
-/// A recording of ROS 2: these topics with their types, each offered by one publisher, and log records of each node;
-/// what ends in `late` begins in the middle.
+/// A ROS 2 recording: these topics with their types, each with one publisher, and log records of each node; names that
+/// end in `late` begin in the middle.
 pub(crate) fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
     let mut bag = Recording::default();
     let rosout = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
@@ -106,7 +106,7 @@ fn set(edges: &[&str]) -> BTreeSet<String> {
 pub(crate) const STRING: &str = "std_msgs/msg/String";
 pub(crate) const PACKAGE: (&str, &str) = ("p/package.xml", "<package><name>p</name></package>");
 
-/// A node in Python that publishes one topic and subscribes another.
+/// A node in Python that publishes one topic and subscribes to another.
 pub(crate) fn node(name: &str, publishes: &str, subscribes: &str) -> String {
     format!(
         "from std_msgs.msg import String\nclass N(Node):\n    def __init__(self):\n        super().__init__('{name}')\n        \
@@ -127,7 +127,7 @@ fn names_come_from_the_bag_and_edges_from_the_code() {
         &[
             PACKAGE,
             ("p/p/talker.py", &node("talker", "out", "/in")),
-            // Nobody names this node, and this topic has another type.
+            // This node is not in the bag, and this topic has another type.
             ("p/p/other.py", &node("other", "out", "number")),
         ],
     );
@@ -305,7 +305,7 @@ fn the_code_as_of_the_recording_is_read_from_git() {
     }
 }
 
-/// Everything that a repository could make git or us run leaves a file behind.
+/// Everything that a repository could make git or bagreel execute would leave a file.
 #[cfg(unix)]
 #[test]
 fn a_hostile_repository_executes_nothing() {
@@ -446,7 +446,7 @@ fn a_git_file_must_be_referenced_by_its_repository() {
     assert!(git(folder.path(), &partial));
     let said = read("partial");
     assert!(said.contains("does not hold all files of commit"), "{said}");
-    // Names the repository of another folder.
+    // Refers to the repository of another folder.
     for way in ["file", "link"] {
         let foreign = folder.path().join(way);
         fs::create_dir(&foreign).unwrap();
@@ -464,7 +464,7 @@ fn a_git_file_must_be_referenced_by_its_repository() {
     }
 }
 
-/// What `info` says with the workspace, on both streams.
+/// The output of `info` with the workspace, on both streams.
 fn said(folder: &Path, more: &[&str]) -> String {
     let output = bagreel(
         folder,
@@ -541,7 +541,7 @@ fn reasons_against_a_declaration_are_reported() {
         assert!(!found.contains("/talker ? -> /out"), "{says}: {found:?}");
         let text = said(folder.path(), &["--infer", "source"]);
         assert!(text.contains(says), "{says}: {text}");
-        // Who may not have run did not listen either.
+        // A node that may not have run has no certain subscriptions.
         if says.starts_with("several") {
             assert!(found.is_empty(), "{found:?}");
             let why = "what its node publishes may come from elsewhere";
@@ -608,7 +608,7 @@ fn a_simulation_is_rejected_if_another_launch_file_starts_the_same_nodes() {
     let alone = folder(&recorded, &["/steer"], &files[..5]);
     let found = edges(alone.path(), &["--infer", "source"]);
     assert!(found.contains("/sim ? -> /out"), "{found:?}");
-    // Where the bag names nobody, either may have run: the robot, or its simulation.
+    // If the bag names no nodes, the robot or its simulation may have run.
     let neither = folder(&recorded, &[], &files);
     let shared = set(&["/steer ? -> /in", "/out -> /steer ?"]);
     assert_eq!(edges(neither.path(), &["--infer", "source"]), shared);

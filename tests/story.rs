@@ -1,4 +1,4 @@
-//! The ledger of real missions: what is told, when, and that it is one story everywhere.
+//! Tests of the event log of real missions: events, times, and consistency.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use bagreel::internals::mission::ledger::Kind;
 use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
 
-/// A mission of ours, in windows of so many seconds.
+/// An example mission in windows of this many seconds.
 fn mission(file: &str, seconds: i64) -> Mission {
     let bag = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
@@ -28,7 +28,7 @@ const ALL: LogOptions = LogOptions {
     phases: true,
 };
 
-/// Every headline of a kind: whom it is about, and when in seconds.
+/// Every headline of a kind: its element and its time in seconds.
 fn told(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
     let headlines = mission.ledger.entries.iter();
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
@@ -163,15 +163,14 @@ fn the_log_is_sorted_and_parts_are_not_nested() {
     }
 }
 
-/// What really happened, from the scripts that ran the mission and the nodes' own counters; made by the same rules for
-/// every mission.
+/// The ground truth from the scripts that ran the mission and the nodes' own counters, by the same rules for every
+/// mission.
 fn truth() -> Vec<serde_json::Value> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/warehouse.story.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Starts or stops of nodes by role, with seconds and the interval in which the truth should lie; those of a restart
-/// too.
+/// Starts or stops of nodes by role, including restarts, with seconds and the interval that should contain the truth.
 fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
     let second = |at| mission.offset(at) as f64 / 1e9;
     let entries = mission.ledger.entries.iter();
@@ -225,7 +224,7 @@ fn starts_and_stops_are_timed_independent_of_the_period() {
                 inside += usize::from(*earliest <= to && from <= *latest);
                 told.remove(place);
             }
-            // What is told beside the truth is within two seconds of the bag's ends, or of who records.
+            // Additional events are within two seconds of the bag's ends, or concern the recorder.
             let end = mission.offset(mission.span.end) as f64 / 1e9;
             told.retain(|(name, at, (earliest, latest))| {
                 let is_edge = *at < 5.0 && *earliest < 2.0 || *latest > end - 2.0;

@@ -1,4 +1,4 @@
-//! A tiny bag builder: one description, written as ROS 1 bag, MCAP and SQLite; and a sink that keeps what it is told.
+//! A tiny bag builder: one description, written as ROS 1 bag, MCAP and SQLite; and a sink that keeps everything.
 
 #![expect(unreachable_pub, reason = "a test binary has no outside")]
 
@@ -19,7 +19,7 @@ use bagreel::internals::base::error::Result;
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
 
-/// What publishes in a described bag.
+/// A publisher in a described bag.
 #[derive(Clone, Debug, Default)]
 pub struct Publisher {
     pub node: String,
@@ -32,16 +32,16 @@ pub struct Publisher {
     pub definition: String,
 }
 
-/// A described bag: who publishes, and what was sent when, in order of time.
+/// A described bag: publishers, and messages sorted by time.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
     pub publishers: Vec<Publisher>,
-    /// The place of the publisher, nanoseconds since 1970, the payload.
+    /// The index of the publisher, nanoseconds since 1970, the payload.
     pub messages: Vec<(usize, i64, Vec<u8>)>,
 }
 
 impl Recording {
-    /// Adds a publisher; answers its place.
+    /// Adds a publisher; returns its index.
     pub fn publisher(&mut self, node: &str, topic: &str, type_name: &str) -> usize {
         self.publishers.push(Publisher {
             node: node.to_owned(),
@@ -81,7 +81,7 @@ impl Recording {
     }
 }
 
-/// When described bags begin: 2024-01-01, nanoseconds since 1970.
+/// The start of described bags: 2024-01-01, nanoseconds since 1970.
 pub const ORIGIN: i64 = 1_704_067_200_000_000_000;
 
 /// A minute of a small robot: a latched map, a fast scan, two publishers of one topic, a late node.
@@ -117,7 +117,7 @@ impl Kept {
         self.count(|c| c.topic.to_string())
     }
 
-    /// Messages per whatever `key` says of a connection.
+    /// Messages per `key` of a connection.
     pub fn count<K: Ord>(&self, key: impl Fn(&Connection) -> K) -> BTreeMap<K, u64> {
         let mut counts = BTreeMap::new();
         for (id, ..) in &self.stamps {
@@ -194,7 +194,7 @@ pub fn read_as(
     Ok((report, kept))
 }
 
-/// A folder beside the project with recordings that are not ours to copy; `None`, said aloud, where it is absent.
+/// A folder outside the project with recordings that may not be copied; `None`, with a printed line, if absent.
 pub fn shared(below: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../shared")

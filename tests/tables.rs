@@ -1,4 +1,4 @@
-//! Messages and missions as tables: the command's files against each other and against counts known otherwise.
+//! Tests of messages and missions as tables: the files compared with each other and with independent counts.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,7 +16,7 @@ fn bagreel(folder: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Runs the command, which must end with `code`; what it said.
+/// Runs the command, which must exit with `code`; returns its messages.
 #[track_caller]
 fn ends(folder: &Path, args: &[&str], code: i32) -> String {
     let output = bagreel(folder, args);
@@ -25,7 +25,7 @@ fn ends(folder: &Path, args: &[&str], code: i32) -> String {
     said
 }
 
-/// The rows of a CSV file, its head first.
+/// The rows of a CSV file, header first.
 fn csv(path: &Path) -> Vec<Vec<String>> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -80,7 +80,7 @@ fn rows_are_filtered_by_topic_and_time() {
     );
     assert!(said.contains("select nothing"), "{said}");
     assert!(!dir.path().join("x.csv").exists());
-    // A name that is mistyped is told.
+    // A mistyped name is reported.
     let nothing = [
         "extract",
         WAREHOUSE,
@@ -124,7 +124,7 @@ fn every_field_has_a_column() {
     assert_eq!(ranges.len(), 60);
     let frame = &scan[1][3];
     assert_eq!(frame, "laser");
-    // As many rows as messages, and nothing beside the tables.
+    // As many rows as messages, and no other files.
     ends(dir.path(), &["extract", COURIER, "-o", "m.csv"], 0);
     let index = csv(&dir.path().join("t/index.csv"));
     assert_eq!(index[0], ["topic", "type", "file", "n"]);
@@ -140,7 +140,7 @@ fn every_field_has_a_column() {
     assert_eq!(rows, csv(&dir.path().join("m.csv")).len() - 1);
     let files = fs::read_dir(dir.path().join("t")).unwrap().count();
     assert_eq!(files, index.len(), "a table each, and the index");
-    // A stamp is near the log time, in the same unit; who publishes stands in a bag of ROS 1.
+    // A stamp is near the log time, in the same unit; a ROS 1 bag contains the publisher.
     let number = |text: &String| text.parse::<i64>().unwrap();
     assert!((number(&scan[1][2]) - number(&scan[1][0])).abs() < 1_000_000_000);
     let args = [
@@ -209,7 +209,7 @@ fn recordings_without_definitions_use_common_and_given_types() {
     let point = csv(&dir.path().join("t/point.csv"));
     assert_eq!(point.len(), 11);
     assert!(point[1].ends_with(&["1.5", "2.5", "-3.5"].map(str::to_owned)));
-    // Nothing at all is an error that names what is missing, and leaves no folder.
+    // An empty result is an error that names what is missing, and creates no folder.
     let only = [
         &args[..3],
         &["new/er", "--fields", "--topic-filter", "/thing"],
@@ -247,8 +247,8 @@ fn invalid_requests_are_refused() {
     refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
 }
 
-/// A folder of recordings of every kind, mixed: a folder of rosbag2 with a stranger in it, parts without their
-/// metadata, loose files, broken ones, folders below.
+/// A folder with all kinds of recordings: a rosbag2 folder with a foreign file, parts without metadata, loose files,
+/// broken ones, subfolders.
 fn mixed(folder: &Path) {
     let mcap = fs::read(COURIER).unwrap();
     let put = |name: &str, bytes: &[u8]| {
@@ -299,7 +299,7 @@ fn a_survey_lists_every_recording() {
         failed,
         ["a.bag", "broken.db3", "deep/er/b.bag", "ros2/stranger.bag"]
     );
-    // What cannot be read is as large as it is, and not whole.
+    // An unreadable bag has its size and is not complete.
     let cell = |path: &str, column: &str| {
         let at = rows[0].iter().position(|c| c == column).unwrap();
         let row = rows.iter().find(|r| r[0] == path).unwrap();
@@ -308,7 +308,7 @@ fn a_survey_lists_every_recording() {
     assert_eq!(cell("a.bag", "file_bytes"), "13");
     assert_eq!(cell("a.bag", "is_complete"), "false");
     assert_eq!(cell("loose.mcap", "is_complete"), "true");
-    // A recording with nothing beside it is no survey.
+    // A single recording is not a survey.
     let one = bagreel(dir.path(), &["info", "parts"]);
     assert!(String::from_utf8(one.stdout).unwrap().contains("messages"));
 }
@@ -381,7 +381,7 @@ fn graphs_for_other_tools_contain_every_element_once() {
     }
     let gexf = read("x.gexf");
     assert!(gexf.matches("<spell ").count() >= nodes + edges);
-    // Spells are lives in continuous time: they begin inside windows of a minute, and some after a pause.
+    // Spells are lifetimes in continuous time: they begin inside windows of a minute, and some after a pause.
     let starts = gexf.split("<spell start=\"").skip(1);
     let starts: Vec<f64> = starts
         .map(|rest| rest.split('"').next().unwrap().parse().unwrap())
@@ -433,7 +433,7 @@ mod parquet {
         let cells = |row: &Row| row.get_column_iter().map(cell).collect::<Vec<_>>();
         let rows: Vec<Vec<String>> = parquet_rows(&path).iter().map(cells).collect();
         assert!(rows == csv(&dir.path().join("m.csv"))[1..]);
-        // Only the bag of ROS 1 says who publishes.
+        // Only the ROS 1 bag contains publishers.
         let unknown = rows.iter().filter(|row| row[3].is_empty()).count();
         assert!(unknown > 0 && unknown < rows.len());
         let time = columns(&path).remove(0);

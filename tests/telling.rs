@@ -1,4 +1,4 @@
-//! What is told of a window is the same everywhere: headlines, counts, captions, marks.
+//! Tests that headlines, counts, captions and marks of a window agree in all outputs.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -7,7 +7,7 @@ use bagreel::internals::mission::ledger::Kind;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use bagreel::internals::view::{Mark, SeenWindow, Shown, View, ViewOptions, view};
 
-/// What an example shows in windows of this length, or of the usual one.
+/// The view of an example in windows of this length, or of the default.
 fn example(name: &str, period: Option<&str>) -> View {
     let bag = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
@@ -57,7 +57,7 @@ fn every_headline_is_counted_captioned_and_marked() {
     }
 }
 
-/// What a window shows when its marks are gone, but for clock and numbers.
+/// A window's picture without marks, clock and numbers.
 fn settled(seen: &SeenWindow) -> Vec<String> {
     let stays = all(seen).filter(|s| s.mark != Some(Mark::Removed));
     let look = |s: &Shown| format!("{} {:?} {:?} {:?}", s.id, s.state, s.degree, s.steady_hz);
@@ -105,7 +105,7 @@ fn a_crash_is_drawn_before_during_and_after() {
     );
     let back = "object_detector back after 15.6 s";
     assert_eq!(of(28), said(Some(Mark::Restarted), back, "/robot1 · 4:41"));
-    // Where both ends lie in one window, it restarted there.
+    // If both ends are in one window, it is a restart there.
     let minutes = example("warehouse.bag", Some("60"));
     let words = minutes.frames[4].fitting(|_| true);
     assert!(

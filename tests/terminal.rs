@@ -1,4 +1,4 @@
-//! The command on a terminal: what is left on the screen when it ends, how wide results are, when there are colours.
+//! Tests of the command on a terminal: the final screen, the width of results, colours.
 #![cfg(target_os = "linux")]
 
 use std::fs::{self, File};
@@ -16,7 +16,7 @@ const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
 
-/// The streams of a command that are the terminal; the other one goes nowhere.
+/// The streams of a command that are the terminal; the other one is discarded.
 #[derive(Clone, Copy, PartialEq)]
 enum On {
     Both,
@@ -24,7 +24,7 @@ enum On {
     Errors,
 }
 
-/// All that the command writes to a terminal of so many columns.
+/// All output of the command to a terminal of this many columns.
 fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> String {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -66,7 +66,7 @@ fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> St
     let mut all = Vec::new();
     let mut master = File::from(master);
     let mut part = [0; 4096];
-    // The end of a terminal without anybody on it is an error.
+    // Reading from a terminal that was closed is an error.
     while let Ok(n @ 1..) = master.read(&mut part) {
         all.extend_from_slice(&part[..n]);
     }
@@ -74,7 +74,7 @@ fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> St
     String::from_utf8(all).unwrap()
 }
 
-/// The lines that a terminal of so many columns shows in the end, without what was cleared.
+/// The lines that a terminal of this many columns shows at the end, without cleared ones.
 fn screen(written: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![Vec::new()];
     let (mut row, mut column) = (0, 0);
@@ -135,7 +135,7 @@ fn screen(written: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// The lines with every number made the same: times differ from run to run.
+/// The lines with all numbers masked, as times differ between runs.
 fn timeless(lines: Vec<String>) -> Vec<String> {
     let digit = |c: char| if c.is_ascii_digit() { '0' } else { c };
     let seconds = |line: String| match line.rfind(", in ") {
@@ -336,7 +336,7 @@ fn events_are_coloured_by_kind_unless_disabled() {
     );
 }
 
-/// A sink that keeps what it is told of the progress: bytes done, bytes in all.
+/// A sink that records the reported progress: bytes done, bytes in total.
 struct Progress(Vec<(u64, u64)>);
 
 impl Sink for Progress {

@@ -1,5 +1,5 @@
-//! A mission read from its own JSON is the mission that was read from the bag: everything drawn and written of it is
-//! the same, byte for byte.
+//! Tests that a mission read from its own JSON equals the one read from the bag: all outputs are identical byte for
+//! byte.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +14,7 @@ fn example(name: &str) -> PathBuf {
     examples.join(name)
 }
 
-/// Everything that comes out quickly enough; animations are made of the frames.
+/// All formats that are fast enough; animations consist of the frames.
 const FORMATS: [&str; 13] = [
     "x.svg",
     "x{n}.svg",
@@ -30,7 +30,7 @@ const FORMATS: [&str; 13] = [
     "x.gexf",
     "x.graphml",
 ];
-/// Every file that `bagreel render` makes of `input`, by name.
+/// Every file that `bagreel render` writes for `input`, by name.
 fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
@@ -122,7 +122,7 @@ fn rendering_exported_json_gives_the_same_bytes() {
     }
 }
 
-/// A robot that says what it does on a topic.
+/// A robot that publishes its activity on a topic.
 fn telling() -> Vec<u8> {
     let mut bag = Recording::default();
     let odometry = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
@@ -149,7 +149,7 @@ fn bagreel(arguments: &[&str], input: &[u8]) -> (bool, String, String) {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     let mut pipe = child.stdin.take().unwrap();
-    // What is refused before anything is read leaves its input unread.
+    // A command that is refused early leaves its input unread.
     let _ = pipe.write_all(input);
     drop(pipe);
     let done = child.wait_with_output().unwrap();
@@ -183,7 +183,7 @@ fn captions_are_read_from_a_pipe() {
         let second = (start - ORIGIN) / 1_000_000_000;
         (second, phase["name"].as_str().unwrap())
     });
-    // What is said again is no new phase, and what comes before the first caption one of our own.
+    // A repeated caption is not a new phase, and the time before the first one is a phase of its own.
     let told: Vec<_> = told.collect();
     assert_eq!(told, [(10, "driving"), (30, "picking"), (45, "docking")]);
 }
@@ -263,7 +263,7 @@ fn windows_are_cut_by_phases_or_changes() {
         changes.windows(2).all(|pair| pair[0].1 == pair[1].0),
         "{changes:?}"
     );
-    // The planner comes at 37 s with all of its kind, and goes at 176 s.
+    // The planner starts at 37 s with its whole group, and stops at 176 s.
     for second in [37, 176] {
         assert!(
             changes.iter().any(|(start, _)| (start - second).abs() <= 1),

@@ -1,4 +1,4 @@
-//! The example mission against what an independent reader counts in it, and against what really happened.
+//! Compares the example mission with an independent reader's counts and with the ground truth.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -51,7 +51,7 @@ fn all_counts_match_an_independent_reader() {
     );
 }
 
-/// Whether a node is there in the window that begins at this second of the mission.
+/// Whether a node is alive in the window that begins at this second of the mission.
 fn alive(mission: &Mission, node: &str, second: usize) -> bool {
     let graph = mission.graphs.get(second / 10).unwrap();
     graph.nodes.iter().any(|n| {

@@ -2,7 +2,7 @@
 //!
 //! Draws the mission (an evolution as JSON) at 1280×720 and prints a table: everything included on one core and on two,
 //! drawing alone, drawing over the last frame where less than a tenth of the elements changed, frames of a tween, and
-//! a long run with its memory. What was measured last stands in `drawing.md`.
+//! a long run with its memory. The latest results are in `drawing.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -192,7 +192,7 @@ fn row(what: &str, frames: usize, time: Duration) {
     );
 }
 
-/// The most memory this process ever held; 0 where the system does not tell.
+/// The peak memory of this process; 0 if unknown.
 fn peak_mb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find(|l| l.starts_with("VmHWM"));

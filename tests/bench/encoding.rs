@@ -1,6 +1,6 @@
 //! How large and how fast each format is: `cargo bench --bench encoding -- MISSION.json [FOLDER] [OUTPUT…]`.
 //!
-//! Draws the mission (an evolution as JSON) at 1280×720 once for each format and tells bytes, milliseconds per frame
+//! Draws the mission (an evolution as JSON) at 1280×720 once for each format and reports bytes, milliseconds per frame
 //! above drawing, and for GIF the worst PSNR of a frame. With outputs, writes those into the folder in one run.
 #![allow(
     clippy::unwrap_used,

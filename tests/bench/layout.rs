@@ -1,4 +1,4 @@
-//! Lays the test graphs out, with Graphviz `dot` beside, and prints what `layout.md` keeps.
+//! Lays out the test graphs, optionally also with Graphviz `dot`, and prints the table in `layout.md`.
 //!
 //! usage: `cargo bench --bench layout -- [--dot] [--svg FOLDER] [--layout WORD] [--orientation LR|TB] [GRAPH…]`
 
@@ -107,7 +107,7 @@ fn main() {
     }
 }
 
-/// The quickest of three, unless that takes long.
+/// The fastest of three runs, unless they take long.
 fn timed<T>(mut work: impl FnMut() -> T) -> (T, Duration) {
     let mut once = || {
         let begin = Instant::now();

@@ -1,4 +1,4 @@
-//! What a run of this process takes, and the middle one of several runs.
+//! Measures a run of this process, and the median of several runs.
 
 #![allow(
     dead_code,
@@ -8,7 +8,7 @@
 
 use std::fs;
 
-/// What a run took.
+/// The cost of a run.
 #[derive(Clone, Copy, Default)]
 pub struct Took {
     pub wall: f64,
@@ -30,7 +30,7 @@ pub fn io_bytes() -> u64 {
     proc("io", "rchar:")
 }
 
-/// The most memory that it ever had, in megabytes.
+/// The peak memory in megabytes.
 pub fn peak_mb() -> f64 {
     proc("status", "VmHWM:") as f64 / 1024.0
 }
@@ -47,7 +47,7 @@ pub fn cpu() -> f64 {
     ticks.sum::<f64>() / 100.0
 }
 
-/// What a child printed as `took …`.
+/// Parses a child's `took …` line.
 pub fn parse(out: &[u8]) -> Option<Took> {
     let text = String::from_utf8_lossy(out);
     let line = text.lines().find_map(|l| l.strip_prefix("took "))?;

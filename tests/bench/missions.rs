@@ -1,7 +1,8 @@
-//! What huge but honest missions cost: ten hours in windows of one second, and a robot of 20,000 topics.
+//! Measures huge but valid missions: ten hours in windows of one second, and a robot of 20,000 topics.
 //!
-//! `cargo bench --bench missions [-- --keep]` makes the bags below `target/bench/missions/`, reads each into every output in
-//! a process of its own, and prints a table. `-- --make` only makes them. What was measured last stands in `missions.md`.
+//! `cargo bench --bench missions [-- --keep]` makes the bags below `target/bench/missions/`, reads each into every
+//! output in a process of its own, and prints a table. `-- --make` only makes them. The latest results are in
+//! `missions.md`.
 
 #![allow(
     clippy::unwrap_used,
@@ -36,14 +37,14 @@ struct Shape {
     seconds: u64,
     nodes: usize,
     topics: usize,
-    /// The length of its windows; none for the usual one.
+    /// The length of its windows; empty for the default.
     period: &'static str,
-    /// Nanoseconds between two messages of the topic at a place.
+    /// Nanoseconds between two messages of the topic with this index.
     every: fn(usize) -> u64,
 }
 
 const SHAPES: [Shape; 3] = [
-    // One message a second in all.
+    // One message per second in total.
     Shape {
         name: "quiet",
         seconds: 36_000,
@@ -52,7 +53,7 @@ const SHAPES: [Shape; 3] = [
         period: "1",
         every: |_| 100 * SECOND,
     },
-    // One to four a second of each topic, so that hardly two windows are equal.
+    // One to four per second on each topic, so that hardly two windows are equal.
     Shape {
         name: "busy",
         seconds: 36_000,
@@ -72,12 +73,12 @@ const SHAPES: [Shape; 3] = [
 ];
 
 impl Shape {
-    /// Who sends on a topic.
+    /// The publisher of a topic.
     fn node(&self, topic: usize) -> usize {
         topic % self.nodes
     }
 
-    /// Whether a node is there: every tenth is away from the middle to three quarters.
+    /// Whether a node is alive: every tenth is absent from the middle to three quarters.
     fn lives(&self, node: usize, second: u64) -> bool {
         let away = self.seconds / 2..self.seconds / 4 * 3;
         node % 10 != 3 || !away.contains(&second)
@@ -104,7 +105,7 @@ impl Shape {
         all.sort_unstable();
     }
 
-    /// The bag and the table of its subscriptions, made unless they are there.
+    /// The bag and the table of its subscriptions, created if missing.
     fn make(&self, folder: &Path) -> (PathBuf, PathBuf) {
         let bag = folder.join(format!("{}.mcap", self.name));
         let table = folder.join(format!("{}.csv", self.name));
@@ -144,7 +145,7 @@ impl Shape {
         to.finish().unwrap();
     }
 
-    /// Each node hears the next one's first three topics.
+    /// Each node subscribes to the next one's first three topics.
     fn subscriptions(&self) -> String {
         let mut table = "Name,Publish,Subscribe,Node-start,Node-end\n".to_owned();
         for node in 0..self.nodes {
@@ -172,7 +173,7 @@ fn topic_name(node: usize, topic: usize) -> String {
     format!("/part{}/topic{topic:05}", node / 10)
 }
 
-/// Writes one output in this process and prints what it took: `--one bag table period output`.
+/// Writes one output in this process and prints its cost: `--one bag table period output`.
 fn one(args: &[String]) {
     let start = Instant::now();
     let mut reading = Reading::of([&args[0]]);

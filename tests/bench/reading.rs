@@ -1,7 +1,8 @@
 //! How fast bags are read, against other readers, on bags that it makes itself below `target/bench/`.
 //!
-//! `cargo bench --bench reading [-- --gigabytes 10] [--keep]`. Other readers need Python with `rosbags`, `mcap` and `zstandard`:
-//! `BENCH_PYTHON=venv/bin/python`. What is absent is left out, and said. The table of a run is in `reading.md`.
+//! `cargo bench --bench reading [-- --gigabytes 10] [--keep]`. Other readers need Python with `rosbags`, `mcap` and
+//! `zstandard`:
+//! `BENCH_PYTHON=venv/bin/python`. Missing readers are reported and skipped. The table of a run is in `reading.md`.
 
 #![allow(
     clippy::unwrap_used,
@@ -26,10 +27,10 @@ use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
 use measure::{Took, cpu, io_bytes, median, parse, peak_mb};
 
-/// What one robot sends: topic, type, messages per second, bytes of each.
+/// A robot's stream: topic, type, messages per second, bytes per message.
 type Stream = (&'static str, &'static str, u32, usize);
 
-/// A robot whose cameras make most of the bag: about 17 MB/s with 15 pictures a second.
+/// A robot whose cameras produce most of the bag: about 17 MB/s with 15 images per second.
 fn streams(pictures: u32) -> Vec<Stream> {
     vec![
         ("/camera/image", "sensor_msgs/Image", pictures, 1 << 20),
@@ -101,11 +102,11 @@ fn time(nanos: i64) -> [u8; 8] {
     bytes
 }
 
-/// How a ROS 1 bag is made.
+/// How a ROS 1 bag is written.
 #[derive(Clone, Copy, PartialEq)]
 enum Body {
     Plain,
-    /// The payloads are holes: true headers and index, no disk.
+    /// The payloads are sparse: real headers and index, no disk space.
     Holes,
     Lz4,
 }
@@ -170,7 +171,7 @@ impl Ros1<'_> {
         }
     }
 
-    /// A chunk of these messages, its index, and what the tail will say of it.
+    /// A chunk of these messages, its index, and its entry for the tail.
     fn chunk(&mut self, messages: &[(usize, i64)], first: bool) {
         let mut index: BTreeMap<usize, Vec<(i64, u32)>> = BTreeMap::new();
         let mut parts = Vec::new();
@@ -406,7 +407,7 @@ impl Sink for Counter {
     }
 }
 
-/// Reads a bag in this process and prints what it took: `--one bag logs|counts start_s end_s rounds`.
+/// Reads a bag in this process and prints the cost: `--one bag logs|counts start_s end_s rounds`.
 fn one(args: &[String]) {
     let path = PathBuf::from(&args[0]);
     let part: Vec<i64> = args[2..4].iter().map(|s| s.parse().unwrap()).collect();

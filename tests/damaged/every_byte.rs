@@ -1,5 +1,5 @@
-//! Bags of two kilobytes, of which every bit is flipped and which are cut behind every byte: whatever is damaged, reading
-//! ends, invents nothing, and does not lose a message without a word.
+//! Tests with bags of two kilobytes in which every bit is flipped and which are cut at every byte: reading terminates,
+//! invents nothing, and reports every lost message.
 
 use std::fs;
 use std::ops::Range;
@@ -61,17 +61,17 @@ pub(super) fn tiny() -> Vec<(&'static str, Vec<u8>)> {
 /// Messages in one of the [`tiny`] bags.
 pub(super) const TINY: usize = 14;
 
-/// The spaces behind the head of a ROS 1 bag, which mean nothing.
+/// The padding after the head of a ROS 1 bag.
 const PADDING: Range<usize> = 100..4100;
 
-/// The places in a bag that mean something.
+/// The positions of meaningful bytes in a bag.
 fn bytes_of(name: &str, bytes: &[u8]) -> impl Iterator<Item = usize> {
     let is_bag = !name.contains("mcap");
     (0..bytes.len()).filter(move |at| !(is_bag && PADDING.contains(at)))
 }
 
-/// Reads the bag with each of these bits of every byte flipped: never more messages than there were, and fewer only with
-/// a word.
+/// Reads the bag with each of these bits of every byte flipped: never more messages than before, and fewer only with a
+/// notice.
 fn flip(name: &str, bytes: &[u8], bits: impl Fn(usize) -> Range<usize>) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
@@ -82,12 +82,12 @@ fn flip(name: &str, bytes: &[u8], bits: impl Fn(usize) -> Range<usize>) {
             bytes[at] ^= 1 << bit;
             fs::write(&path, &bytes).unwrap();
             let Ok((report, kept)) = read(&path, Want::Payload) else {
-                // The first bytes say what it is, and there is no second copy of them.
+                // The magic bytes identify the format and have no second copy.
                 assert!(at < 16, "{name}: bit {bit} of byte {at}");
                 continue;
             };
             let found = kept.stamps.len();
-            // Records that the format leaves to its users are no damage, and said all the same.
+            // Private records are not damage, but reported too.
             let is_said =
                 !report.complete || kept.notices.iter().any(|n| n.kind == NoticeKind::Note);
             if found != TINY && !is_said {
@@ -156,7 +156,7 @@ fn a_bag_cut_at_any_byte_has_the_messages_before_it() {
 fn a_flipped_bit_seen_only_by_the_data_checksum_is_reported() {
     let (name, bytes) = tiny().pop().unwrap();
     assert_eq!(name, "front_unchunked.mcap");
-    // Behind the first eight bytes, and before the end of the data, the end of the file and the closing bytes.
+    // After the first eight bytes, and before the end of the data, the end of the file and the closing bytes.
     let (start, end) = (8, bytes.len() - 13 - 29 - 8);
     assert_eq!(bytes[end..end + 9], [15, 4, 0, 0, 0, 0, 0, 0, 0]);
     let dir = tempfile::tempdir().unwrap();
@@ -171,14 +171,14 @@ fn a_flipped_bit_seen_only_by_the_data_checksum_is_reported() {
         damaged[at] ^= 1 << (at % 8);
         assert!(!is_complete(&damaged, Want::Stamps), "byte {at}");
     }
-    // The last byte before the end is of a payload, of which nobody knows without a checksum.
+    // The last byte before the end belongs to a payload, where damage is only detected by a checksum.
     let mut unsummed = bytes.clone();
     unsummed[end - 1] ^= 1;
     unsummed[end + 9..end + 13].fill(0);
     assert!(is_complete(&unsummed, Want::Payload));
 }
 
-/// The places of the values of this field in a ROS 1 bag.
+/// The positions of this field's values in a ROS 1 bag.
 fn values(bytes: &[u8], field: &[u8]) -> Vec<usize> {
     let starts = bytes.windows(field.len()).enumerate();
     let starts = starts.filter(|(_, window)| *window == field);
@@ -200,7 +200,7 @@ fn chunk_infos_with_too_few_connections_lose_no_message() {
             let (_, kept) = read_bytes("x.bag", &lying);
             assert_eq!(kept.stamps.len(), truth, "{fewer} of {stated} at {info}");
             assert!(!kept.notices.is_empty());
-            // The same lie, told by the length of the record and its content as well.
+            // The same wrong count, consistent with the record's length and content.
             let len = count + 4 + 4;
             let pairs = len + 8 * usize::from(fewer)..len + 8 * usize::from(stated);
             let later = values(&bytes, b"index_pos=")[0];
@@ -219,7 +219,7 @@ fn foreign_records_in_a_chunk_are_reported_by_both_readers() {
     let recording = super::short();
     let truth = recording.messages.len();
     let mut bytes = rosbag1::unindexed(&rosbag1::write(&recording, Pack::None, 4000));
-    // What the index behind a chunk knows is believed; here there is none.
+    // The index of a chunk is trusted; here there is none.
     let mut lost = 0;
     for at in values(&bytes, b"op=\x02").into_iter().step_by(2) {
         bytes[at - 1] = 10;

@@ -1,4 +1,4 @@
-//! What the targets share: bytes as a file, a bag read into nothing, a message of any type read into a graph.
+//! Shared code of the fuzz targets: bytes as a file, reading a bag without output, reading a message into a graph.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use bagreel::internals::base::time::Stamp;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use bagreel::{Output, Render};
 
-/// Calls `with` with a file of this name that holds `bytes`, in memory where the system has such a folder.
+/// Calls `with` with a file of this name and content, in memory if the system has such a folder.
 pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {
     let memory = Path::new("/dev/shm");
     let dir = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
@@ -23,16 +23,16 @@ pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {
     assert!(begin.elapsed() < most, "{:?} for {} bytes", begin.elapsed(), bytes.len());
 }
 
-/// How many times longer than a second and a second per megabyte an input may take, on a machine that does other things
-/// and with code that counts its edges.
+/// The time limit of an input, as a multiple of a second plus a second per megabyte, on a busy machine with
+/// instrumented code.
 const SLOWNESS: u32 = 5;
 
-/// Wants everything, keeps nothing, and holds the reader to its promises.
+/// A sink that wants everything, keeps nothing, and checks the reader's contract.
 #[derive(Default)]
 struct Nothing {
     connections: u32,
     stamps: u64,
-    /// Whether a notice says that something was lost or passed over.
+    /// Whether a notice reports lost or skipped data.
     is_said: bool,
 }
 
@@ -60,20 +60,20 @@ impl Sink for Nothing {
     }
 }
 
-/// Reads whatever lies there, every payload of it.
+/// Reads an input with all payloads.
 pub fn read_bag(path: &Path, verify: bool) {
     let input = Input::Path(path.to_owned());
     if let Ok(mut reader) = bag::open(&input, &OpenOptions { verify, ..OpenOptions::default() }) {
         let _ = reader.span();
         let mut nothing = Nothing::default();
         if reader.read(None, &mut nothing).is_ok() {
-            // Every message takes bytes, but for those that a compressed chunk or row holds.
+            // Every message takes bytes, except in a compressed chunk or row.
             assert!(nothing.stamps < 100_000_000, "{} messages", nothing.stamps);
         }
     }
 }
 
-/// The messages in a bag, and whether a notice says that something is missing; `None` if it is none.
+/// The number of messages in a bag, and whether a notice reports a loss; `None` if it is not a bag.
 fn count(bytes: &[u8]) -> Option<(u64, bool)> {
     let mut counted = None;
     as_file("x", bytes, |path| {
@@ -118,8 +118,8 @@ pub fn healthy(way: u8) -> Vec<u8> {
 /// Messages in a [`healthy`] file.
 pub const HEALTHY: u64 = 24;
 
-/// Damages a healthy file as the bytes say, a place and a mask in every three of them, or cuts it: what is missing
-/// then, a notice says.
+/// Damages or cuts a healthy file as encoded in the bytes (a position and a mask in every three): losses must be
+/// reported.
 pub fn damage(bytes: &[u8]) {
     let Some(([way, cut], edits)) = bytes.split_first_chunk() else {
         return;
@@ -137,7 +137,7 @@ pub fn damage(bytes: &[u8]) {
     }
 }
 
-/// Renders a bag onto a path made of the parts that the bytes choose: the bag stays as it was.
+/// Renders a bag to a path made of parts chosen by the bytes: the bag must stay unchanged.
 pub fn outputs(bytes: &[u8]) {
     const PARTS: [&str; 8] = ["..", ".", "a", "new", "x.mcap", "link.json", "0.mcap", "{n}.mcap"];
     let folder = tempfile::tempdir().expect("a folder");
@@ -168,7 +168,7 @@ pub fn outputs(bytes: &[u8]) {
     assert!(std::fs::read(&path).expect("the bag") == bag, "overwritten by {}", to.display());
 }
 
-/// Reads whatever lies there into graphs.
+/// Reads an input into graphs.
 pub fn read_graphs(path: &Path) {
     let reading = Reading::of([path]);
     if let Ok(mission) = read(&reading, &mut Unwatched) {
@@ -176,7 +176,7 @@ pub fn read_graphs(path: &Path) {
     }
 }
 
-/// Topics and types of which some source reads the messages.
+/// Topics and types whose messages are read by an evidence source.
 const KNOWN: &[(&str, &str)] = &[
     ("/rosout", "rosgraph_msgs/Log"),
     ("/statistics", "rosgraph_msgs/TopicStatistics"),
@@ -199,7 +199,7 @@ const KNOWN: &[(&str, &str)] = &[
     ("/odd", "odd/msg/Odd"),
 ];
 
-/// A bag of one connection, whose type the first byte chooses, and of one message of these bytes.
+/// Reads a bag with one connection, whose type is chosen by the first byte, and one message of these bytes.
 pub fn read_message(encoding: &str, definition: &[u8], bytes: &[u8]) {
     let Some((choice, payload)) = bytes.split_first() else {
         return;

@@ -1,4 +1,4 @@
-//! What differs between two missions, in words and in pictures.
+//! Tests of differences between two missions, as text and as pictures.
 
 use std::fs;
 
@@ -47,7 +47,7 @@ fn differences_are_limited_to_what_both_can_show() {
         assert!(svg.contains(name), "{name}");
     }
     assert!(!svg.contains("window 1 of"), "time means nothing here");
-    // What is in one of them did not start or stop.
+    // Elements in only one of them did not start or stop.
     let html = fs::read_to_string(here.join("d.html")).unwrap();
     for text in [&svg, &html] {
         for words in [

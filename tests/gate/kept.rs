@@ -1,4 +1,4 @@
-//! What a run keeps: the expectation that was written from it, or from another recording of the same mission.
+//! Tests that a run passes the expectation generated from it, or from another recording of the same mission.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -71,13 +71,13 @@ fn every_available_bag_passes_its_own_expectation() {
     for bag in &bags {
         let bag = bag.to_str().unwrap();
         let (code, said) = run(here, &["baseline", bag, "-o", "g.yaml"]);
-        // There are bags without a message, and files that are none.
+        // Some bags have no messages, and some files are not bags.
         if code == 1 {
             continue;
         }
         assert!(matches!(code, 0 | 3), "{bag}: {said}");
         let (kept, said) = run(here, &["check", bag, "--expect", "g.yaml"]);
-        // What is damaged is damaged in both.
+        // Damaged bags fail in both.
         assert!(
             kept == code && said.contains("no findings"),
             "{bag}: {said}"
@@ -139,7 +139,7 @@ fn other_recordings_of_one_mission_pass_its_expectation() {
     }
 }
 
-/// Nodes of ROS 2 are named as they start, and by what they log.
+/// ROS 2 nodes are named at their start and by their logs.
 #[test]
 fn a_late_recorder_proves_no_node_missing() {
     let dir = tempfile::tempdir().unwrap();
@@ -152,7 +152,7 @@ fn a_late_recorder_proves_no_node_missing() {
         said.contains("unknown[node-missing]: cannot tell whether /amcl is there"),
         "{said}"
     );
-    // One that is missing where all others are named is missing.
+    // A node absent although all others are named is missing.
     let text = fs::read_to_string(here.join("g.yaml")).unwrap();
     let more = text.replace("nodes:\n", "nodes:\n  /radar: {}\n");
     fs::write(here.join("g.yaml"), more).unwrap();

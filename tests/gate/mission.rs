@@ -1,4 +1,4 @@
-//! A recorded mission: each of its reconfigurations breaks the rule written for it, and no other.
+//! Tests with a recorded mission: each of its reconfigurations breaks exactly its rule.
 
 use std::fs;
 
@@ -83,7 +83,7 @@ fn each_reconfiguration_breaks_the_rule_written_for_it() {
     assert_eq!(found, expected);
 }
 
-/// Of the mission's reconfigurations each has a rule.
+/// A rule for each of the mission's reconfigurations.
 const STEPS: &str = "\
 schema: bagreel.expect/1
 nodes:
@@ -107,7 +107,7 @@ rules:
   - {id: localizer-restarts, node: /localizer, restarts: ..0}
 ";
 
-/// From one end of the mission, in seconds, to the next: which rules are broken then and were not before, and which were.
+/// An end of the mission in seconds: the rules newly broken there, and those no longer broken.
 type Step = (
     &'static str,
     &'static [&'static str],
@@ -125,14 +125,14 @@ fn each_reconfiguration_breaks_exactly_its_rule() {
         ("50", &["localizer-starts"], &[]),
         ("80", &["planner-starts"], &[]),
         ("110", &["controller-starts"], &[]),
-        // Whether the camera is replaced in time nobody knows by now.
+        // Whether the camera is replaced in time is not known yet.
         ("130", &["node /camera_driver"], &[]),
         ("140", &["camera-is-replaced"], &[]),
         ("160", &["backup-starts"], &[]),
         ("174", &["probe-starts"], &[]),
         ("184", &["node /planner"], &[]),
         ("196", &["node /probe"], &[]),
-        // Who is back has not gone.
+        // A node that returned is not missing.
         ("207", &["planner-restarts"], &["node /planner"]),
         ("220", &["probe-restarts"], &["node /probe"]),
         // Half a second apart, as the next two.

@@ -1,10 +1,10 @@
-//! Reports of a check: hostile names are inert in all of them, and none is larger than its reader takes.
+//! Tests of check reports: hostile names are escaped in all of them, and none exceeds its reader's limit.
 
 use std::fs;
 
 use super::{HEALTHY, bag, bagreel, recording, run, said};
 
-/// Names as nobody should give them.
+/// Hostile names.
 const HOSTILE: [&str; 8] = [
     "/]]>&amp;<![CDATA[x",
     "/@team",
@@ -109,7 +109,7 @@ fn hostile_names_are_inert_in_every_format() {
     for format in ["json", "sarif", "gitlab"] {
         serde_json::from_str::<serde_json::Value>(&print(format)).unwrap();
     }
-    // What is written from such names reads back, and holds.
+    // An expectation with such names can be read back and passes.
     assert_eq!(run(here, &["baseline", "run.bag", "-o", "own.yaml"]).0, 0);
     let (code, said) = run(here, &["check", "run.bag", "--expect", "own.yaml"]);
     assert_eq!((code, said.contains("no findings")), (0, true), "{said}");
@@ -194,7 +194,7 @@ fn no_report_exceeds_its_readers_limit() {
         serde_json::from_slice(&fs::read(here.join("c.json")).unwrap()).unwrap();
     let count = |key: &str| json[key].as_u64().unwrap();
     assert!(count("errors") > 5300 && count("warnings") > 40 && count("unknown") == 0);
-    // 10 of each kind in a step; more are dropped without a word.
+    // GitHub shows 10 of each kind per step and silently drops the rest.
     for (command, key) in [("::error ", "errors"), ("::warning ", "warnings")] {
         let own: Vec<&str> = github.lines().filter(|l| l.starts_with(command)).collect();
         assert_eq!(own.len(), 10, "{command}");

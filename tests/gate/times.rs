@@ -1,18 +1,18 @@
-//! When things begin and end, how long they are silent, and how much they send in all: learnt from healthy runs.
+//! Tests of rules on start and end times, silences and message counts, generated from healthy runs.
 
 use std::fs;
 
 use super::{bag, findings, run};
 use crate::support::Recording;
 
-/// A minute and a half of a robot: what one fault changes.
+/// The parameters of a minute and a half of a robot, changed by faults.
 #[derive(Clone, Copy)]
 struct Mission {
     /// When the arm's node begins to send, in milliseconds.
     arm: (i64, i64),
     /// When the camera sends.
     camera: (i64, i64),
-    /// A part of the commands, which come unevenly, that is sent: every so many.
+    /// Sends every n-th of the irregular commands.
     every: usize,
     has_map: bool,
     /// A silence of the wheels.
@@ -27,7 +27,7 @@ const GOOD: Mission = Mission {
     silence: (90_000, 90_000),
 };
 
-/// The recording; `shift` milliseconds are what the nodes of two runs are apart.
+/// The recording; nodes of different runs are `shift` milliseconds apart.
 fn recording(mission: Mission, shift: i64) -> Recording {
     let mut bag = Recording::default();
     let base = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
@@ -61,7 +61,7 @@ fn each_timing_fault_is_found_and_a_third_healthy_run_passes() {
     let (code, said) = run(here, &["baseline", "a.bag", "b.bag", "-o", "g.yaml"]);
     assert_eq!(code, 0, "{said}");
     let text = fs::read_to_string(here.join("g.yaml")).unwrap();
-    // Ten per cent, at least 5 s, on either side of 0:40 and of 1:00.
+    // Ten percent, at least 5 s, on either side of 0:40 and 1:00.
     for line in [
         "/arm/joints: {type: sensor_msgs/JointState, by: [/arm], hz: 4.5..5.5, max_gap: 1s, within: 35s..46s}",
         "/image: {type: sensor_msgs/Image, by: [/camera], hz: 4.52..5.53, max_gap: 1s, within: ..6s, may_end: 53s..}",
@@ -129,7 +129,7 @@ fn each_timing_fault_is_found_and_a_third_healthy_run_passes() {
         let ids = findings(here, &file, "g.yaml");
         assert_eq!(ids.len(), expected.len(), "{name}: {said}");
     }
-    // Of a part of a recording no times are judged: they count from its beginning.
+    // Times are not checked for a part of a recording, as they count from its beginning.
     let part = [
         "check",
         "healthy.bag",
@@ -152,7 +152,7 @@ fn each_timing_fault_is_found_and_a_third_healthy_run_passes() {
 fn a_listed_topic_without_messages_is_missing() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
-    // Its action client publishes it, and never cancels.
+    // Its action client advertises it, and never cancels.
     let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     let name = "/robot1/move_base/cancel";
     for (facts, code) in [

@@ -1,5 +1,5 @@
-//! Standard output is as careful as a file: every `--format` is honoured, and no name steers a terminal, a job of
-//! GitHub's, a spreadsheet or a reader of JSON.
+//! Tests of standard output: every `--format` is respected, and no name can control a terminal, a GitHub job, a
+//! spreadsheet or a JSON reader.
 
 use std::path::Path;
 
@@ -61,12 +61,12 @@ fn events_are_printed_in_every_format() {
     assert_eq!(events("markdown").lines().count(), many + 2);
 }
 
-/// Characters that a terminal, or whoever reads its text, would obey.
+/// Whether a terminal or another reader would interpret a character.
 fn is_obeyed(c: char) -> bool {
     c.is_control() && c != '\n' || ('\u{202a}'..='\u{202e}').contains(&c)
 }
 
-/// A bag with names that try to steer whatever prints them.
+/// A bag with names that try to control their reader.
 fn steering(folder: &Path) -> String {
     let mut recording = Recording::default();
     for name in [
@@ -113,7 +113,7 @@ fn no_name_is_printed_raw() {
     }
 }
 
-/// Every format of text that `render` writes into one file.
+/// Every text format that `render` writes to a single file.
 const TEXTS: &[&str] = &["json", "dot", "mmd", "md", "svg", "html", "gexf", "graphml"];
 
 #[test]

@@ -1,4 +1,4 @@
-//! What only processes of Unix can be asked: signals at any stage, pipes that stall, children that chatter.
+//! Tests for Unix processes: signals at any stage, stalled pipes, verbose child processes.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::{COURIER, command, errors, names};
 
-/// How long an end may take: half a second, and what a loaded machine adds.
+/// The time limit for an exit: half a second, plus the delay of a loaded machine.
 const SOON: Duration = Duration::from_secs(15);
 
 fn signal(child: &Child, name: &str) {
@@ -18,7 +18,7 @@ fn signal(child: &Child, name: &str) {
     assert!(done.unwrap().success());
 }
 
-/// Waits for the end of a process that was told to stop; answers its exit code.
+/// Waits for a process that was signalled to stop; returns its exit code.
 #[track_caller]
 fn ended(mut child: Child) -> Option<i32> {
     let since = Instant::now();
@@ -39,7 +39,7 @@ fn fifo(path: &Path) {
     assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
 }
 
-/// A command that waits for something that never comes.
+/// A command that waits forever.
 fn stalled(folder: &Path, args: &[&str]) -> Child {
     let child = command(folder, args)
         .stdin(Stdio::piped())
@@ -52,12 +52,12 @@ fn stalled(folder: &Path, args: &[&str]) -> Child {
     child
 }
 
-/// Waits until the process listens to signals, where the system tells: a loaded machine takes its time.
+/// Waits until the process handles signals, if the system reports it: a loaded machine may be slow.
 fn await_handlers(child: &Child) {
     let is_caught = || {
         let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
         let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:"))?;
-        // A bit for each signal, the first for signal 1; a termination is 15.
+        // One bit per signal, the lowest for signal 1; SIGTERM is 15.
         Some(u64::from_str_radix(mask.trim(), 16).ok()? >> 14 & 1 == 1)
     };
     let since = Instant::now();
@@ -66,7 +66,7 @@ fn await_handlers(child: &Child) {
     }
 }
 
-/// Whether the process was told by its parents to ignore a hang-up.
+/// Whether the process inherited an ignored SIGHUP.
 fn ignores_hangups(child: &Child) -> bool {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
@@ -167,7 +167,7 @@ fn ignored_signals_stay_ignored() {
     );
 }
 
-/// Puts a program of this name and text before all others.
+/// Creates a program of this name and text, first in `PATH`.
 fn with_program(folder: &Path, name: &str, text: &str) -> String {
     use std::os::unix::fs::PermissionsExt as _;
     let path = folder.join(name);
@@ -214,7 +214,7 @@ fn a_verbose_ffmpeg_does_not_block() {
     );
 }
 
-/// A minute of mission is drawn from cells of a second each: what lives through all of them must not take room in each.
+/// A minute of mission has cells of a second each: elements that exist throughout must not take memory in each.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_hundred_thousand_nodes_fit_into_memory() {

@@ -1,4 +1,4 @@
-//! ROS 2 payloads as CDR writes them: little-endian, aligned from behind the header of four bytes.
+//! ROS 2 payloads in CDR: little-endian, aligned relative to the end of the four-byte header.
 
 /// A payload being written.
 pub struct Cdr(Vec<u8>);

@@ -110,7 +110,7 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ),
 ];
 
-/// The definition of a type with those of all types inside it.
+/// The definition of a type with those of all nested types.
 pub fn definition(type_name: &str) -> String {
     let mut parts = vec![type_name.to_owned()];
     let mut at = 0;
@@ -144,7 +144,7 @@ pub fn definition(type_name: &str) -> String {
     text
 }
 
-/// `offered_qos_profiles` of so many publishers, as Jazzy writes it.
+/// `offered_qos_profiles` of this many publishers, as Jazzy writes it.
 fn qos(publishers: usize, depth: u32, durability: &str) -> String {
     let endless = "\n    sec: 9223372036\n    nsec: 854775807";
     format!(
@@ -170,14 +170,14 @@ impl Mission {
         place
     }
 
-    /// A topic whose last message is kept for those who come later.
+    /// A topic with transient local durability.
     fn kept(&mut self, node: &str, topic: &str, type_name: &str) -> usize {
         let place = self.topic(node, topic, type_name);
         self.bag.publishers[place].qos = qos(1, 1, "transient_local");
         place
     }
 
-    /// Sends what `payload` makes of each moment, `hz` times a second between two moments in seconds.
+    /// Publishes `payload` of each time, `hz` times per second, between two times in seconds.
     fn stream(
         &mut self,
         topic: usize,
@@ -187,7 +187,7 @@ impl Mission {
     ) {
         let count = ((to - from) * hz) as i64;
         for i in 0..count {
-            // Recorders see messages a little late, never at the same distance.
+            // Recorders receive messages with a varying delay.
             let jitter = (i * 7919 + topic as i64 * 104_729) % 3_000_000;
             let at = ORIGIN + (from * 1e9) as i64 + (i as f64 / hz * 1e9) as i64 + jitter;
             self.bag.messages.push((topic, at, payload(at - jitter)));
@@ -202,7 +202,7 @@ impl Mission {
         self.bag.messages.push((self.rosout, at + 400_000, payload));
     }
 
-    /// A node that starts: it declares a parameter and says that it is there.
+    /// Starts a node: it declares a parameter and logs its start.
     fn start(&mut self, node: &str, second: f64) {
         let at = ORIGIN + (second * 1e9) as i64;
         let empty = |cdr: Cdr| (0..5).fold(cdr.text(""), |cdr, _| cdr.u32(0));
@@ -310,7 +310,7 @@ const UNCONFIGURED: (u8, &str) = (1, "unconfigured");
 const INACTIVE: (u8, &str) = (2, "inactive");
 const ACTIVE: (u8, &str) = (3, "active");
 
-/// The mission. The README of `examples/` tells it minute by minute.
+/// The mission. The README of `examples/` describes it minute by minute.
 pub fn mission() -> Recording {
     let mut m = Mission {
         bag: Recording::default(),
@@ -328,7 +328,7 @@ pub fn mission() -> Recording {
     m.bag
 }
 
-/// The robot itself: there all the time, but for the lidar, which falls silent for a while.
+/// The robot itself: present throughout, except for the lidar, which is silent for a while.
 fn base(m: &mut Mission) {
     for node in [
         "/base_driver",
@@ -369,7 +369,7 @@ fn base(m: &mut Mission) {
     m.stream(scan_data, (78.0, 120.0), 5.0, scan);
 }
 
-/// Localisation and planning: brought up one after the other, taken down before the end.
+/// Localisation and planning: started one after the other, stopped before the end.
 fn navigation(m: &mut Mission) {
     m.start("/amcl", 10.0);
     let estimated = m.topic(
@@ -398,7 +398,7 @@ fn navigation(m: &mut Mission) {
     m.stream(command, (65.0, 100.0), 10.0, twist(0.3));
 }
 
-/// Somebody takes the robot by hand, and it hands over a parcel.
+/// Manual control of the robot, and delivery of a parcel.
 fn delivery(m: &mut Mission) {
     m.start("/teleop", 48.0);
     let command = m.topic("/teleop", "/cmd_vel", "geometry_msgs/msg/Twist");

@@ -1,8 +1,8 @@
-//! How large the letters of a PDF are on paper, read out of its content streams.
+//! Font sizes of a PDF on paper, from its content streams.
 
 use std::io::Read as _;
 
-/// The size in points of every run of letters of every page, scaling included.
+/// The size in points of every text run on every page, including scaling.
 pub fn letters_pt(pdf: &[u8]) -> Vec<f64> {
     let mut all = Vec::new();
     let mut rest = pdf;
@@ -23,7 +23,7 @@ fn find(text: &[u8], word: &[u8]) -> Option<usize> {
     text.windows(word.len()).position(|w| w == word)
 }
 
-/// What a content stream is made of, without what strings hold.
+/// The tokens of a content stream, without the contents of strings.
 fn tokens(content: &[u8]) -> Vec<String> {
     let mut all = vec![String::new()];
     let (mut depth, mut escaped) = (0, false);
@@ -47,14 +47,14 @@ fn tokens(content: &[u8]) -> Vec<String> {
     all
 }
 
-/// How tall one unit is after a matrix `a b c d e f`.
+/// The height of one unit after a matrix `a b c d e f`.
 fn tall(matrix: &[f64]) -> f64 {
     matrix[2].hypot(matrix[3])
 }
 
 fn of_content(content: &[u8]) -> Vec<f64> {
     let (mut all, mut numbers) = (Vec::new(), Vec::new());
-    // How tall a unit of the page's drawing is, and those that `Q` goes back to; no drawing of ours turns text.
+    // The height of a unit on the page, and the heights that `Q` restores; our drawings never rotate text.
     let (mut page, mut kept) = (1.0, Vec::new());
     let (mut size, mut line) = (0.0, 1.0);
     for token in tokens(content) {

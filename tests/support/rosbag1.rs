@@ -84,11 +84,11 @@ struct Chunk {
     plain: Vec<u8>,
     /// Per connection: times and offsets.
     index: BTreeMap<u32, Vec<(i64, u32)>>,
-    /// What stands behind the packed records.
+    /// Bytes after the compressed records.
     behind: Vec<u8>,
 }
 
-/// The chunk's record, its index records, and what the tail says of it.
+/// The chunk's record, its index records, and its entry in the tail.
 fn close(chunk: &Chunk, how: Pack, pos: u64) -> (Vec<u8>, Vec<u8>) {
     let (name, mut data) = packed(how, &chunk.plain);
     data.extend(&chunk.behind);
@@ -154,7 +154,7 @@ pub fn write(recording: &Recording, how: Pack, chunk: usize) -> Vec<u8> {
     write_with(recording, how, chunk, &[])
 }
 
-/// A bag with these bytes behind the packed records of every chunk.
+/// A bag with these bytes after the compressed records of every chunk.
 fn write_with(recording: &Recording, how: Pack, chunk: usize, behind: &[u8]) -> Vec<u8> {
     const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
     let mut bytes = MAGIC.to_vec();
@@ -198,15 +198,15 @@ fn write_with(recording: &Recording, how: Pack, chunk: usize, behind: &[u8]) -> 
     bytes
 }
 
-/// A bag that is mostly a hole: what is not zero in it, and where that lies.
+/// A sparse bag: its nonzero parts and their positions.
 #[cfg(feature = "remote")]
 pub struct SparseBag {
     pub len: u64,
     pub parts: Vec<(u64, Vec<u8>)>,
 }
 
-/// A bag of `chunks` chunks of `chunk` bytes, each with twenty messages of one publisher and one of another, a tenth of a
-/// second behind the one before and half as long again. What they hold is a hole: only the index says so.
+/// A bag of `chunks` chunks of `chunk` bytes, each with twenty messages of one publisher and one of another, a tenth of
+/// a second apart and half as long again. Their contents are a hole, listed only in the index.
 #[cfg(feature = "remote")]
 pub fn sparse(publishers: &[Publisher; 2], start: i64, chunks: usize, chunk: u32) -> SparseBag {
     const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
@@ -224,7 +224,7 @@ pub fn sparse(publishers: &[Publisher; 2], start: i64, chunks: usize, chunk: u32
         let fields: [(&str, &[u8]); 3] =
             [("op", &[5]), ("compression", b"none"), ("size", &[0; 4])];
         let index = head.split_off(record(&fields, &[]).len());
-        // Its size, unpacked and packed.
+        // Its size, uncompressed and compressed.
         let sizes = head.len() - 8;
         head[sizes..].copy_from_slice(&chunk.to_le_bytes().repeat(2));
         let behind = at + head.len() as u64 + u64::from(chunk);
@@ -244,7 +244,7 @@ pub fn sparse(publishers: &[Publisher; 2], start: i64, chunks: usize, chunk: u32
     SparseBag { len, parts }
 }
 
-/// The same bag as if its recorder had been killed: no tail, and a head that says so.
+/// The same bag as if its recorder had been killed: no tail, as stated in the head.
 pub fn unindexed(bag: &[u8]) -> Vec<u8> {
     let at = bag.windows(10).position(|w| w == b"index_pos=").unwrap() + 10;
     let index_pos = u64::from_le_bytes(bag[at..at + 8].try_into().unwrap());
@@ -253,10 +253,10 @@ pub fn unindexed(bag: &[u8]) -> Vec<u8> {
     cut
 }
 
-/// Small bags that unfold to twenty gigabytes: where a chunk was never closed, where its index is wrong, and where a
-/// message is said to lie deep in it.
+/// Small bags that expand to twenty gigabytes: with an unclosed chunk, with a wrong index, and with a message stated to
+/// be deep inside.
 pub fn bombs(recording: &Recording) -> Vec<(&'static str, Vec<u8>)> {
-    // A record that is nearly as long as one can be, and zeros: 64 MB in each of many streams.
+    // A record of nearly maximal length, and zeros: 64 MB in each of many streams.
     let mut long = record(&[("op", &[9])], &[]);
     let at = long.len() - 4;
     long[at..].fill(0xff);
@@ -275,10 +275,10 @@ pub fn bombs(recording: &Recording) -> Vec<(&'static str, Vec<u8>)> {
     let size = behind_field(b"\x09\0\0\0size=", 0);
     open[size..size + 8].fill(0);
     assert!(size > chunk);
-    // The bag's head has counts of its own, of other names.
+    // The bag's head has its own counts under other names.
     let count = behind_field(b"\x0a\0\0\0count=", 0);
     wrong[count] += 1;
-    // Behind the count: the length of the entries, then time and offset of each.
+    // After the count: the length of the entries, then time and offset of each.
     let second = count + 4 + 4 + 12 + 8;
     deep[second..second + 4].copy_from_slice(&4_000_000_000u32.to_le_bytes());
     vec![("open", open), ("wrong", wrong), ("deep", deep)]

@@ -9,7 +9,7 @@ use rusqlite::{Connection, params};
 
 use super::Recording;
 
-/// Writes a database; topics are told apart by name and type only, as rosbag2 does.
+/// Writes a database; topics are distinguished by name and type only, as in rosbag2.
 pub fn write(recording: &Recording, path: &Path) {
     let mut db = Connection::open(path).unwrap();
     db.execute_batch(
@@ -57,7 +57,7 @@ pub fn write(recording: &Recording, path: &Path) {
     db.close().unwrap();
 }
 
-/// Writes `metadata.yaml`, version 9, for storage files that hold the recording.
+/// Writes `metadata.yaml`, version 9, for storage files with the recording.
 pub fn write_metadata(recording: &Recording, folder: &Path, storage: &str, files: &[&str]) {
     let counts = recording.counts();
     let times = || recording.messages.iter().map(|m| m.1);

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use bagreel::internals::base::geometry::{Point, Rect, Size};
 use bagreel::internals::layout::{Layout, Orientation, Plan, Route};
 
-/// What `dot` makes of a plan; `None` if it is not installed or takes longer than `seconds`.
+/// The layout by `dot`; `None` if it is not installed or takes longer than `seconds`.
 pub(crate) fn lay_out(
     plan: &Plan,
     orientation: Orientation,

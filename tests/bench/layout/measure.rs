@@ -1,4 +1,4 @@
-//! What makes a layout good or bad, in numbers, for any engine alike.
+//! Quality metrics of a layout, for any engine.
 
 #![allow(dead_code, reason = "the properties look at some of the numbers only")]
 #![allow(
@@ -9,7 +9,7 @@
 use bagreel::internals::base::geometry::{Point, Rect, Size};
 use bagreel::internals::layout::{Layout, Outline, Plan, Route};
 
-/// The numbers of one layout.
+/// The metrics of one layout.
 #[derive(Default)]
 pub(crate) struct Measures {
     /// Pairs of boxes that overlap.
@@ -27,7 +27,7 @@ pub(crate) struct Measures {
     pub(crate) crossed: usize,
     /// Vertices inside a cluster that is not theirs.
     pub(crate) foreign: usize,
-    /// How many pieces of routes are not straight and level.
+    /// The number of route segments that are not straight and horizontal.
     pub(crate) bends: usize,
     /// The length of all edges, in pixels.
     pub(crate) length: f64,
@@ -71,7 +71,7 @@ pub(crate) fn measure(plan: &Plan, layout: &Layout) -> Measures {
 
 fn crossed(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
     let labels = layout.routes.iter().zip(&plan.links).enumerate();
-    // The arcs of self loops are measured in more pieces here than there.
+    // The arcs of self loops are measured in more segments here than in the layout.
     let labels = labels.filter(|(_, (_, link))| link.from != link.to);
     let labels = labels.filter_map(|(i, (route, link))| {
         // Two may touch; `enters` looks 2 px further inside.
@@ -93,7 +93,7 @@ fn strayed(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
         let (Some(middle), Some(size)) = (route.label, link.label) else {
             continue;
         };
-        // Lines are measured in more pieces here than there.
+        // Lines are measured in more segments here than in the layout.
         let (core, whole) = (Size::new(3.0, 3.0), Size::new(size.w - 3.0, size.h - 3.0));
         let on = |line: &Vec<Point>, size: Size| {
             let area = Rect::around(middle, size);
@@ -161,7 +161,7 @@ fn through(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
     count
 }
 
-/// Whether a straight piece enters a shape by more than 2 px.
+/// Whether a straight segment enters a shape by more than 2 px.
 fn enters(pair: &[Point], at: &Rect, outline: Outline) -> bool {
     let inner = at.grown(-2.0);
     let (low, high) = (pair[0].x.min(pair[1].x), pair[0].x.max(pair[1].x));

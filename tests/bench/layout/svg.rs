@@ -1,4 +1,4 @@
-//! A layout as an SVG with `data-*` attributes, for measuring elsewhere and for looking at.
+//! A layout as an SVG with `data-*` attributes, for viewing and external measurements.
 
 use std::fmt::Write as _;
 

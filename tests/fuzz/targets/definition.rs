@@ -1,4 +1,4 @@
-//! Message definitions, up to the first byte 0xff, and a payload behind it.
+//! Message definitions, up to the first byte 0xff, followed by a payload.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -1,4 +1,4 @@
-//! `metadata.yaml` of a folder, which may name two files that are there.
+//! `metadata.yaml` of a folder, which may list two existing files.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
