@@ -101,6 +101,7 @@ fn folder() -> tempfile::TempDir {
     }
     let topology = "nodes:\n  /rviz: {subscribes: [/robot1/plan]}\n";
     fs::write(dir.path().join("topology.yaml"), topology).unwrap();
+    copy(&examples.join("paper/phases.txt"), "phases.txt");
     fs::create_dir(dir.path().join("images")).unwrap();
     dir
 }
@@ -167,6 +168,49 @@ fn every_command_of_readme_and_docs_runs() {
         }
     }
     assert!(tried > 60, "{tried} commands");
+}
+
+/// The number of bytes that all pictures of the docs may have.
+const MOST_BYTES: u64 = 3_000_000;
+
+/// `INSTA_UPDATE=always` writes the pictures anew. Pixels are equal on one kind of processor only.
+#[test]
+fn gallery_shows_what_its_commands_draw() {
+    let (gallery, dir) = (chapter("gallery.md"), folder());
+    let images = root().join("docs/src/images");
+    let is_new = std::env::var("INSTA_UPDATE").is_ok_and(|word| word == "always");
+    let (mut shown, mut stale) = (0, Vec::new());
+    for part in gallery.split("](images/").skip(1) {
+        let (name, rest) = part.split_once(')').unwrap();
+        let command = commands(rest)[0];
+        assert!(
+            command.ends_with(&format!(" -o images/{name}")),
+            "{command}"
+        );
+        let output = run(command, dir.path());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{command}: {said}");
+        let drawn = fs::read(dir.path().join("images").join(name)).unwrap();
+        let is_text = Path::new(name).extension().is_some_and(|e| e == "svg");
+        if is_new {
+            fs::write(images.join(name), &drawn).unwrap();
+        } else if is_text || cfg!(target_arch = "x86_64") {
+            let is_same = fs::read(images.join(name)).is_ok_and(|old| old == drawn);
+            stale.extend((!is_same).then_some(name));
+        }
+        shown += 1;
+    }
+    assert_eq!(
+        stale,
+        Vec::<&str>::new(),
+        "draw them anew with INSTA_UPDATE=always"
+    );
+    assert_eq!(shown, 20);
+    let files = fs::read_dir(images).unwrap();
+    let bytes: u64 = files
+        .map(|file| file.unwrap().metadata().unwrap().len())
+        .sum();
+    assert!(bytes <= MOST_BYTES, "{bytes} bytes of pictures");
 }
 
 #[test]

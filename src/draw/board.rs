@@ -235,7 +235,7 @@ impl<'a> Board<'a> {
         let why = if self.source.knows_publishers() {
             "a timeline of topics; --view graph draws the graph".to_owned()
         } else if elements.publishes.is_empty() {
-            "the bag names no publishers or subscribers; add them with --topology FILE; bagreel info lists what would have recorded them".to_owned()
+            "the bag names no publishers; add them with --topology FILE; bagreel info says how to record them".to_owned()
         } else {
             "most publishers are unknown; add them with --topology FILE, or draw what is known with --view graph".to_owned()
         };

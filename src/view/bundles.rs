@@ -7,6 +7,8 @@ use super::group::Groups;
 use super::names::is_plumbing;
 use super::select::Selection;
 use super::{AlsoHere, Item, Namespace, Showing, ViewOptions};
+use crate::base::time::Stamp;
+use crate::graph::window::default_period;
 use crate::graph::{Elements, NodeId, Topic};
 use crate::mission::Mission;
 use crate::mission::ledger::{Entry, Kind};
@@ -133,9 +135,18 @@ fn changing_nodes(
     (changes, changes_itself)
 }
 
-/// The headlines but for the starts in the first window.
+/// The end of the time in which everything begins that is there from the beginning, to the eye, where a mission is one
+/// window.
+pub(crate) fn beginning(mission: &Mission) -> Option<Stamp> {
+    let first = default_period(mission.span.nanos());
+    let end = mission.span.start.plus(first.nanos());
+    (mission.windows.len() == 1 && !mission.ledger.compares).then_some(end)
+}
+
+/// The headlines but for the starts in the first window, or in the beginning of the only one.
 pub(crate) fn news(mission: &Mission) -> impl Iterator<Item = &Entry> {
     let first = mission.windows.first().map(|window| window.span.end);
+    let first = beginning(mission).or(first);
     let is_first =
         move |e: &Entry| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
     let entries = mission.ledger.entries.iter();

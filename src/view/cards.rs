@@ -58,7 +58,7 @@ impl Drawn {
             }
             let is_plumbing = hides_plumbing && is_plumbing(&self.items[topic as usize].name)
                 || self.is_hub(owners.keys());
-            if (owners.len() == 1 || is_plumbing) && self.is_always_connected(topic, &lines) {
+            if (owners.len() == 1 || is_plumbing) && self.is_told(topic, &lines, is_plumbing) {
                 let own = owners.into_iter();
                 rows.extend(
                     own.map(|(owner, lines)| self.row((topic, owner), &lines, is_plumbing)),
@@ -102,13 +102,18 @@ impl Drawn {
         }
     }
 
-    /// Whether one of these arrows of a topic is there whenever the topic is.
-    fn is_always_connected(&self, topic: u32, lines: &[usize]) -> bool {
+    /// Whether one of these arrows of a topic is there whenever the topic is; of plumbing, whenever something is reported of
+    /// it.
+    fn is_told(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
         let Some(looks) = self.items_shown.get(topic as usize) else {
             return true;
         };
-        let mut windows = self.turns(topic, lines).into_iter();
-        windows.all(|k| looks.at(k as usize).is_none() || self.line(lines, k).is_some())
+        let needs_line = |k: &u32| {
+            let look = looks.at(*k as usize);
+            look.is_some_and(|look| !is_plumbing || look.mark.is_some())
+        };
+        let mut windows = self.turns(topic, lines).into_iter().filter(needs_line);
+        windows.all(|k| self.line(lines, k).is_some())
     }
 
     /// The windows in which a topic or one of its arrows gets another look.

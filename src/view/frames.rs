@@ -1,5 +1,6 @@
 //! The windows one after the other, each with the headlines of the ledger in it.
 
+use super::bundles::beginning;
 use super::caption::Speaker;
 use super::items::Viewed;
 use super::lasting::LastingEvents;
@@ -12,7 +13,6 @@ use super::turn::{WindowTurn, marked, with_ends};
 use super::{Attendance, Counts, Frame, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::graph::window::default_period;
 use crate::mission::{Mission, Window};
 
 /// The windows, and the looks of each item and arrow in them.
@@ -77,14 +77,6 @@ fn join_empty(frames: &mut [Frame]) {
             }
         }
     }
-}
-
-/// The end of the time in which everything begins that is there from the beginning, to the eye, where a mission is one
-/// window.
-fn beginning(mission: &Mission) -> Option<Stamp> {
-    let first = default_period(mission.span.nanos());
-    let end = mission.span.start.plus(first.nanos());
-    (mission.windows.len() == 1 && !mission.ledger.compares).then_some(end)
 }
 
 /// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before, or

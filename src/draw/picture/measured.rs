@@ -188,9 +188,6 @@ fn first_seen(view: &View) -> Vec<usize> {
     first
 }
 
-/// The words on the box of a namespace inside its own frame, beside the members that were kept open.
-const REST: &str = "all others";
-
 struct Measurer<'a> {
     view: &'a View,
     style: &'a Style,
@@ -220,11 +217,11 @@ impl Measurer<'_> {
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         if item.kind == ItemKind::Namespace {
-            let is_rest = &*item.name == inside;
-            name = if is_rest {
-                REST.to_owned()
-            } else {
-                name + "/…"
+            let is_open = |other: &Item| other.kind == ItemKind::Node && other.cluster == item.cluster;
+            name = match (&*item.name == inside, self.view.items.iter().any(is_open)) {
+                (true, true) => "all others".to_owned(),
+                (true, false) => "all nodes".to_owned(),
+                (false, _) => name + "/…",
             };
         }
         Label {
