@@ -9,8 +9,10 @@ use bagreel::internals::evidence::conclude;
 use bagreel::internals::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use bagreel::internals::evidence::{Degree, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
+use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
 
 use crate::support::cdr::Cdr;
+use crate::support::rosbag1::{Pack, write};
 use crate::support::{ORIGIN, Recording};
 
 const SECOND: i64 = 1_000_000_000;
@@ -219,6 +221,38 @@ fn a_mux_subscribes_to_all_its_inputs() {
     assert_eq!(
         copies(&bag),
         ["/cmd_nav > /mux inferred", "/cmd_teleop > /mux inferred"]
+    );
+}
+
+#[test]
+fn the_turn_of_a_mux_is_a_hand_over_and_no_step_of_a_rate() {
+    let mut bag = Recording::default();
+    let teleop = bag.publisher("/teleop", "/cmd_teleop", "geometry_msgs/Twist");
+    let nav = bag.publisher("/nav", "/cmd_nav", "geometry_msgs/Twist");
+    let mux = bag.publisher("/mux", "/cmd_vel", "geometry_msgs/Twist");
+    for n in 0..600_u32 {
+        let at = i64::from(n) * 100;
+        for (from, is_its_turn) in [(teleop, n < 300 && n % 2 == 0), (nav, n >= 300)] {
+            let sent = (n + 1000 * u32::try_from(from).unwrap()).to_le_bytes();
+            if from == nav || n % 2 == 0 {
+                bag.at(from, at, sent.repeat(12));
+            }
+            if is_its_turn {
+                bag.at(mux, at + 2, sent.repeat(12));
+            }
+        }
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mux.bag");
+    std::fs::write(&path, write(&bag, Pack::None, 768 * 1024)).unwrap();
+    let mut reading = bagreel::Reading::of([path]);
+    reading.collect.payload_bytes = u64::MAX;
+    let mission = bagreel::read(&reading).unwrap();
+    let text = log(&mission, LogFormat::Text, LogOptions::default());
+    assert_eq!(
+        text,
+        "      00:30.0  /cmd_vel handed over: /teleop → /nav, by /mux\n"
     );
 }
 

@@ -269,7 +269,14 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
-        payload::hear(&mut heard, beginning, message.size);
+        // The number in the header is the publisher's own, in a copy too.
+        let own = if self.numbers.contains_key(&place) {
+            4
+        } else {
+            0
+        };
+        let content = beginning.get(own..).unwrap_or_default();
+        payload::hear(&mut heard, content, message.size);
         if self.aged[place] {
             equal_stamps::age(&mut heard, beginning);
         }

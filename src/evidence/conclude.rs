@@ -15,7 +15,9 @@ use crate::base::time::Stamp;
 use crate::evidence::claim::{Claims, Measurement, Name};
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
-use crate::evidence::proof::{Conclusions, ElementKey, Incident, Proof, Stream, Validity, offers};
+use crate::evidence::proof::{
+    Conclusions, ElementKey, Incident, IncidentKind, Proof, Stream, Validity, offers,
+};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
@@ -107,6 +109,9 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     for incident in &mut incidents {
         let renamed = incident.what.renamed(&to);
         incident.what = renamed.with_node(&mut |name| role(name));
+        if let IncidentKind::Turn(from, before) = &mut incident.kind {
+            (*from, *before) = (to(*from), to(*before));
+        }
     }
     let renamed = |stream: &Stream| {
         let publisher = stream.publisher.map(to);

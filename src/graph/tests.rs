@@ -3,6 +3,7 @@
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
 use crate::base::time::Span;
+use crate::evidence::Degree;
 use crate::evidence::collector::Collector;
 use crate::evidence::conclude::ConcludeOptions;
 use crate::evidence::topology::NamedElement::{Node, Subscribe};
@@ -125,6 +126,16 @@ fn a_node_starts_only_where_something_shows_that_it_was_absent() {
     let edge = u32::try_from(edge.unwrap()).unwrap();
     let life = all.lives.of(Element::Publish(edge)).unwrap()[0];
     assert_eq!((life.span.start, life.began), (Stamp(0), None));
+    // Before its first message it is only inferred.
+    let degrees = all.graphs.iter().take(5).map(|graph| {
+        let state = graph.publishes.iter().find(|state| state.id == edge);
+        state.map(|state| state.degree)
+    });
+    let [before, after] = [Some(Degree::Inferred), Some(Degree::Measured)];
+    assert_eq!(
+        degrees.collect::<Vec<_>>(),
+        [before, before, before, after, after]
+    );
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Conclusions, ElementKey};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::Stamp;
-use crate::evidence::claim::SourceId;
+use crate::evidence::claim::{Name, SourceId};
 
 /// The kind of an incident, with what is stated about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub(crate) enum IncidentKind {
     Duplicate,
     /// The recorder lost so many messages.
     Lost(u64),
+    /// A node that passed on the messages of one topic passes on those of another one.
+    Turn(Name, Name),
 }
 
 /// A statement about an element.

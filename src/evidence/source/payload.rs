@@ -12,9 +12,10 @@ use foldhash::quality::FixedState;
 use foldhash::{HashMap, HashSet};
 
 use super::SourceContext;
+use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::spread::Spread;
 
 /// The fewest equal messages that are not chance.
@@ -25,6 +26,8 @@ const SHARE: u64 = 90;
 const FIRST: u64 = 3;
 /// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
+/// The most runs that are kept of a flow: a mux that turns more often passes on several inputs at once.
+const MOST_RUNS: usize = 4096;
 /// The longest time that a message takes to be passed on, in nanoseconds.
 const RECENT_NS: i64 = 2_000_000_000;
 /// Log topics, which are left out: log records are passed on by a known node.
@@ -58,6 +61,14 @@ struct PayloadPair {
     lag: Spread,
 }
 
+/// Messages of an output in a row that all come from one input, and only from it.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    input: usize,
+    first: Stamp,
+    count: u64,
+}
+
 /// The result of going through all messages once.
 #[derive(Debug, Default)]
 struct Matches {
@@ -65,6 +76,10 @@ struct Matches {
     /// By flow: the number of its different messages that were seen before in exactly these other flows.
     origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
     distinct: BTreeMap<usize, u64>,
+    /// By flow: the number of its messages that another one had just after it: the recorder may get a copy first.
+    later: BTreeMap<usize, BTreeMap<usize, u64>>,
+    /// By flow, in order.
+    runs: BTreeMap<usize, Vec<Run>>,
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -80,7 +95,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         known.copies.insert((node, basis));
-        for input in nearest(&matches, *output, &inputs) {
+        let inputs = nearest(&matches, *output, &inputs);
+        turns(source, known, &flows, &matches, (*output, &inputs));
+        for input in inputs {
             let topic = flows[input].0;
             let what = ElementKey::Subscribe(topic, node);
             known.infer(source, what, ElementKey::Publish(node, basis), |known| {
@@ -91,6 +108,31 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 )
             });
         }
+    }
+}
+
+/// Adds the times at which a mux begins to pass on another of its inputs.
+fn turns(
+    source: SourceId,
+    known: &mut Conclusions<'_>,
+    flows: &[PayloadFlow],
+    matches: &Matches,
+    (output, inputs): (usize, &[usize]),
+) {
+    let runs = matches.runs.get(&output).into_iter().flatten();
+    let runs: Vec<&Run> = runs
+        .filter(|run| run.count >= FEWEST_OF_SENDER && inputs.contains(&run.input))
+        .collect();
+    for pair in runs
+        .windows(2)
+        .filter(|pair| pair[0].input != pair[1].input)
+    {
+        let [from, to] = [pair[0], pair[1]].map(|run| flows[run.input].0);
+        let (what, kind) = (
+            ElementKey::Topic(flows[output].0),
+            IncidentKind::Turn(from, to),
+        );
+        known.incident(source, what, kind, pair[1].first);
     }
 }
 
@@ -175,12 +217,29 @@ impl PayloadWalk {
         if owners.len() >= MOST_AT_ONCE {
             return;
         }
+        for (_, other) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
+            let later = self.found.later.entry(*other).or_default();
+            *later.entry(flow).or_default() += 1;
+        }
         let mut origins = Vec::new();
         for (before, input) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
             let pair = self.found.pairs.entry((*input, flow)).or_default();
             pair.before += 1;
             pair.lag.add(time.since(*before) as f64 / 1e9);
             origins.push(*input);
+        }
+        if let [input] = origins[..] {
+            let runs = self.found.runs.entry(flow).or_default();
+            let is_more = runs.len() < MOST_RUNS;
+            match runs.last_mut() {
+                Some(run) if run.input == input => run.count += 1,
+                _ if is_more => runs.push(Run {
+                    input,
+                    first: time,
+                    count: 1,
+                }),
+                _ => {}
+            }
         }
         if !origins.is_empty() {
             origins.sort_unstable();
@@ -221,13 +280,16 @@ fn inputs(
     from.into_iter().filter(is_input).collect()
 }
 
-/// The number of different messages of an output that one of these inputs had before.
+/// The number of different messages of an output that one of these inputs had just before, or just after.
 fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
     let origins = matches.origins.get(&output).into_iter().flatten();
-    origins
-        .filter(|(from, _)| from.iter().any(|f| inputs.contains(f)))
+    let before = origins.filter(|(from, _)| from.iter().any(|f| inputs.contains(f)));
+    let later = matches.later.get(&output).into_iter().flatten();
+    let later = later.filter(|(input, _)| inputs.contains(input));
+    let all = before
         .map(|(_, count)| count)
-        .sum()
+        .chain(later.map(|(_, count)| count));
+    all.sum::<u64>().min(matches.distinct[&output])
 }
 
 /// The nearer of two inputs that have the same messages, which lie on one path: the one with clearly less spread of
@@ -276,6 +338,17 @@ mod tests {
         ]);
         assert_eq!(found.pairs[&(0, 1)].before, 2);
         assert_eq!(found.distinct, [(0, 2), (1, 2)].into());
+    }
+
+    #[test]
+    fn a_copy_that_the_recorder_gets_first_is_a_copy_too() {
+        let message = |n: u32| {
+            let (at, early) = (i64::from(n) * 100, n % 5 == 0);
+            [(0, at, n), (1, if early { at - 1 } else { at + 1 }, n)]
+        };
+        let found = walked(&(1..41).flat_map(message).collect::<Vec<_>>());
+        assert_eq!(copied(&found, 1, &[0]), 40);
+        assert_eq!(found.pairs[&(0, 1)].before, 32);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::rates::{Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::error::Result;
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
@@ -144,7 +144,11 @@ impl GraphAssembly<'_> {
             let state = TopicState {
                 id,
                 state: record.state(*window, sum.is_some()),
-                degree: record.degree,
+                degree: degree_in(
+                    record,
+                    self.history.elements.topics[id as usize].first,
+                    *window,
+                ),
                 count,
                 bytes: bytes(sum, sums.is_some()),
                 hz: per_second(count, *window),
@@ -174,7 +178,11 @@ impl GraphAssembly<'_> {
                 let state = NodeState {
                     id: *id,
                     state: record.state(*window, false),
-                    degree: record.degree,
+                    degree: degree_in(
+                        record,
+                        self.history.elements.nodes[*id as usize].first,
+                        *window,
+                    ),
                     hz: sent.and_then(|of| per_second(of[at], *window)),
                     lifecycle: self.findings.values.lifecycle(*name, *window),
                 };
@@ -214,7 +222,13 @@ impl GraphAssembly<'_> {
                                 .or(self.measures.of(what, at).jitter_s),
                             ..self.measures.of(what, at)
                         },
-                        ..edge_state(id, record.degree, state, *window, count)
+                        ..edge_state(
+                            id,
+                            degree_in(record, edge.first, *window),
+                            state,
+                            *window,
+                            count,
+                        )
                     };
                     self.graphs.publish(at, &state);
                 }
@@ -244,7 +258,13 @@ impl GraphAssembly<'_> {
                 let state = EdgeState {
                     bytes: self.measures.bytes(what, at),
                     measures: self.measures.of(what, at),
-                    ..edge_state(id, record.degree, state, *window, None)
+                    ..edge_state(
+                        id,
+                        degree_in(record, edge.first, *window),
+                        state,
+                        *window,
+                        None,
+                    )
                 };
                 self.graphs.subscribe(at, &state);
             }
@@ -274,6 +294,15 @@ fn counted(count: u64, is_sole: bool, sum: &Sums, of: impl Fn(&Vec<u64>) -> u64)
         bytes: sum.stream_bytes.as_ref().map(of),
         jitter: Number::of(sum.jitter_s.filter(|_| is_sole)),
         ..Row::new(State::Active, Degree::Measured)
+    }
+}
+
+/// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
+fn degree_in(record: &Record, first: Option<Stamp>, window: Span) -> Degree {
+    if first.is_some_and(|first| window.end <= first) {
+        record.degree.max(Degree::Inferred)
+    } else {
+        record.degree
     }
 }
 

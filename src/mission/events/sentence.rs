@@ -46,7 +46,18 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
                     |id: &u32| visible(elements.nodes[*id as usize].name.as_str()).into_owned();
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
-            format!("handed over: {} → {}", names(from), names(to))
+            let mut by: Vec<u32> = Vec::new();
+            if let Element::Topic(topic) = entry.what {
+                let own = elements.publishes.iter().filter(|edge| edge.topic == topic);
+                by.extend(own.map(|edge| edge.node));
+            }
+            // Who sends and is not one of them is the mux between them.
+            let is_end = |node| from.contains(node) || to.contains(node);
+            let by = match by.iter().any(is_end) {
+                false if !by.is_empty() => format!(", by {}", names(&by)),
+                _ => String::new(),
+            };
+            format!("handed over: {} → {}{by}", names(from), names(to))
         }
         (Detail::Count(many), Kind::Appeared) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));

@@ -32,12 +32,24 @@ fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
 /// stopped or started.
 fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
+    let steps = headlines(drafts, &[Kind::Rate]);
     for hand in headlines(drafts, &[Kind::HandedOver]) {
         let entry = drafts.get(hand).clone();
         let (Detail::Senders { from, to }, Element::Topic(topic)) = (&entry.detail, entry.what)
         else {
             continue;
         };
+        for step in &steps {
+            let other = drafts.get(*step);
+            let (Some(node), of) = told.elements.ends(other.what) else {
+                continue;
+            };
+            // A mux has the rate of the sender whose turn it is.
+            let is_mux = of == Some(topic) && !from.contains(&node) && !to.contains(&node);
+            if is_mux && is_within(other.time, entry.time, TOGETHER_NS) {
+                drafts.fold(*step, hand);
+            }
+        }
         for turn in &turns {
             let other = drafts.get(*turn);
             let Element::Node(node) = other.what else {
@@ -47,7 +59,7 @@ fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
                 Kind::Stopped => (from, entry.earliest),
                 _ => (to, entry.time),
             };
-            let is_end = of.contains(&node) && other.time.since(at).abs() <= TOGETHER_NS;
+            let is_end = of.contains(&node) && is_within(other.time, at, TOGETHER_NS);
             if is_end && is_only_sender(told, node, topic) {
                 drafts.fold(*turn, hand);
             }

@@ -1,14 +1,16 @@
-//! Remarks: subscribers that get nothing, names used twice, and messages that the recorder lost, which explain silences.
+//! What is stated about elements besides their being there: subscribers that get nothing, names used twice, messages that
+//! the recorder lost, which explain silences, and the turns of a mux.
 
 use super::make::{Drafts, LedgerInput, exact};
 use super::{Detail, EntryId, Kind};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::Stamp;
 use crate::evidence::Degree;
+use crate::evidence::claim::Name;
 use crate::evidence::proof::IncidentKind;
-use crate::graph::Element;
+use crate::graph::{Element, NodeId};
 
-/// Adds all remarks.
+/// Adds all of them.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     for incident in &told.history.incidents {
         let (kind, detail) = match &incident.kind {
@@ -18,11 +20,21 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
             }
             IncidentKind::Duplicate => (Kind::Duplicate, Detail::None),
             IncidentKind::Lost(many) => (Kind::Lost, Detail::Count(*many)),
+            IncidentKind::Turn(from, to) => {
+                let [from, to] = [from, to].map(|topic| publishers(told, *topic));
+                if from.is_empty() || to.is_empty() || from == to {
+                    continue;
+                }
+                (Kind::HandedOver, Detail::Senders { from, to })
+            }
         };
         let mut entry = told.entry(kind, incident.what, exact(incident.time));
         entry.until = incident.until;
         entry.detail = detail;
-        entry.degree = Degree::Stated;
+        entry.degree = match kind {
+            Kind::HandedOver => Degree::Inferred,
+            _ => Degree::Stated,
+        };
         entry.evidence = incident.evidence;
         let id = drafts.add(entry);
         if kind == Kind::Lost {
@@ -30,6 +42,14 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
             explain(drafts, id, incident.what, (incident.time, until));
         }
     }
+}
+
+/// The known publishers of a topic.
+fn publishers(told: &LedgerInput<'_>, topic: Name) -> Vec<NodeId> {
+    let topic = told.history.topic_ids.get(&topic);
+    let edges = told.elements.publishes.iter();
+    let own = edges.filter(|edge| Some(&edge.topic) == topic && !edge.evidence.is_guess());
+    own.map(|edge| edge.node).collect()
 }
 
 /// Makes the silences of a topic, with those of its nodes, parts of the loss that explains them. A loss is reported
