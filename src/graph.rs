@@ -129,9 +129,10 @@ pub struct Elements {
 
 worded! {
     /// The state of an element in one window.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub enum State {
         /// Messages or evidence in the window.
+        #[default]
         Active = "active",
         /// Alive without a message.
         Silent = "silent",
@@ -143,7 +144,7 @@ worded! {
 }
 
 /// The state of a node in one window.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct NodeState {
     /// The node.
     pub id: NodeId,
@@ -173,7 +174,7 @@ pub struct Measures {
 }
 
 /// The state of a topic in one window.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TopicState {
     /// The topic.
     pub id: TopicId,
@@ -196,7 +197,7 @@ pub struct TopicState {
 }
 
 /// The state of a publication or subscription in one window.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeState {
     /// The edge.
     pub id: EdgeId,

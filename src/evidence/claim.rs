@@ -15,9 +15,10 @@ use crate::evidence::times::{SeriesId, Stamps};
 
 worded! {
     /// The strength of the evidence for something. Ordered: the stronger is the smaller.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub enum Degree {
         /// Messages of this very connection, or the middleware's own statistics.
+        #[default]
         Measured = "measured",
         /// A statement: a log record's topic list, a graph snapshot, the user's own file.
         Stated = "stated",

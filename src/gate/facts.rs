@@ -13,7 +13,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::history::Bound;
-use crate::graph::{Edge, Element, NodeId, State, TopicId};
+use crate::graph::{Edge, Element, NodeId, PerElement, State, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::{Entry, Kind};
 
@@ -22,7 +22,8 @@ pub(crate) use tempo::{Rate, TopicSilence};
 /// A mission, with facts that are asked for often worked out once.
 pub(crate) struct Facts<'a> {
     pub(crate) mission: &'a Mission,
-    degrees: Degrees,
+    /// The strongest degree to which each element is known.
+    degrees: PerElement<Degree>,
     /// The number of messages of each topic.
     messages: Vec<u64>,
     /// Whether a tool rewrote the bag, so that it names false publishers.
@@ -34,13 +35,6 @@ pub(crate) struct Facts<'a> {
     topics: BTreeMap<&'a str, TopicId>,
     /// The publications and the subscriptions of each topic.
     edges: [Vec<Vec<u32>>; 2],
-}
-
-/// The strongest degree to which each element is known.
-struct Degrees {
-    nodes: Vec<Degree>,
-    publishes: Vec<Degree>,
-    subscribes: Vec<Degree>,
 }
 
 /// Words of evidence for what should be, not for what was. A file of the user's tells what was.
@@ -71,13 +65,18 @@ impl<'a> Facts<'a> {
     /// The facts of a mission.
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let elements = &mission.elements;
-        let (degrees, messages) = summed(mission);
+        let degrees = mission.graphs.degrees(elements);
+        let is_there = |id| degrees.of(Element::Node(id)) < Some(&Degree::Declared);
+        let count = |id| {
+            let rows = mission.graphs.rows(Element::Topic(id));
+            rows.filter_map(|(_, row)| row.count).sum()
+        };
+        let topics = (0..).zip(&elements.topics);
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
         let mut names = BTreeMap::new();
         for (id, node) in (0..).zip(&elements.nodes) {
             // What never was in a window lies outside the part that is judged.
-            let is_there = degrees.nodes[id as usize] < Degree::Declared;
-            if is_there && is_seen(node.evidence) {
+            if is_there(id) && is_seen(node.evidence) {
                 roles.entry(&node.role).or_default().push(id);
                 names.insert(node.name.as_str(), &*node.role);
             }
@@ -85,15 +84,14 @@ impl<'a> Facts<'a> {
         Self {
             mission,
             degrees,
-            messages,
+            messages: topics.clone().map(|(id, _)| count(id)).collect(),
             is_rewritten: mission
                 .notices
                 .iter()
                 .any(|n| n.kind == NoticeKind::Rewritten),
             roles,
             names,
-            topics: (0..)
-                .zip(&elements.topics)
+            topics: topics
                 .map(|(id, topic)| (topic.name.as_str(), id))
                 .collect(),
             edges: [&elements.publishes, &elements.subscribes]
@@ -192,9 +190,14 @@ impl<'a> Facts<'a> {
         is_quiet(self.topic(topic))
     }
 
+    fn degree(&self, what: Element) -> Degree {
+        let known = self.degrees.of(what).copied();
+        known.unwrap_or(Degree::Declared)
+    }
+
     /// Whether a role is measured or stated, not only inferred.
     pub(crate) fn is_sure(&self, nodes: &[NodeId]) -> bool {
-        let sure = |id: &NodeId| self.degrees.nodes[*id as usize] <= Degree::Stated;
+        let sure = |id: &NodeId| self.degree(Element::Node(*id)) <= Degree::Stated;
         nodes.iter().any(sure)
     }
 
@@ -203,9 +206,8 @@ impl<'a> Facts<'a> {
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
         let own = self.edges[0][topic as usize].iter();
         own.map(|id| {
-            let place = *id as usize;
-            let edge = &self.mission.elements.publishes[place];
-            (edge.node, *id, self.degrees.publishes[place])
+            let edge = &self.mission.elements.publishes[*id as usize];
+            (edge.node, *id, self.degree(Element::Publish(*id)))
         })
         .collect()
     }
@@ -214,9 +216,8 @@ impl<'a> Facts<'a> {
     pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
         let own = self.edges[1][topic as usize].iter();
         own.map(|id| {
-            let place = *id as usize;
-            let edge = &self.mission.elements.subscribes[place];
-            (edge.node, *id, self.degrees.subscribes[place])
+            let edge = &self.mission.elements.subscribes[*id as usize];
+            (edge.node, *id, self.degree(Element::Subscribe(*id)))
         })
         .collect()
     }
@@ -389,31 +390,6 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// The strongest degree to which each element is known, and the number of messages of each topic.
-fn summed(mission: &Mission) -> (Degrees, Vec<u64>) {
-    let elements = &mission.elements;
-    let mut degrees = Degrees {
-        nodes: vec![Degree::Declared; elements.nodes.len()],
-        publishes: vec![Degree::Declared; elements.publishes.len()],
-        subscribes: vec![Degree::Declared; elements.subscribes.len()],
-    };
-    let mut messages = vec![0; elements.topics.len()];
-    for graph in &mission.graphs {
-        let nodes = graph.nodes.iter().map(|s| (s.id, s.degree));
-        raise(&mut degrees.nodes, nodes);
-        let edges = graph.publishes.iter().map(|s| (s.id, s.degree));
-        raise(&mut degrees.publishes, edges);
-        let edges = graph.subscribes.iter().map(|s| (s.id, s.degree));
-        raise(&mut degrees.subscribes, edges);
-        for topic in &graph.topics {
-            if let Some(sum) = messages.get_mut(topic.id as usize) {
-                *sum += topic.count;
-            }
-        }
-    }
-    (degrees, messages)
-}
-
 /// The edges of each topic, but for those of nodes that nothing names.
 fn by_topic(edges: &[Edge], topics: usize) -> Vec<Vec<u32>> {
     let mut all = vec![Vec::new(); topics];
@@ -423,13 +399,4 @@ fn by_topic(edges: &[Edge], topics: usize) -> Vec<Vec<u32>> {
         }
     }
     all
-}
-
-/// Keeps the best degree of each element.
-fn raise(best: &mut [Degree], seen: impl Iterator<Item = (u32, Degree)>) {
-    for (id, degree) in seen {
-        if let Some(own) = best.get_mut(id as usize) {
-            *own = degree.min(*own);
-        }
-    }
 }

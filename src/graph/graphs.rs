@@ -11,8 +11,9 @@ pub(crate) use walk::ColumnWalk;
 
 use std::sync::Arc;
 
-use super::{EdgeState, Element, Graph, NodeState, TopicState};
+use super::{EdgeState, Element, Elements, Graph, NodeState, PerElement, TopicState};
 use crate::base::time::Span;
+use crate::evidence::Degree;
 
 /// A graph per window, in order.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +79,14 @@ impl Graphs {
             row.map(|row| (at, row))
         };
         (0..self.spans.len()).filter_map(row)
+    }
+
+    /// The strongest degree to which each element is known in any window.
+    pub(crate) fn degrees(&self, elements: &Elements) -> PerElement<Degree> {
+        PerElement::new(elements, |what| {
+            let degrees = self.rows(what).map(|(_, row)| row.degree);
+            degrees.min().unwrap_or(Degree::Declared)
+        })
     }
 
     /// The lifecycle state in a row.

@@ -22,7 +22,7 @@ pub use why::why;
 use crate::base::name::is_recorder;
 use crate::base::words::visible_json;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Edge, Element, NodeId};
+use crate::graph::{Edge, EdgeId, Element, NodeId};
 use crate::mission::Mission;
 
 /// The output of `bagreel info` for one mission. Written as JSON with these names.
@@ -178,16 +178,22 @@ pub struct NodeInfo {
 /// The summary of a mission; its windows become the parts of each topic's activity.
 pub fn info(mission: &Mission) -> Info {
     let elements = &mission.elements;
-    let best = BestDegrees::of(mission);
+    let best = mission.graphs.degrees(elements);
+    let degrees = |is_kind: fn(&Element) -> bool| -> DegreeCounts {
+        let own = best.iter().filter(|(what, _)| is_kind(what));
+        let known = own.filter(|(what, _)| !elements.evidence(*what).is_guess());
+        known.map(|(_, degree)| *degree).collect()
+    };
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
-    let named = elements.nodes.iter().enumerate();
+    let named = (0..).zip(&elements.nodes);
     let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
     let nodes = named.map(|(id, node)| {
-        let own = &traffic[id];
+        let own = &traffic[id as usize];
+        let degree = best.of(Element::Node(id));
         NodeInfo {
             name: node.name.to_string(),
-            degree: best.nodes[id].word(),
+            degree: degree.map_or("", |degree| degree.word()),
             evidence: node.evidence.words().collect(),
             first_ns: node.runs.first().map(|run| run.start.0),
             last_ns: node.runs.last().map(|run| run.end.0 - 1),
@@ -204,15 +210,11 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: known(&best.nodes, elements.nodes.iter().map(|e| e.evidence)).collect(),
-        publishes_by_degree: known(
-            &best.publishes,
-            elements.publishes.iter().map(|e| e.evidence),
-        )
-        .collect(),
+        nodes_by_degree: degrees(|what| matches!(what, Element::Node(_))),
+        publishes_by_degree: degrees(|what| matches!(what, Element::Publish(_))),
         subscribes_by_degree: listeners(mission)
             .filter(|(_, edge)| !edge.evidence.is_guess())
-            .map(|(id, _)| best.subscribes[id])
+            .filter_map(|(id, _)| best.of(Element::Subscribe(id)).copied())
             .collect(),
         topics_without_publisher: lacking(&topics, &mut elements.publishes.iter()),
         topics_without_subscriber: lacking(&topics, &mut listeners(mission).map(|(_, edge)| edge)),
@@ -257,43 +259,6 @@ fn bags(mission: &Mission) -> Vec<BagInfo> {
     told.collect()
 }
 
-/// The best degree of every element over all windows.
-struct BestDegrees {
-    nodes: Vec<Degree>,
-    publishes: Vec<Degree>,
-    subscribes: Vec<Degree>,
-}
-
-impl BestDegrees {
-    fn of(mission: &Mission) -> Self {
-        let elements = &mission.elements;
-        let mut best = Self {
-            nodes: vec![Degree::Declared; elements.nodes.len()],
-            publishes: vec![Degree::Declared; elements.publishes.len()],
-            subscribes: vec![Degree::Declared; elements.subscribes.len()],
-        };
-        for graph in &mission.graphs {
-            graph
-                .nodes
-                .iter()
-                .for_each(|s| better(&mut best.nodes[s.id as usize], s.degree));
-            graph
-                .publishes
-                .iter()
-                .for_each(|s| better(&mut best.publishes[s.id as usize], s.degree));
-            graph
-                .subscribes
-                .iter()
-                .for_each(|s| better(&mut best.subscribes[s.id as usize], s.degree));
-        }
-        best
-    }
-}
-
-fn better(best: &mut Degree, degree: Degree) {
-    *best = degree.min(*best);
-}
-
 /// The word of the evidence for publishers that are counted, not named: the summary counts them with their topics.
 const UNNAMED: &str = "unknown";
 
@@ -301,24 +266,14 @@ fn is_unnamed(evidence: Evidence) -> bool {
     evidence == Evidence::of(UNNAMED)
 }
 
-/// The degree of each element, without stand-ins for nodes without a name.
-fn known(
-    degrees: &[Degree],
-    evidence: impl Iterator<Item = Evidence>,
-) -> impl Iterator<Item = Degree> {
-    let all = degrees.iter().copied().zip(evidence);
-    all.filter(|(_, evidence)| !evidence.is_guess())
-        .map(|(degree, _)| degree)
-}
-
 /// Subscriptions with their ids, without those of the recorder, which is not part of the robot.
-fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
+fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
     let elements = &mission.elements;
     let is_recorder = |edge: &Edge| {
         let node = &elements.nodes[edge.node as usize];
         is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
     };
-    let edges = elements.subscribes.iter().enumerate();
+    let edges = (0..).zip(&elements.subscribes);
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 

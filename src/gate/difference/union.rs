@@ -9,9 +9,7 @@ use crate::evidence::{Degree, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
-use crate::graph::{
-    Edge, EdgeState, Element, Elements, Graph, Measures, Node, NodeState, State, Topic, TopicState,
-};
+use crate::graph::{Edge, EdgeState, Element, Elements, Graph, Node, NodeState, Topic, TopicState};
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger, sorted};
 use crate::mission::{Mission, Window};
 
@@ -130,20 +128,12 @@ pub(crate) fn union(
         windows.first().map_or(at, |w| w.span.start),
         Stamp(2 * SECOND),
     );
-    let nodes = (0..)
-        .zip(&elements.nodes)
-        .map(|(id, n)| (n.name.as_str(), id));
-    let topics = (0..)
-        .zip(&elements.topics)
-        .map(|(id, t)| (t.name.as_str(), id));
     let entries = UnionLedger {
         a: &a,
         b: &b,
         elements: &elements,
         differing,
         turned: turned(differing),
-        nodes: nodes.collect(),
-        topics: topics.collect(),
         at,
         entries: Vec::new(),
     };
@@ -156,9 +146,8 @@ pub(crate) fn union(
         step: period,
         ledger: Ledger {
             entries: sorted(entries.all(), &elements).0,
-            phases: Vec::new(),
-            interruptions: Vec::new(),
             compares: true,
+            ..Ledger::default()
         },
         elements,
         windows,
@@ -182,9 +171,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
             node: place(node)?,
             topic: topic_place(topic)?,
             evidence,
-            first: None,
-            last: None,
-            runs: Vec::new(),
+            ..Edge::default()
         })
     };
     let publishes = both(&a.publishes, &b.publishes).into_iter();
@@ -202,9 +189,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
                 name: name.as_str().into(),
                 role: name.as_str().into(),
                 evidence: *evidence,
-                first: None,
-                last: None,
-                runs: Vec::new(),
+                ..Node::default()
             })
             .collect(),
         topics: topics
@@ -217,11 +202,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
                     name: name.as_str().into(),
                     types: types.into_iter().map(|t| t.as_str().into()).collect(),
                     evidence: own().fold(Evidence::NONE, |all, t| all.and(t.evidence)),
-                    first: None,
-                    last: None,
-                    qos: None,
-                    runs: Vec::new(),
-                    unknown_publishers: None,
+                    ..Topic::default()
                 }
             })
             .collect(),
@@ -245,55 +226,41 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     let node = |id: u32| elements.nodes[id as usize].name.to_string();
     let topic = |id: u32| elements.topics[id as usize].name.to_string();
     let edge = |id: u32, known: Option<&(Degree, Evidence)>| {
-        known.map(|(degree, _)| EdgeState {
+        let degree = known?.0;
+        Some(EdgeState {
             id,
-            state: State::Active,
-            degree: *degree,
-            count: None,
-            hz: None,
-            bytes: None,
-            measures: Measures::default(),
+            degree,
+            ..EdgeState::default()
         })
     };
+    let nodes = (0..).zip(&elements.nodes).filter_map(|(id, own)| {
+        let (degree, _) = seen.nodes.get(own.name.as_str())?;
+        Some(NodeState {
+            id,
+            degree: *degree,
+            ..NodeState::default()
+        })
+    });
+    let topics = (0..).zip(&elements.topics).filter_map(|(id, own)| {
+        let topic = seen.topics.get(own.name.as_str())?;
+        Some(TopicState {
+            id,
+            count: topic.count,
+            hz: topic.hz,
+            ..TopicState::default()
+        })
+    });
+    let publishes = (0..).zip(&elements.publishes);
+    let publishes = publishes
+        .filter_map(|(id, e)| edge(id, seen.publishes.get(&(node(e.node), topic(e.topic)))));
+    let subscribes = (0..).zip(&elements.subscribes);
+    let subscribes = subscribes
+        .filter_map(|(id, e)| edge(id, seen.subscribes.get(&(topic(e.topic), node(e.node)))));
     Graph {
-        nodes: (0..)
-            .zip(&elements.nodes)
-            .filter_map(|(id, own)| {
-                let (degree, _) = seen.nodes.get(own.name.as_str())?;
-                Some(NodeState {
-                    id,
-                    state: State::Active,
-                    degree: *degree,
-                    hz: None,
-                    lifecycle: None,
-                })
-            })
-            .collect(),
-        topics: (0..)
-            .zip(&elements.topics)
-            .filter_map(|(id, own)| {
-                let topic = seen.topics.get(own.name.as_str())?;
-                Some(TopicState {
-                    id,
-                    state: State::Active,
-                    degree: Degree::Measured,
-                    count: topic.count,
-                    bytes: None,
-                    hz: topic.hz,
-                    median_period_s: None,
-                    max_gap_s: None,
-                    measures: Measures::default(),
-                })
-            })
-            .collect(),
-        publishes: (0..)
-            .zip(&elements.publishes)
-            .filter_map(|(id, e)| edge(id, seen.publishes.get(&(node(e.node), topic(e.topic)))))
-            .collect(),
-        subscribes: (0..)
-            .zip(&elements.subscribes)
-            .filter_map(|(id, e)| edge(id, seen.subscribes.get(&(topic(e.topic), node(e.node)))))
-            .collect(),
+        nodes: nodes.collect(),
+        topics: topics.collect(),
+        publishes: publishes.collect(),
+        subscribes: subscribes.collect(),
     }
 }
 
@@ -304,8 +271,6 @@ struct UnionLedger<'a> {
     elements: &'a Elements,
     differing: &'a [Difference],
     turned: Turned<'a>,
-    nodes: BTreeMap<&'a str, u32>,
-    topics: BTreeMap<&'a str, u32>,
     at: Stamp,
     entries: Vec<Entry>,
 }
@@ -381,8 +346,8 @@ impl UnionLedger<'_> {
         if difference.side != Where::Both {
             return;
         }
-        let node = self.nodes.get(difference.name.as_str()).copied();
-        let topic = self.topics.get(difference.name.as_str()).copied();
+        let node = self.elements.node(&difference.name);
+        let topic = self.elements.topic(&difference.name);
         let values = || {
             let of = |value: &str| match (difference.kind, value.parse()) {
                 ("restarts", Ok(n)) => words::count(n, "restart").into(),
