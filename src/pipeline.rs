@@ -1,4 +1,4 @@
-//! The whole program in the order it happens: it reads, divides, builds, compares, draws and writes.
+//! The whole program in order: read, divide, build, compare, draw and write.
 
 use crate::base::words::worded;
 mod collect;
@@ -53,7 +53,7 @@ pub(crate) use {
 };
 
 worded! {
-    /// A part of the work, for progress and timings.
+    /// A stage of the work, for progress and timings.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     #[non_exhaustive]
     pub enum Stage {
@@ -72,9 +72,9 @@ worded! {
     }
 }
 
-/// A watcher of the work, which is informed of its progress and may stop it.
+/// An observer of the work, which receives its progress and may stop it.
 pub trait Watch {
-    /// A new stage begins; the one before is over.
+    /// A new stage begins and the previous one ends.
     fn stage(&mut self, _stage: Stage) {}
 
     /// The stage has done `done` of `total`.
@@ -83,16 +83,16 @@ pub trait Watch {
     /// A note for the user before the next stage begins, in a sentence.
     fn note(&mut self, _text: &str) {}
 
-    /// The shares of the stage's time: the words of its steps and the share of each, 0..=1, the largest first.
+    /// The shares of the stage's time: the names of its steps and the share of each, 0..=1, largest first.
     fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
 
-    /// Whether to stop at the next good moment, leaving nothing half-written.
+    /// Whether to stop as soon as possible, leaving no partial files.
     fn stopped(&self) -> bool {
         false
     }
 }
 
-/// A watcher that does nothing.
+/// An observer that does nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unwatched;
 

@@ -17,7 +17,7 @@ use crate::graph::window;
 pub(super) struct Collected {
     pub(super) reports: Vec<Report>,
     pub(super) recorded: Recorded,
-    /// The time that the windows divide.
+    /// The time range that is divided into windows.
     pub(super) range: Span,
 }
 
@@ -31,7 +31,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
     let mut readers = bag::open_each(inputs.clone(), &options).collect::<Result<Vec<_>>>()?;
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
-    // Where time falls, a part of the mission is not a part of the times.
+    // If time goes back, a part of the mission is not a range of times.
     let cut = cut && readers.iter().all(|reader| reader.is_straight());
     let known = if cut { known_span(&mut readers)? } else { None };
     let range = known
@@ -96,8 +96,8 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
 /// The beginning of the notice about a clock that was set back.
 const SET_BACK: &str = "the recorder's clock went back by";
 
-/// The options of collecting, without the payloads of bags that are too large, or too far away, to be compared: an index
-/// would be of no use if every payload were read. Where all are asked for they are read.
+/// The collection options without comparing payloads of large or remote bags, where reading all payloads would defeat
+/// the index. They are compared on request.
 fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
@@ -110,10 +110,10 @@ fn affordable(reading: &Reading) -> collector::CollectOptions {
     options
 }
 
-/// The words for a bag that is whole and empty.
+/// The message for an intact, empty bag.
 pub(super) const NOTHING_RECORDED: &str = "the recording is empty";
 
-/// The error for bags without a message, with the losses on the way.
+/// The error for bags without messages, including losses.
 pub(super) fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
     let lost: Vec<String> = notices
         .iter()

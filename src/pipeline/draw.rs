@@ -1,4 +1,4 @@
-//! The options of the picture, and a view with its places.
+//! The options of the picture, and a view with its positions.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::view::{View, ViewOptions, view};
 /// The kind of picture of a mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A graph, or a board where the publishers of most messages are unknown.
+    /// A graph, or a board if the publishers of most messages are unknown.
     #[default]
     Auto,
     /// The computation graph.
@@ -52,13 +52,13 @@ pub struct Drawing {
     pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
-    /// The place where it will be seen, if that decides the page: see [`Drawing::seen`].
+    /// The medium, if it determines the page: see [`Drawing::seen`].
     pub(crate) purpose: Option<Purpose>,
-    /// Whether to grow the page and collapse namespaces until the text can be read.
+    /// Whether to enlarge the page and collapse namespaces until the text is legible.
     pub is_fitted: bool,
     /// The layout engine.
     pub engine: &'static (dyn Engine + Sync),
-    /// Places of an earlier drawing, which are kept; new elements are placed beside them.
+    /// Positions of an earlier drawing, which are kept; new elements are placed beside them.
     pub kept: Option<Places>,
 }
 
@@ -66,7 +66,7 @@ impl Drawing {
     /// The light style on a page of 1280×720 that may grow, as the command line has it.
     ///
     /// # Errors
-    /// None that a user can cause: the built-in style is known to be valid.
+    /// None in practice: the built-in style is valid.
     pub fn new() -> crate::base::error::Result<Self> {
         Ok(Self {
             body: Body::default(),
@@ -84,8 +84,7 @@ impl Drawing {
 }
 
 impl Drawing {
-    /// The same drawing for this place where it is seen: page, size of text and furniture follow from it, whatever they
-    /// were.
+    /// The same drawing for this medium, which overrides page, text size and furniture.
     #[must_use]
     pub fn seen(self, purpose: Purpose) -> Self {
         Self {
@@ -96,7 +95,7 @@ impl Drawing {
         }
     }
 
-    /// The same drawing by another engine.
+    /// The same drawing with another engine.
     pub(super) fn with(&self, engine: &'static (dyn Engine + Sync)) -> Self {
         Self {
             engine,
@@ -104,7 +103,7 @@ impl Drawing {
         }
     }
 
-    /// The smallest text that can be read, in pixels.
+    /// The smallest legible text, in pixels.
     pub(super) fn readable(&self) -> f64 {
         self.purpose.map_or(READABLE, Purpose::readable)
     }
@@ -122,7 +121,7 @@ pub(super) struct Composed {
     pub(super) notices: Notices,
 }
 
-/// The view where nothing is drawn: everything asked for, without places.
+/// The view if nothing is drawn: everything requested, without positions.
 pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     Composed {
         view: view(mission, &drawing.view).0,
@@ -133,7 +132,7 @@ pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     }
 }
 
-/// The view where only the data itself is written: an empty one.
+/// The empty view, if only data is written.
 pub(super) fn unseen(drawing: &Drawing) -> Composed {
     Composed {
         view: View::default(),
@@ -144,7 +143,7 @@ pub(super) fn unseen(drawing: &Drawing) -> Composed {
     }
 }
 
-/// The place of each item in an earlier drawing; `None` for new ones.
+/// The position of each item in an earlier drawing; `None` for new ones.
 pub(super) fn known(view: &View, kept: &Places) -> Vec<Option<Rect>> {
     let places: BTreeMap<(&str, &str), Rect> = kept
         .boxes
@@ -157,7 +156,7 @@ pub(super) fn known(view: &View, kept: &Places) -> Vec<Option<Rect>> {
         .collect()
 }
 
-/// The places of a layout, for the JSON.
+/// The positions of a layout, for the JSON.
 pub(super) fn places(view: &View, layout: &Layout) -> Places {
     let boxes = view.items.iter().zip(&layout.boxes);
     let mut boxes: Vec<Place> = boxes

@@ -35,18 +35,18 @@ pub struct Render {
     pub drawing: Drawing,
     /// The options of the sequence.
     pub sequence: options::SequenceOptions,
-    /// Files and folders of the user's that are read beside the inputs, and never overwritten.
+    /// Other files and folders that are read, and never overwritten.
     pub kept: Vec<PathBuf>,
     /// The outputs to write.
     pub outputs: Vec<Output>,
-    /// The output in place of all others for a picture that is not a film: of a mission in one window, or a topic timeline.
+    /// The output that replaces all others if the picture is not an animation: a mission in one window, or a board.
     pub still: Option<Output>,
-    /// Whether data files hold the viewed graph only.
+    /// Whether data files contain only the filtered graph.
     pub is_filtered: bool,
 }
 
 impl Render {
-    /// A job that reads `reading` and writes `outputs`, with everything else as the command line has it.
+    /// A job that reads `reading` and writes `outputs`, with the command line's defaults.
     ///
     /// # Errors
     /// As [`Drawing::new`].
@@ -71,14 +71,14 @@ pub struct Rendered {
     pub mission: Mission,
     /// All notices, about the mission and about its drawing.
     pub notices: Notices,
-    /// The files written, by output in the order asked for.
+    /// The files written, per output in the given order.
     pub written: Vec<Written>,
 }
 
-/// Reads, draws and writes. Outputs are checked before anything is read, and appear whole or not at all.
+/// Reads, draws and writes. Outputs are checked before anything is read, and written atomically.
 ///
 /// # Errors
-/// Where an output cannot be written, no input can be read, or an option makes no sense.
+/// If an output cannot be written, no input can be read, or an option is invalid.
 pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
     check(job)?;
     let mission = read(&job.reading, watch)?;
@@ -97,7 +97,7 @@ pub(crate) fn check(job: &Render) -> Result<()> {
     export::check(&outputs.cloned().collect::<Vec<_>>(), &kept)
 }
 
-/// Refuses a figure without an output that holds it, and lines for LaTeX without a figure.
+/// Refuses a figure without a suitable output, and LaTeX code without a figure.
 fn check_figure(job: &Render) -> Result<()> {
     let holds = |o: &Output| o.format.whole != OneDrawing::Never && o.format.word != "tex";
     if job.sequence.figure.is_some() && !job.outputs.iter().any(holds) {
@@ -113,7 +113,7 @@ fn check_figure(job: &Render) -> Result<()> {
     }
 }
 
-/// Draws and writes a mission that was read.
+/// Draws and writes a mission.
 ///
 /// # Errors
 /// As [`render`].
@@ -130,7 +130,7 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     if is_figure || !is_mixed {
         return show_alike(job, mission, watch);
     }
-    // Two drawings of one mission: the same picture as if either kind of output had been asked for alone.
+    // Two drawings of one mission, each the same as if its kind of output had been requested alone.
     let some = |is: bool| {
         let outputs = job.outputs.iter().filter(|o| has_all_topics(o) == is);
         Render {
@@ -154,8 +154,7 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     })
 }
 
-/// The job with the output for a still in place of the film, where there is nothing to play, with a note of the command
-/// that makes a film.
+/// The job with a still instead of an animation if there is nothing to animate, with a note on how to get an animation.
 fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
     let still = job.still.as_ref()?;
     let is_board = job.drawing.body.is_board(mission);
@@ -176,14 +175,14 @@ fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
     })
 }
 
-/// Whether an output has each topic as an element of its own: a page that opens boxes, and a graph that is written down.
-/// Pictures may show it as a row of a box.
+/// Whether an output has each topic as a separate element: pages with expandable boxes, and graph files. Pictures may
+/// show a topic as a row of a box.
 fn has_all_topics(output: &Output) -> bool {
     let format = output.format;
     format.is_unfolded || format.is_viewed && !format.is_drawn
 }
 
-/// Draws and writes a mission where all outputs show the same drawing.
+/// Draws and writes a mission if all outputs show the same drawing.
 fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
     let is_picture = !job.outputs.iter().any(has_all_topics);
@@ -196,7 +195,7 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         drawing.page.phases = captions(&mission);
     }
     let figure = drawn_figure(job, &mission)?;
-    // What is not drawn, or drawn as a figure, needs no places.
+    // Data and figures need no positions.
     let is_graph = |o: &Output| {
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
     };
@@ -314,14 +313,12 @@ fn captions(mission: &Mission) -> Vec<String> {
     mission.windows.iter().map(|w| name(w.span.end)).collect()
 }
 
-/// The number of frames above which a note is given before they are drawn.
+/// The number of frames above which a note is printed before drawing.
 const MANY_FRAMES: usize = 2000;
-/// Milliseconds of one core for a frame, and for each of its megapixels: one and a half times the time measured with
-/// `tests/bench/drawing.rs`.
+/// Milliseconds per frame and per megapixel on one core: 1.5 times the results of `tests/bench/drawing.rs`.
 const FRAME_MS: (f64, f64) = (4.0, 13.0);
 
-/// The note before a job of very many frames: their number, the time it takes, and a sensible alternative; `None` for
-/// others.
+/// The note before a job with very many frames: their number, the estimated time, and an alternative.
 fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     let is_drawn = |o: &Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
     let frames = sequence.frame_times().len();
@@ -393,7 +390,7 @@ fn show_board(
     let overview = board.overview();
     let viewed = job.is_filtered.then(|| filtered(&mission, options));
     let lives = LifeLines::new(LivesFigure::new(&source, true));
-    // Each topic has a row of its own.
+    // Each topic has its own row.
     let mut each = drawing.clone();
     each.view.group = Grouping::parse("none")?;
     let opened = unfolded::opened(&mission, &each, &job.outputs);
@@ -424,7 +421,7 @@ fn show_board(
     })
 }
 
-/// The figure with its lines for LaTeX, if one was asked for.
+/// The requested figure with its LaTeX code, if any.
 fn drawn_figure(job: &Render, mission: &Mission) -> Result<Option<(Figure, String)>> {
     let Some(options) = &job.sequence.figure else {
         return Ok(None);
@@ -436,7 +433,7 @@ fn drawn_figure(job: &Render, mission: &Mission) -> Result<Option<(Figure, Strin
     super::figure::draw(mission, &job.drawing, &options, &job.outputs).map(Some)
 }
 
-/// The film strip, if it was asked for or an output needs one.
+/// The film strip, if requested or needed by an output.
 fn side_by_side(
     job: &Render,
     mission: &Mission,

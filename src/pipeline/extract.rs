@@ -1,4 +1,4 @@
-//! The messages themselves as tables: a row per message, or a table per topic with every field decoded.
+//! Messages as tables: a row per message, or a table per topic with all fields decoded.
 
 mod definitions;
 mod fields;
@@ -31,15 +31,15 @@ pub struct Extract {
     pub format: TableFormat,
     /// Whether messages are decoded.
     pub fields: bool,
-    /// Whether the fields of messages inside messages are structures; else columns with dots in their names.
+    /// Whether nested messages are structures; otherwise columns with dotted names.
     pub nested: bool,
-    /// The topics to take.
+    /// The topics to extract.
     pub topics: NameFilter,
-    /// Folders of `.msg` files that define the types that the bags do not.
+    /// Folders of `.msg` files for types that the bags do not define.
     pub msg_paths: Vec<PathBuf>,
-    /// The moment before which messages are left out.
+    /// The start; earlier messages are left out.
     pub start: Option<Moment>,
-    /// The moment after which messages are left out.
+    /// The end; later messages are left out.
     pub end: Option<Moment>,
 }
 
@@ -49,7 +49,7 @@ pub struct Extract {
 pub struct Extracted {
     /// The number of tables written.
     pub tables: usize,
-    /// The number of their rows in all.
+    /// The total number of their rows.
     pub rows: u64,
     /// The number of messages that could not be decoded.
     pub undecoded: u64,
@@ -57,10 +57,10 @@ pub struct Extracted {
     pub notices: Notices,
 }
 
-/// Reads bags and writes their messages as tables, which appear whole or not at all.
+/// Reads bags and writes their messages as tables, atomically.
 ///
 /// # Errors
-/// Where an input cannot be read at all, an output cannot be written, or times make no sense.
+/// If an input cannot be read at all, an output cannot be written, or times are invalid.
 pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let kept = files(&job.inputs);
     let (inputs, twice) = each_once(&job.inputs)?;
@@ -90,8 +90,8 @@ impl Extract {
         inputs.map(|i| bag::open(i, &options)).collect()
     }
 
-    /// The part of the bags that is asked for; `None` for all of it. Bags whose tails do not tell when they begin and
-    /// end are read for it.
+    /// The requested part of the bags; `None` for all of it. Bags whose time range is not in their tails are read to
+    /// determine it.
     fn range(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
         if self.start.is_none() && self.end.is_none() {
             return Ok(None);
@@ -137,7 +137,7 @@ fn stop(watch: &dyn Watch) -> Result<()> {
     Ok(())
 }
 
-/// The notice about a bag of which something was lost without one.
+/// The notice about losses of a bag that reported none.
 fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
     use crate::base::notice::NoticeKind::Damaged;
     let silent = !report.complete && !notices.any_loss();

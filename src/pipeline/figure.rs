@@ -1,4 +1,4 @@
-//! The figure that was asked for, drawn and put into LaTeX.
+//! Draws the requested figure and generates its LaTeX code.
 
 use super::Drawing;
 use crate::base::error::{Error, Result};
@@ -7,7 +7,7 @@ use crate::export::Output;
 use crate::export::options::FigureOptions;
 use crate::mission::Mission;
 
-/// The figure, and the lines for LaTeX.
+/// The figure and its LaTeX code.
 ///
 /// # Errors
 /// As [`figure::figure`].

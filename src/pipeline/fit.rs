@@ -1,4 +1,4 @@
-//! Makes a drawing readable: the page grows, topics become lines, what does not change is folded, then what changes.
+//! Makes a drawing legible: enlarges the page, draws topics as lines, collapses constant elements, then changing ones.
 
 mod notices;
 
@@ -17,18 +17,18 @@ use crate::mission::Mission;
 use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
 use notices::{parts, so_that, told};
 
-/// The style by which it is decided what is drawn.
+/// The style used to decide what is drawn.
 const PLAIN: &str = "light";
 /// The largest page that `--fit auto` grows to.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
-/// The least number of boxes that must vanish in a collapsed namespace from which those that change are left out.
+/// The fewest boxes that collapsing a namespace must save if its changing elements stay outside.
 const FEWEST_STEADY: usize = 3;
-/// The share of the smallest text that can be read below which what changes in a namespace is not left out.
+/// The share of the smallest legible text below which changing elements of a namespace are collapsed too.
 const HOPELESS: f64 = 0.3;
-/// The largest number of collapsed namespaces that are tried to be opened again.
+/// The most collapsed namespaces that are tentatively reopened.
 const MOST_REOPENED: usize = 24;
 
-/// The best drawing so far, with the page and the options that it was made with.
+/// The best drawing so far, with its page and options.
 struct Fitting<'a> {
     mission: &'a Mission,
     drawing: &'a Drawing,
@@ -40,12 +40,12 @@ struct Fitting<'a> {
     layouts: Layouts,
 }
 
-/// Chooses what is shown and lays it out on a page. With `--fit auto` the page grows, then those namespaces are collapsed in which least
-/// changes, until the smallest text can be read or nothing is left to collapse; then topics are bundled, if need be, and
-/// namespaces that turn out to fit are opened again.
+/// Chooses what is shown and lays it out on a page. `--fit auto` enlarges the page, then collapses namespaces, those
+/// with the fewest changes first, until the smallest text is legible or nothing is left to collapse; then it bundles
+/// topics if necessary, and reopens namespaces that fit after all.
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
-    // What is drawn does not depend on the style.
+    // The choice of elements does not depend on the style.
     let plain = Drawing {
         style: Style::builtin(PLAIN).unwrap_or_else(|_| drawing.style.clone()),
         ..drawing.clone()
@@ -86,18 +86,18 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     composed
 }
 
-/// The size of names on a page that is cut to its graph, in pixels.
+/// The size of names on a page cropped to its graph, in pixels.
 const NAMES: f64 = 15.0;
 /// The space around the graph on such a page, in pixels.
 const AROUND: f64 = 20.0;
-/// The least width of such a page for a film, which has a timeline, and for a still; and the least height.
+/// The minimum width of such a page for an animation, which has a timeline, and for a still; and the minimum height.
 const LEAST: (f64, f64, f64) = (720.0, 320.0, 140.0);
-/// The least width of such a page with a legend.
+/// The minimum width of such a page with a legend.
 const LEGEND: f64 = 480.0;
-/// The width of a page whose furniture has its usual size, and the least scale of furniture that can be read.
+/// The width of a page with furniture of normal size, and the smallest legible scale of furniture.
 const FURNITURE: (f64, f64) = (1100.0, 0.8);
 
-/// The page cut to its graph, where names of a readable size leave it empty.
+/// The page cropped to its graph, if names of a legible size leave it empty.
 fn cut(composed: &Composed, drawing: &Drawing) -> PageOptions {
     let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
     let measured =
@@ -168,7 +168,7 @@ impl Fitting<'_> {
         self.take_lower_page();
     }
 
-    /// Takes the lowest page of a purpose on which everything can be read, else the one with the largest text.
+    /// Takes the lowest page of a purpose on which everything is legible, else the one with the largest text.
     fn take_higher_page(&mut self) {
         let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
         for size in sizes.into_iter().skip(1) {
@@ -183,7 +183,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// Takes the lowest page of a purpose on which what is left can be read.
+    /// Takes the lowest page of a purpose on which the remaining text is legible.
     fn take_lower_page(&mut self) {
         let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
         let height = self.page.size.h;
@@ -204,8 +204,8 @@ impl Fitting<'_> {
         }
     }
 
-    /// Collapses what does not change in namespaces until the text can be read. Returns the namespaces with the boxes
-    /// in them that were left out.
+    /// Collapses the constant elements of namespaces until the text is legible. Returns the namespaces with the boxes
+    /// that were left outside.
     fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
         let told = self.changing();
         let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
@@ -236,7 +236,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// The elements that change, with the nodes that they connect, and the partners of those.
+    /// The changing elements, the nodes that they connect, and the partners of those.
     fn changing(&self) -> BTreeSet<Element> {
         let elements = &self.mission.elements;
         let view = &self.best.view;
@@ -268,7 +268,7 @@ impl Fitting<'_> {
         told
     }
 
-    /// Collapses these namespaces with the boxes in them that were left out, until the text can be read.
+    /// Collapses these namespaces including the boxes left outside, until the text is legible.
     fn collapse_the_rest(&mut self, mut left: Vec<(Arc<str>, Vec<Arc<str>>)>) {
         while !self.is_readable() && !left.is_empty() {
             let now = self.at_once(left.clone());
@@ -283,16 +283,15 @@ impl Fitting<'_> {
         }
     }
 
-    /// The first of these, or a quarter of them where the text is far too small: that is not worth a layout for every
-    /// namespace on the way.
+    /// The first of these, or a quarter of them if the text is far too small, which saves a layout per namespace.
     fn at_once<T>(&self, mut all: Vec<T>) -> Vec<T> {
         let is_far = self.best.text < self.drawing.readable() / 2.0;
         all.truncate(if is_far { all.len().div_ceil(4) } else { 1 });
         all
     }
 
-    /// The last resort: outermost namespaces as one box each, and one line for all topics between two boxes; if that
-    /// can be read better.
+    /// The last resort: one box per outermost namespace, and one line for all topics between two boxes, if more
+    /// legible.
     fn bundle(&mut self) {
         let mut bundled = ViewOptions {
             mode: Mode::Bundles,
@@ -305,7 +304,7 @@ impl Fitting<'_> {
         let outermost = outermost.into_iter().map(Arc::from);
         bundled.collapse.extend(outermost);
         let boxes = outline(self.mission, &bundled);
-        // Few boxes with many arrows among them stand best around the page.
+        // Few boxes with many arrows are best arranged in a ring.
         let is_few = boxes.items.len() <= RING && boxes.namespaces.is_empty();
         let ring = engine("ring").ok().filter(|_| is_few);
         let attempt = match ring {
@@ -322,7 +321,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// Opens namespaces that were collapsed on the way and need not have been, the outermost first.
+    /// Reopens namespaces that need not be collapsed, the outermost first.
     fn open_again(&mut self) {
         let asked = self.drawing.view.collapse.len();
         let collapsed = self.options.collapse[asked..].to_vec();
@@ -336,7 +335,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// The drawing with the notices about what was done to make it readable, and whether that was enough.
+    /// The drawing with notices about what was done to make it legible, and whether that was sufficient.
     fn composed(mut self) -> Composed {
         if self.best.layout.is_none() {
             let chosen = (&self.options, &self.page);
@@ -373,8 +372,7 @@ fn outermost(name: &str) -> Option<&str> {
     name.get(..end)
 }
 
-/// The layouts by one engine so far: a namespace that is collapsed inside another one, or opened there, changes nothing
-/// that is drawn.
+/// The layouts by one engine so far: collapsing or opening a namespace inside a collapsed one changes nothing.
 #[derive(Default)]
 struct Layouts(Vec<(Plan, LayoutOptions, Layout)>);
 
@@ -390,19 +388,19 @@ impl Layouts {
     }
 }
 
-/// A layout of the view that some options give.
+/// A layout of the view with some options.
 struct Attempt {
-    /// The view; without its windows where there is no layout.
+    /// The view; without its windows if there is no layout.
     view: View,
     notices: Notices,
-    /// The layout; `None` where there are too many boxes to be read in any layout.
+    /// The layout; `None` if there are too many boxes for any legible layout.
     layout: Option<Layout>,
     /// The size of its smallest text in pixels.
     text: f64,
 }
 
 impl Attempt {
-    /// An attempt with a layout if it may be readable or `--fit none` was given, else without.
+    /// An attempt, with a layout if it may be legible or `--fit none` was given.
     fn new(
         mission: &Mission,
         drawing: &Drawing,
@@ -432,7 +430,7 @@ impl Attempt {
         (options, page): (&ViewOptions, &PageOptions),
         layouts: &mut Layouts,
     ) -> Self {
-        // The widest labels depend on rates, so that the windows are needed too.
+        // The widest labels depend on rates, so the windows are needed too.
         let (view, notices) = view(mission, options);
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
         let (plan, page) = (measured.plan(), measured.layout_options());
@@ -467,15 +465,14 @@ impl Attempt {
     }
 }
 
-/// The share of the smallest text that can be read from which a drawing that fills the page better is tried: its text is
-/// larger by an eighth at most.
+/// The share of the smallest legible text above which a drawing that fills the page better is tried: its text is at
+/// most an eighth larger.
 const ALMOST: f64 = 0.85;
 
-/// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
-/// times that.
+/// The minimum area of a box in squares of its text height: it is at least as high as its text and four times as wide.
 const LEAST_BOX: f64 = 4.0;
 
-/// Whether these are more boxes than a page holds with text that can be read.
+/// Whether these are more boxes than fit on a page with legible text.
 fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
     let text = drawing.readable();
     boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)

@@ -1,11 +1,11 @@
-//! Many bags as two tables: counts of each bag by itself, counts merged, and the mission made of them at the end.
+//! Many bags as two tables: counts of each bag, merged counts, and the mission computed from them.
 //!
 //! ```text
 //! plan ──> count (each bag, or each part of its time, anywhere) ──> merge ──> finish (each mission)
 //! ```
 //!
-//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count()`] is a pure
-//! function of one bag and reads its index only. [`merge`] makes one list of the counts of the parts of a bag.
+//! A [`FleetPlan`] lists the bags and fixes where windows begin, before anything is counted. [`count()`] is a pure
+//! function of one bag and reads its index only. [`merge`] combines the counts of the parts of a bag.
 //! [`finish()`] makes the [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the
 //! whole.
 

@@ -1,7 +1,7 @@
-//! A mission while it is recorded: what is known so far, and its events as they become known.
+//! A mission while it is recorded: the mission so far, and its events as they are detected.
 //!
-//! Nothing here knows the time of day: now is the time of the newest message. What is told while the recording grows is
-//! for eyes; every file is written from the closed recording, as if nobody had followed it.
+//! The current time is that of the newest message, not of the clock. Only printed lines come from the growing
+//! recording; all files are written from the closed one.
 
 mod feed;
 
@@ -18,32 +18,32 @@ use crate::graph::window::Length;
 use crate::mission::Mission;
 pub(crate) use feed::{Feed, FindingFeed};
 
-/// A recording that grows, and what has been collected of it.
+/// A growing recording and what has been collected from it.
 pub(crate) struct Follow {
     reading: Reading,
     growing: Box<dyn Growing>,
     collector: Collector,
-    /// The first message of all.
+    /// The time of the very first message.
     origin: Option<Stamp>,
-    /// The time before which messages were forgotten, but for the last of each topic.
+    /// The time before which messages were dropped, except the last of each topic.
     forgotten: Option<Stamp>,
     keep: Period,
 }
 
-/// What is known of a growing recording.
+/// The mission of a growing recording so far.
 pub(crate) struct SoFar {
     pub(crate) mission: Mission,
-    /// The time from which on every message is in it.
+    /// The time from which on it contains all messages.
     pub(crate) from: Stamp,
     /// The time of the newest message.
     pub(crate) now: Stamp,
 }
 
 impl Follow {
-    /// Begins to follow the only input of `reading`; of its messages the last `keep` are kept.
+    /// Begins to follow the only input of `reading`, keeping the messages of the last `keep`.
     ///
     /// # Errors
-    /// Where it cannot be read, or does not grow.
+    /// If it cannot be read or cannot grow.
     pub(crate) fn new(reading: Reading, keep: Period) -> Result<Self> {
         let [input] = &reading.inputs[..] else {
             return Err(Error::usage("one recording is followed", "name one"));
@@ -63,10 +63,10 @@ impl Follow {
         })
     }
 
-    /// Collects what has become readable since the last time.
+    /// Collects what has become readable since the last call.
     ///
     /// # Errors
-    /// Where the recording is gone, or a temporary file cannot be used.
+    /// If the recording no longer exists, or a temporary file cannot be used.
     pub(crate) fn poll(&mut self) -> Result<Growth> {
         let growth = self.growing.poll(&mut self.collector.on(&mut |_, _| {}))?;
         if let Some((first, last, _)) = self.collector.extent().filter(|_| growth == Growth::More) {
@@ -82,12 +82,12 @@ impl Follow {
         Ok(growth)
     }
 
-    /// The number of connections and claims, which grows with everything that was not known before.
+    /// The number of connections and claims, which grows with every new fact.
     pub(crate) fn known(&self) -> usize {
         self.collector.known()
     }
 
-    /// What the last `most` messages tell, about, in windows of `length`; `None` if there is no message yet.
+    /// The mission of about the last `most` messages, in windows of `length`; `None` if there is no message yet.
     ///
     /// # Errors
     /// As for reading the recording.
@@ -107,7 +107,7 @@ impl Follow {
         };
         let mut reading = self.reading.clone();
         reading.division.length = length;
-        // Events are counted from the first message, windows divide what is kept.
+        // Times of events count from the first message; windows divide the kept time.
         let start = match length {
             Length::All => self
                 .origin
@@ -126,7 +126,7 @@ impl Follow {
         }))
     }
 
-    /// The reading of the recording where it lies now.
+    /// The reading of the recording under its current path.
     pub(crate) fn closed(&self) -> Reading {
         Reading {
             inputs: vec![Input::Path(self.growing.path().to_owned())],
@@ -149,10 +149,10 @@ impl Follow {
     }
 }
 
-/// A mission as a page that its server renews.
+/// A mission as a page that its server updates.
 ///
 /// # Errors
-/// Where it cannot be drawn, or the folder for temporary files cannot be used.
+/// If it cannot be drawn, or the folder for temporary files cannot be used.
 pub(crate) fn page(job: &Render, mission: Mission) -> Result<Vec<u8>> {
     let folder = Temporary::new()?;
     let path = folder.path().join("page.html");

@@ -1,4 +1,4 @@
-//! Judging: reads the expectation and the mission, holds one against the other, writes the findings.
+//! Checking: reads the expectation and the mission, compares them, writes the findings.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -27,10 +27,10 @@ pub(crate) struct ReportJob {
 pub(crate) struct Check {
     pub(crate) reading: Reading,
     pub(crate) expect: PathBuf,
-    /// The expectation from the root of its repository.
+    /// The path of the expectation from the root of its repository.
     pub(crate) tracked: String,
     pub(crate) reports: Vec<ReportJob>,
-    /// The bags as they were typed.
+    /// The bags as given.
     pub(crate) bags: Vec<String>,
     pub(crate) links: Vec<(String, String)>,
     /// Whether undecidable facts are errors.
@@ -60,10 +60,10 @@ pub(crate) struct CheckResult {
     pub(crate) verdict: Verdict,
 }
 
-/// Judges a mission and writes every report.
+/// Checks a mission and writes every report.
 ///
 /// # Errors
-/// Where the expectation, the mission or an output cannot be read or written.
+/// If the expectation, the mission or an output cannot be read or written.
 pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
     let text = file::read_text(&job.expect, budget::USER_TEXT)?;
     let expectation = crate::gate::read(&text, &job.expect)?;
@@ -122,7 +122,7 @@ pub(crate) struct Compared {
 /// Compares two missions, and writes every report and picture.
 ///
 /// # Errors
-/// Where a mission cannot be read or an output cannot be written.
+/// If a mission cannot be read or an output cannot be written.
 pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|(target, _)| target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
@@ -135,7 +135,7 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
     for (target, format) in &job.reports {
         put(target, &(format.write)(&job.subject, &differences))?;
     }
-    // What moves shows the first mission and then both; what stands shows both.
+    // Animations show the first mission and then both; stills show both.
     let (moving, standing): (Vec<Output>, Vec<Output>) = job
         .pictures
         .iter()
@@ -169,11 +169,11 @@ const MOVING: [&str; 5] = ["gif", "apng", "html", "mp4", "webm"];
 
 /// The whole job of `bagreel baseline`.
 pub(crate) struct Baseline {
-    /// The runs to write down, each read by itself.
+    /// The runs, each read separately.
     pub(crate) runs: Vec<Reading>,
-    /// The expectation to bring up to date; `None` to write a new one.
+    /// The expectation to update; `None` to write a new one.
     pub(crate) update: Option<PathBuf>,
-    /// The names to bring up to date; all if empty.
+    /// The names to update; all if empty.
     pub(crate) only: Vec<String>,
     pub(crate) output: Target,
 }
@@ -181,18 +181,18 @@ pub(crate) struct Baseline {
 /// The outcome of `bagreel baseline`.
 pub(crate) struct BaselineWritten {
     pub(crate) missions: Vec<Mission>,
-    /// The number of facts that were written anew.
+    /// The number of rewritten facts.
     pub(crate) changed: usize,
-    /// The number of findings that are left.
+    /// The number of remaining findings.
     pub(crate) left: usize,
     /// The number of nodes and topics left out for lack of room.
     pub(crate) left_out: usize,
 }
 
-/// Writes an expectation that holds in all runs, or brings one up to date.
+/// Writes an expectation that all runs meet, or updates one.
 ///
 /// # Errors
-/// Where the expectation or a run cannot be read, or the output cannot be written.
+/// If the expectation or a run cannot be read, or the output cannot be written.
 pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten> {
     let old = job.update.as_deref().map(|path| {
         let text = file::read_text(path, budget::USER_TEXT)?;
@@ -214,7 +214,7 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
             reading.division.length = Length::Fixed(period);
         }
         let mission = read(&reading, watch)?;
-        // All runs are seen in the windows of the first.
+        // All runs use the period of the first.
         period = period.or(Some(mission.period));
         missions.push(mission);
     }
@@ -238,12 +238,12 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
     Ok(done)
 }
 
-/// Whether a part of a recording is read, in which nothing begins when it began in the whole.
+/// Whether only a part of a recording is read, in which start times differ from those in the whole.
 fn is_part(reading: &Reading) -> bool {
     reading.division.start.is_some() || reading.division.end.is_some()
 }
 
-/// The expectation that holds in all of these runs.
+/// The expectation that all of these runs meet.
 fn written(missions: &[Mission], is_part: bool) -> Written {
     let names: Vec<String> = missions.iter().map(name).collect();
     let from = words::some_of(&names, 3);
@@ -261,14 +261,14 @@ fn files(readings: &[Reading]) -> Vec<PathBuf> {
     readings.iter().flat_map(Reading::files).collect()
 }
 
-/// Writes a text whole or not at all.
+/// Writes a text atomically.
 fn put(target: &Target, text: &str) -> Result<()> {
     places::make_folder(target)?;
     let mut sink = OutputSink::create(target, None)?;
     let failed = sink.error();
     match sink.write_all(text.as_bytes()) {
         Ok(()) => sink.commit().map(drop),
-        // Whoever reads the other end of a pipe has what it wanted.
+        // A closed pipe is not an error.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(failed(error)),
     }

@@ -1,4 +1,4 @@
-//! The bags of a mission: each of them once.
+//! The bags of a mission, without duplicates.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -9,7 +9,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
-/// Every input once, with a notice for those named twice, which would count twice.
+/// Every input once, with a notice for duplicates, which would be counted twice.
 pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     let mut seen = BTreeSet::new();
     let (mut once, mut twice) = (Vec::new(), Vec::new());
@@ -36,7 +36,7 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     Ok((once, twice))
 }
 
-/// The time that all bags cover; `None` unless every one of them tells its own without being read.
+/// The time span covered by all bags; `None` unless each reports its own without being read.
 pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     let mut all: Option<Span> = None;
     for reader in readers {
@@ -50,16 +50,16 @@ pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
     Ok(all)
 }
 
-/// Refuses bags that hold the same messages, which would count twice: copies, and conversions to another format. Bags
-/// that can be read only once, or are far away, are not looked into.
+/// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes and remote bags are
+/// not checked.
 fn refuse_copies(inputs: &[Input]) -> Result<()> {
     let near = inputs
         .iter()
         .filter(|i| matches!(i, Input::Path(_)) && !i.is_pipe());
     let near: Vec<&Input> = near.collect();
-    // What cannot be opened is told when it is read.
+    // Errors of opening are reported when the bag is read.
     let open = |input: &Input| bag::open(input, &OpenOptions::default()).ok();
-    // Copies have the same ends; where these are not known, the same size.
+    // Copies have the same time span or, if that is unknown, the same size.
     let ends = |input: &&Input| {
         let span = open(input).and_then(|mut bag| bag.span().ok().flatten());
         let size = if span.is_none() {
@@ -92,7 +92,7 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
     Ok(())
 }
 
-/// The number of messages in a bag, and a sum over their topics and times that does not depend on their order.
+/// The number of messages in a bag, and an order-independent checksum of their topics and times.
 #[derive(Default)]
 struct Contents {
     messages: u64,

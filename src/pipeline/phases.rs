@@ -1,4 +1,4 @@
-//! The phases of a mission: found, named or cut by a file of the user's, or told by captions.
+//! The phases of a mission: detected, named or defined by the user's file, or taken from captions.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,20 +15,19 @@ use crate::mission::phases::{of_spans, phases};
 /// The source of phases and of their names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Phases {
-    /// They are found, and named by what they change.
+    /// Detected, and named after their changes.
     #[default]
     Found,
     /// There are none.
     None,
-    /// A file: lines `0:38 navigation` give the time at which a phase begins; lines without a time name those that are
-    /// found.
+    /// A file: lines `0:38 navigation` define the start of a phase; lines without a time name the detected phases.
     File(PathBuf),
     /// A file of `seconds|text` lines, or a string topic of the bags.
     Captions(String),
 }
 
 impl Phases {
-    /// The file that they come from, if they do.
+    /// The file that defines them, if any.
     pub(super) fn file(&self) -> Option<&PathBuf> {
         match self {
             Self::File(path) => Some(path),
@@ -36,7 +35,7 @@ impl Phases {
         }
     }
 
-    /// The topic whose texts name them; `None` where they come from elsewhere.
+    /// The topic whose texts name them, if any.
     pub(super) fn topic(&self) -> Option<&str> {
         match self {
             Self::Captions(from) if !Path::new(from).is_file() => Some(from),
@@ -44,14 +43,13 @@ impl Phases {
         }
     }
 
-    /// Whether their names are the user's.
+    /// Whether the user named them.
     pub(super) fn is_named(&self) -> bool {
         matches!(self, Self::File(_) | Self::Captions(_))
     }
 }
 
-/// The sources of phases: the history of the mission, the texts of the topic that tells them, and the phases of an
-/// earlier run.
+/// The sources of phases: the history of the mission, the texts of the caption topic, and the phases of an earlier run.
 pub(super) struct Basis<'a> {
     pub(super) elements: &'a Elements,
     pub(super) sending: &'a Sending,
@@ -65,7 +63,7 @@ pub(super) struct Basis<'a> {
 ///
 /// # Errors
 /// [`Error::BadFile`] for a line that is not a phase, more names than phases, or times out of order; [`Error::Usage`]
-/// for captions that are not there.
+/// for missing captions.
 pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> {
     match &reading.phases {
         Phases::None => Ok(Vec::new()),
@@ -87,8 +85,8 @@ impl Basis<'_> {
         }
     }
 
-    /// Phases that begin at these times, sorted, under these names. The time before the first of them is a phase under
-    /// a name of our own.
+    /// Phases that begin at these times, sorted, with these names. The time before the first is a phase with a default
+    /// name.
     fn at(&self, begins: &[(Stamp, String)]) -> Vec<Phase> {
         let whole = self.whole;
         let begins = begins.iter().filter(|(at, _)| *at < whole.end);
@@ -117,7 +115,7 @@ impl Basis<'_> {
     }
 }
 
-/// One line: the time at which a phase begins, if it is given, in nanoseconds after the mission's start, and its name.
+/// One line: the start of a phase, if given, in nanoseconds after the mission's start, and its name.
 type CaptionLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
@@ -146,7 +144,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
                 "it does not begin after the previous one".to_owned(),
             ));
         }
-        // What comes before the first phase belongs to it.
+        // The time before the first phase belongs to it.
         let start = basis.whole.start;
         let begins = lines.into_iter().enumerate().map(|(k, (_, (at, name)))| {
             let at = at.filter(|_| k > 0).unwrap_or(0);
@@ -177,7 +175,7 @@ fn line(text: &str) -> CaptionLine {
     }
 }
 
-/// Phases by captions: `from` is a file if there is one of that name, else a topic of type `std_msgs/String`.
+/// Phases from captions: `from` is an existing file, else a topic of type `std_msgs/String`.
 fn captions(basis: &Basis<'_>, from: &str) -> Result<Vec<Phase>> {
     let path = Path::new(from);
     let start = basis.whole.start;
@@ -225,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_gives_captions_in_order_of_time() {
+    fn captions_of_a_file_are_sorted_by_time() {
         let read = |text| captions_of_file(text, Path::new("c.txt"));
         let captions = read("# phases\n90|picking\n\n0|start\n").unwrap();
         assert_eq!(

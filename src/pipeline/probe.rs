@@ -1,5 +1,4 @@
-//! Looks into single messages that the first reading passed over: into the numbers in their headers, before and after
-//! gaps.
+//! Reads the header sequence numbers of single messages before and after gaps, which the first reading skipped.
 
 use std::collections::BTreeSet;
 
@@ -11,11 +10,11 @@ use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::numbers::{self, Number};
 
-/// The longest time between two messages that are read at once, in nanoseconds: they lie in one chunk.
+/// The longest time between two messages that are read at once, in nanoseconds: they are in one chunk.
 const AT_ONCE_NS: i64 = 100_000_000;
 
-/// Reads the numbers of these messages, named by stream and time. Not of bags that can be read only once, or that are
-/// far away, where each costs several requests.
+/// Reads the sequence numbers of these messages, given by stream and time. Skips pipes, and remote bags, where each
+/// costs several requests.
 pub(super) fn probe(
     reading: &Reading,
     collected: &mut Collected,
@@ -52,7 +51,7 @@ pub(super) fn probe(
     Ok(())
 }
 
-/// A sink for the numbers of a few messages.
+/// A sink for the sequence numbers of a few messages.
 struct Probe<'a> {
     wanted: &'a [(Stamp, usize, ConnectionId)],
     found: Vec<(usize, Stamp, Number)>,

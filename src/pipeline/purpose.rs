@@ -1,4 +1,4 @@
-//! The place where a picture will be seen, and the page that suits it: its text must be readable there.
+//! The medium of a picture, and a page whose text is legible there.
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -6,7 +6,7 @@ use crate::base::words::worded;
 use crate::draw::picture::PageOptions;
 
 worded! {
-    /// The place where the picture will be seen.
+    /// The medium of a picture.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Purpose {
         /// On a repository's front page, which is at most 830 pixels wide.
@@ -38,7 +38,7 @@ impl Purpose {
             .ok_or_else(|| Error::usage(what(), "places: readme, slide, column, page"))
     }
 
-    /// The width on paper in millimetres, if it is seen there.
+    /// The width on paper in millimetres, if printed.
     fn width_mm(self) -> Option<f64> {
         match self {
             Self::Readme | Self::Slide => None,
@@ -47,7 +47,7 @@ impl Purpose {
         }
     }
 
-    /// The smallest text that can be read there, in pixels: 9, or 6 pt.
+    /// The smallest legible text, in pixels: 9, or 6 pt.
     pub(crate) fn readable(self) -> f64 {
         match self.width_mm() {
             None => 9.0,
@@ -68,7 +68,7 @@ impl Purpose {
         }
     }
 
-    /// The page with furniture that can be read there: only a slide has room for a legend.
+    /// The page with legible furniture: only a slide has room for a legend.
     pub(crate) fn page(self, page: PageOptions) -> PageOptions {
         let is_slide = self == Self::Slide;
         PageOptions {
@@ -80,7 +80,7 @@ impl Purpose {
         }
     }
 
-    /// The advice where the graph cannot be made readable.
+    /// The advice if the graph cannot be made legible.
     pub(crate) fn advice(self) -> &'static str {
         match self {
             Self::Readme | Self::Slide => {

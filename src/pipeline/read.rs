@@ -1,5 +1,5 @@
-//! From bags to the mission: collects, concludes, finds the phases, divides time, builds the graphs; each value is made
-//! once.
+//! From bags to the mission: collects, concludes, detects the phases, divides time, builds the graphs; each value is
+//! made once.
 
 use std::path::{Path, PathBuf};
 #[cfg(feature = "source")]
@@ -33,32 +33,31 @@ use crate::mission::{Mission, Window, read_json};
 pub struct Reading {
     /// Bags of one mission, or one mission's own JSON.
     pub inputs: Vec<Input>,
-    /// Whether to read everything by a second reader too, and compare.
+    /// Whether to read everything again with a second reader and compare.
     pub verify: bool,
     /// The division of time into windows.
     pub division: Division,
     /// Whether to merge runs of windows without a change.
     pub skip_unchanged: bool,
-    /// Whether a mission in which nothing changes after the first window has one window, with its rates over the whole
-    /// time.
+    /// Whether a mission without changes after the first window has a single window, with rates over the whole time.
     pub is_still_if_unchanged: bool,
     /// The options of collecting evidence.
     pub collect: collector::CollectOptions,
-    /// The additions to the facts that the bags tell.
+    /// Additions to the facts from the bags.
     pub conclude: conclude::ConcludeOptions,
-    /// The number of windows of silence after which an element that never speaks again counts as gone.
+    /// The number of silent windows before an element counts as gone.
     pub grace: usize,
-    /// The source code to read once the recording's day is known; takes the place of `conclude.code`.
+    /// The source code to read once the recording's date is known; replaces `conclude.code`.
     #[cfg(feature = "source")]
     pub code: Option<SourceCode>,
-    /// The share by which a rate must change to count, ≥ 0.
+    /// The fraction by which a rate must change to be reported, ≥ 0.
     pub rate_change: f64,
     /// The source of phases and of their names.
     pub phases: Phases,
 }
 
 impl Default for Reading {
-    /// No inputs, with every option as the command line has it.
+    /// No inputs, with the command line's defaults.
     fn default() -> Self {
         Self {
             inputs: Vec::new(),
@@ -78,8 +77,7 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// The reading of one mission's bags by their paths or URLs, or of its own JSON, with every option as the command
-    /// line has it.
+    /// Reads one mission's bags by their paths or URLs, or its own JSON, with the command line's defaults.
     pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
         let inputs = paths.into_iter().map(|path| Input::parse(path.into()));
         Self {
@@ -88,7 +86,7 @@ impl Reading {
         }
     }
 
-    /// The files and folders of the user's that it reads: never overwritten.
+    /// The files and folders that it reads, which are never overwritten.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         #[cfg(feature = "source")]
         let source = self.code.iter().map(|code| &code.folder);
@@ -109,7 +107,7 @@ impl Reading {
     }
 }
 
-/// The files and folders among inputs that are there.
+/// The existing files and folders among inputs.
 pub(super) fn files(inputs: &[Input]) -> Vec<PathBuf> {
     let paths = inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
@@ -121,13 +119,13 @@ pub(super) fn files(inputs: &[Input]) -> Vec<PathBuf> {
 /// Reads the inputs into a mission.
 ///
 /// # Errors
-/// Where an input cannot be read at all or none holds a message, and for times that make no sense.
+/// If an input cannot be read at all, none contains a message, or times are invalid.
 pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     explain(reading, watch).map(|(mission, _)| mission)
 }
 
-/// Reads the inputs into a mission, with every piece of evidence on the elements that `reading` asks about, sorted by
-/// time. A mission read from JSON holds no such pieces.
+/// Reads the inputs into a mission, with all evidence on the elements in `reading.collect.why`, sorted by time. A
+/// mission read from JSON has no evidence.
 ///
 /// # Errors
 /// As [`read`].
@@ -161,7 +159,7 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
 /// The path of the mission's JSON that is the only input; `None` for bags.
 ///
 /// # Errors
-/// Where it cannot be read.
+/// If it cannot be read.
 pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     let is_json =
         |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, InputKind::Json)) };
@@ -190,7 +188,7 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
     }
 }
 
-/// The mission of what was collected of a growing recording.
+/// The mission of what was collected from a growing recording.
 ///
 /// # Errors
 /// As [`read`].
@@ -204,7 +202,7 @@ pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission
 
 const DAY: i64 = 86_400_000_000_000;
 
-/// Holds a mission in JSON to the limits of bags; the reason and a hint where it is past one.
+/// Checks a mission in JSON against the limits of bags; returns the reason and a hint if it exceeds one.
 fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)> {
     let many = i64::try_from(mission.windows.len()).unwrap_or(i64::MAX);
     let elements = &mission.elements;
@@ -267,7 +265,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     Ok(mission)
 }
 
-/// The findings from everything read, with the source code as it was on the recording's day.
+/// The findings from everything read, with the source code as of the recording.
 fn concluded(collected: &Collected, reading: &Reading) -> Result<Findings> {
     #[cfg(feature = "source")]
     if let Some(wanted) = &reading.code {
@@ -289,7 +287,7 @@ fn mission(
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
     let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
-    let ledger = told(&history, collected, reading)?;
+    let ledger = ledger_of(&history, collected, reading)?;
     let mut windows = divided(reading, collected.range, &ledger)?;
     let period = windows.period;
     let mut windowed = graphs(&windows.spans, reading.grace)?;
@@ -333,7 +331,7 @@ fn mission(
     })
 }
 
-/// The notice about nodes that several recordings show at the same time.
+/// The notice about nodes that appear in several recordings at the same time.
 fn doubled(history: &History) -> Option<Notice> {
     let name = |id: &u32| format!("`{}`", history.elements.nodes[*id as usize].name);
     let names: Vec<String> = history.doubled.iter().map(name).collect();
@@ -344,10 +342,10 @@ fn doubled(history: &History) -> Option<Notice> {
     (!names.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
 }
 
-/// The most nodes that a notice names.
+/// The most nodes named in a notice.
 const NAMED: usize = 3;
 
-/// The windows: equal ones, or from change to change.
+/// The windows: of equal length, or from change to change.
 fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
     let windows = match reading.division.cut {
         None => return window::divide(&reading.division, span),
@@ -367,7 +365,7 @@ fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
 }
 
 /// The ledger: the events of the mission, and its phases.
-fn told(history: &History, collected: &Collected, reading: &Reading) -> Result<Ledger> {
+fn ledger_of(history: &History, collected: &Collected, reading: &Reading) -> Result<Ledger> {
     let elements = &history.elements;
     let entries = ledger::make(&ledger::LedgerInput {
         elements,
@@ -417,7 +415,7 @@ fn list(windows: &Windows, windowed: &Windowed, history: &History, ledger: &Ledg
     parts.enumerate().map(window).collect()
 }
 
-/// Whether nothing begins, ends or lasts after the first window.
+/// Whether no event begins, ends or lasts after the first window.
 fn is_still(windows: &Windows, ledger: &Ledger) -> bool {
     let first = windows.spans.first().map_or(windows.span.end, |s| s.end);
     let all = ledger.headlines(windows.span);
@@ -425,7 +423,7 @@ fn is_still(windows: &Windows, ledger: &Ledger) -> bool {
     later.next().is_none()
 }
 
-/// The windows' times with every run of them that shows no change made one.
+/// The windows' times, with consecutive windows without a change merged.
 fn merged(windows: &[Window]) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     for window in windows {

@@ -1,4 +1,4 @@
-//! Reads every bag below a folder, one after another, for a survey.
+//! Reads every bag below a folder one by one, for a survey.
 
 use std::path::{Path, PathBuf};
 
@@ -13,12 +13,12 @@ use crate::mission::info::{SurveyRow, survey_table};
 /// The rows of a survey as a file of this format.
 ///
 /// # Errors
-/// If the format cannot hold them.
+/// If the format cannot represent them.
 pub fn survey_file(rows: &[SurveyRow], format: TableFormat) -> Result<Vec<u8>> {
     writer::whole(format, &survey_table(rows))
 }
 
-/// Whether `input` is a folder of bags, and not one recording.
+/// Whether `input` is a folder of bags rather than one recording.
 pub fn is_survey(input: &Input) -> bool {
     let Input::Path(path) = input else {
         return false;
@@ -29,16 +29,16 @@ pub fn is_survey(input: &Input) -> bool {
 
 /// The survey of the bags below a folder.
 pub struct Survey {
-    /// One row per bag, sorted by path; a bag that cannot be read has a row that says why.
+    /// One row per bag, sorted by path; the row of an unreadable bag has the reason.
     pub rows: Vec<SurveyRow>,
-    /// Whether data of some bag was skipped, or all of it.
+    /// Whether any data was skipped.
     pub skipped: bool,
 }
 
 /// Reads every bag below `folder`.
 ///
 /// # Errors
-/// If the folder itself cannot be read or holds no bag.
+/// If the folder itself cannot be read or contains no bag.
 pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
     let bags = bag::recordings(folder)?;
     if bags.is_empty() {
@@ -78,7 +78,7 @@ fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -> SurveyRow
     };
     match read {
         Ok(mission) => SurveyRow::of(row.path, &mission),
-        // An empty bag may be a whole one.
+        // An empty bag may be intact.
         Err(Error::NoMessages { path, hint }) => SurveyRow {
             is_complete: hint == NOTHING_RECORDED,
             error: Some(format!("`{}` holds no messages: {hint}", path.display())),

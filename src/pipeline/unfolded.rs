@@ -1,5 +1,4 @@
-//! The view with every element one by one, on a page of a screen's shape, for pages and reports, whatever the picture
-//! folds.
+//! The view with all elements expanded, on a page of a screen's shape, for pages and reports.
 
 use super::Drawing;
 use crate::base::geometry::Size;
@@ -11,13 +10,13 @@ use crate::view::{View, view};
 /// The part of a screen that the graph of a page has: 3 : 2.
 const SCREEN: Size = Size::new(1200.0, 800.0);
 
-/// The view with everything opened; `None` where no output holds it.
+/// The view with everything expanded; `None` if no output needs it.
 pub(super) fn opened(mission: &Mission, drawing: &Drawing, outputs: &[Output]) -> Option<View> {
     let is_asked = outputs.iter().any(|o| o.format.is_unfolded);
     is_asked.then(|| view(mission, &drawing.view.opened(&mission.elements)).0)
 }
 
-/// The picture of that view; `None` where no output is a page.
+/// The picture of that view; `None` if no output is a page.
 pub(super) fn drawn<'a>(
     view: &'a View,
     drawing: &'a Drawing,

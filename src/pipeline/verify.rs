@@ -1,4 +1,4 @@
-//! `--verify`: reads everything a second time by an independent reader, and compares the counts of both.
+//! `--verify`: reads everything again with an independent reader and compares the counts.
 
 use std::collections::BTreeSet;
 
@@ -17,10 +17,10 @@ pub(super) struct Verified {
     pub(super) notices: Vec<Notice>,
 }
 
-/// Reads the bags again and compares what both readings count.
+/// Reads the bags again and compares the counts of both readings.
 ///
 /// # Errors
-/// Where the user stops it; a bag that cannot be read again is a notice.
+/// If the user stops it; a bag that cannot be read again is a notice.
 pub(super) fn verify(
     first: &Collected,
     reading: &Reading,
@@ -41,7 +41,7 @@ pub(super) fn verify(
     }
 }
 
-/// The notices where the second reader counts otherwise than the first, and about bags that it could not verify.
+/// The notices about differing counts, and about bags that could not be verified.
 fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<Verified> {
     let windows = divide(&reading.division, first.range)?;
     let (ours, theirs) = (
@@ -89,12 +89,12 @@ fn counted(collected: &Collected, windows: &[Span]) -> Result<BTreeSet<TopicCoun
     Ok(counts(&collected.recorded, windows)?.into_iter().collect())
 }
 
-/// The notices about bags of which not everything could be verified.
+/// The notices about bags that could not be verified completely.
 fn unverified(first: &Collected, second: &Collected) -> Vec<Notice> {
     let both = first.reports.iter().zip(&second.reports);
     let notice = |(bag, again): (&Report, &Report)| {
         let why = again.tier_reason.as_ref()?;
-        // A reader that refuses from the start says nothing of the bag; one that stops has met damage.
+        // A reader that fails at the start implies nothing about the bag; one that stops has found damage.
         let kind = if again.complete {
             NoticeKind::Note
         } else {

@@ -14,7 +14,7 @@ const MOST_FILES: usize = 1 << 16;
 /// The types of `.msg` files in folders.
 ///
 /// # Errors
-/// Where a folder or a file cannot be read, or is no definition.
+/// If a folder or a file cannot be read, or is not a definition.
 pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
     let mut types = KnownTypes::default();
     for folder in folders {

@@ -1,4 +1,4 @@
-//! A table per topic with every field of its messages decoded, in the order of the bag.
+//! A table per topic with all fields of its messages decoded, in bag order.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufWriter};
@@ -18,18 +18,18 @@ use crate::export::tables::writer::Writer;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
 
-/// The columns in front of a message's fields: its log time, and the node that published it, if the bag says.
+/// The columns before a message's fields: its log time, and its publisher if known.
 const TIME: &str = "time_ns";
 const PUBLISHER: &str = "publisher";
 /// The table of the others: topic, type, file, number of rows.
 const INDEX: &str = "index";
-/// The number of bytes of messages that wait in one table before its rows are written.
+/// The bytes of messages that one table buffers before its rows are written.
 const MOST_WAITING: usize = 4 << 20;
 /// The same number for all tables together.
 const MOST_WAITING_IN_ALL: usize = 32 << 20;
-/// The most types that an error names.
+/// The most types named in an error.
 const MOST_NAMED: usize = 3;
-/// The number of bytes of packed rows that all tables hold in memory.
+/// The bytes of encoded rows that all tables hold in memory.
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
@@ -73,7 +73,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     })
 }
 
-/// The failure of a job without a single row.
+/// The error for a job without a single row.
 fn nothing(job: &Extract, lost: &Lost) -> Error {
     let is_whole = job.topics.passes_all() && job.start.is_none() && job.end.is_none();
     if lost.types.is_empty() && is_whole {
@@ -144,14 +144,14 @@ struct FieldTables {
     format: TableFormat,
     is_nested: bool,
     all: Vec<FieldTable>,
-    /// Names of files taken so far, in lower case: some systems do not tell cases apart.
+    /// The file names in use, in lower case: some file systems are case-insensitive.
     names: BTreeSet<String>,
     waiting: usize,
     failed: Option<io::Error>,
 }
 
 impl FieldTables {
-    /// The place of the table for such messages.
+    /// The index of the table for such messages.
     fn of(&mut self, topic: &str, type_name: &str, decoder: Decoder) -> usize {
         let same =
             |t: &FieldTable| t.topic == topic && t.type_name == type_name && t.decoder == decoder;
@@ -203,7 +203,7 @@ impl FieldTables {
         true
     }
 
-    /// Writes the tables with the most bytes waiting, until half of all bytes are written.
+    /// Writes the tables with the most buffered bytes, until half of all bytes are written.
     fn make_room(&mut self) {
         let mut order: Vec<usize> = (0..self.all.len()).collect();
         order.sort_by_key(|at| std::cmp::Reverse(self.all[*at].waiting));
@@ -215,7 +215,7 @@ impl FieldTables {
         }
     }
 
-    /// Writes the rows that wait in a table.
+    /// Writes the buffered rows of a table.
     fn write(&mut self, at: usize) {
         if self.failed.is_none() {
             let result = self.try_write(at);
@@ -238,7 +238,7 @@ impl FieldTables {
         }
     }
 
-    /// Begins the file of a table, under a name that no other has.
+    /// Begins the file of a table under a unique name.
     fn begin(&mut self, at: usize) -> io::Result<Writer<BufWriter<Part>>> {
         let table = &mut self.all[at];
         let stem = file_stem(&table.topic);
@@ -259,7 +259,7 @@ impl FieldTables {
         )
     }
 
-    /// Keeps the memory for packed rows within bounds.
+    /// Bounds the memory for encoded rows.
     fn unload(&mut self) -> io::Result<()> {
         let writers = || self.all.iter().filter_map(|t| t.writer.as_ref());
         if writers().map(Writer::held).sum::<usize>() < MOST_HELD_IN_ALL {
@@ -269,7 +269,7 @@ impl FieldTables {
         writers.try_for_each(Writer::unload)
     }
 
-    /// Writes down which table is in which file.
+    /// Writes the index of tables and files.
     fn write_index(&mut self) -> io::Result<()> {
         let mut index = Batch::new(&[
             ("topic", ColumnKind::Text),
@@ -295,7 +295,7 @@ impl FieldTables {
         Ok(())
     }
 
-    /// Writes the rest, one table after another, and gives all of them their names. Returns the number of tables and of
+    /// Writes the remaining rows, one table after another, and renames all files. Returns the number of tables and of
     /// rows; a topic without a decoded message has no table.
     fn finish(mut self) -> io::Result<Result<(usize, u64)>> {
         let (mut tables, mut rows) = (0, 0);
@@ -322,16 +322,16 @@ impl FieldTables {
 struct MessageTarget {
     topic: String,
     type_name: String,
-    /// The place of the table, or the reason why there is none; `None` for topics that are not asked for.
+    /// The index of the table, or the reason why there is none; `None` for topics that are not requested.
     table: Option<Result<usize, String>>,
     /// The decoder to try if the first message does not fit the other.
     older: Option<Decoder>,
     publisher: Option<NodeName>,
-    /// The number of messages stamped and not seen since.
+    /// The number of stamped messages that have not been delivered.
     missing: u64,
 }
 
-/// The reader's visitor of one bag.
+/// The sink for one bag.
 struct OfBag<'a> {
     job: &'a Extract,
     types: &'a KnownTypes,
@@ -342,7 +342,7 @@ struct OfBag<'a> {
 }
 
 impl OfBag<'_> {
-    /// Counts messages that were announced and never came.
+    /// Counts announced messages that were not delivered.
     fn settle(&mut self) {
         let mut reasons: BTreeMap<usize, &str> = BTreeMap::new();
         for (at, source) in self.sources.iter().enumerate() {
@@ -400,7 +400,7 @@ impl Sink for OfBag<'_> {
         let Some(Ok(table)) = source.table else {
             return;
         };
-        // Messages may come before their stamps.
+        // Messages may be delivered before their stamps.
         source.missing = source.missing.wrapping_sub(1);
         let older = source.older.take();
         let publisher = source.publisher.as_ref().map(NodeName::as_str);

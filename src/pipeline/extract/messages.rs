@@ -1,4 +1,4 @@
-//! A row per message, in order of time over all bags, from the index, without payloads.
+//! A row per message, sorted by time over all bags, from the index, without payloads.
 
 use super::{Extract, Extracted, of_report, stop};
 use crate::bag::{Connection, ConnectionId, Sink as Takes, Want};
@@ -15,11 +15,11 @@ use crate::view::NameFilter;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The number of rows that are gathered before they are written.
+/// The number of rows buffered before they are written.
 const MOST_ROWS: usize = 16 * 1024;
 
-/// Reads all times first, which takes little memory (what does not fit goes to an unnamed file), then writes them
-/// sorted: bags that overlap in time are one table in order.
+/// Reads all times first, spilling to an unnamed file if necessary, then writes them sorted, so that bags that overlap
+/// in time make one sorted table.
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let sink = OutputSink::create(&job.target, None)?;
     let range = job.range(watch)?;
@@ -53,7 +53,7 @@ struct RowSource {
     is_sized: bool,
 }
 
-/// The times of all messages taken.
+/// The times of all extracted messages.
 #[derive(Default)]
 struct Taken {
     stamps: Stamps,
@@ -77,10 +77,10 @@ impl Taken {
     }
 }
 
-/// The series of a connection: of messages whose size is known, and of the others.
+/// The series of a connection: messages of known size, and the others.
 type Series = Option<[SeriesId; 2]>;
 
-/// The reader's visitor of one bag.
+/// The sink for one bag.
 struct OfBag<'a> {
     taken: &'a mut Taken,
     filter: &'a NameFilter,
@@ -114,7 +114,7 @@ impl Takes for OfBag<'_> {
     }
 }
 
-/// The table without rows. A text is written down once per source, and stands in a row by the source's number.
+/// The table without rows. A text is stored once per source, and referenced in rows by the source's number.
 fn table(sources: &[RowSource]) -> Batch {
     let topics = sources.iter().map(|s| s.topic.as_str());
     let types = sources.iter().map(|s| &*s.type_name);
@@ -128,7 +128,7 @@ fn table(sources: &[RowSource]) -> Batch {
     ])
 }
 
-/// Writes all rows in order of time, those of one time in the order of their connections.
+/// Writes all rows sorted by time, then by connection.
 fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Watch) -> Result<u64> {
     let spool = |e| Error::io("read", Path::new("temporary file of times"))(e);
     taken.stamps.finish().map_err(spool)?;

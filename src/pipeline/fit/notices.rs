@@ -7,7 +7,7 @@ use crate::base::words;
 use crate::draw::picture::PageOptions;
 use crate::pipeline::Drawing;
 
-/// The collapsed namespaces in words, with the number of those in it that were kept open because they change.
+/// The collapsed namespaces as text, each with the number of changing elements kept outside.
 pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
     let told = |name: &Arc<str>| {
         let inside = |other: &&Arc<str>| {
@@ -23,7 +23,7 @@ pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>,
     collapsed.iter().map(told).collect()
 }
 
-/// The notices about what `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
+/// The notices about what `--fit auto` did, and whether it was sufficient: the smallest text is `text` pixels high.
 pub(super) fn told(
     drawing: &Drawing,
     collapsed: &[(Arc<str>, String)],

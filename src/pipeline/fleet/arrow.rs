@@ -1,6 +1,6 @@
-//! The tables as Arrow record batches, for programs that share our memory.
+//! The tables as Arrow record batches, for zero-copy exchange.
 //!
-//! The crate `arrow-array` is part of this promise: a program that takes these batches uses the same version of it.
+//! The crate `arrow-array` is part of the public API: a program that uses these batches needs the same version.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub use crate::export::arrow::RecordBatch;
 /// The table `counts`.
 ///
 /// # Errors
-/// [`Error::Usage`] for texts of more than 2 GB in all.
+/// [`Error::Usage`] for texts of more than 2 GB in total.
 pub fn counts_batch(counts: &[Count]) -> Result<RecordBatch> {
     to_arrow(&counts_table(counts))
 }
@@ -31,7 +31,7 @@ pub fn bags_batch(bags: &[FleetBag]) -> Result<RecordBatch> {
     to_arrow(&bags_table(bags))
 }
 
-/// Every table of a mission by its word: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
+/// Every table of a mission by name: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
 ///
 /// # Errors
 /// As [`counts_batch`].
@@ -42,12 +42,12 @@ pub fn mission_batches(mission: &Mission) -> Result<Vec<(&'static str, RecordBat
         .collect()
 }
 
-/// The counts in the rows of a table `counts`, whichever program made it.
+/// The counts in the rows of a table `counts`, written by any program.
 ///
 /// # Errors
 /// [`Error::Usage`] for a column that is missing, of another type, or unknown where it must be known.
 pub fn counts_of(batch: &RecordBatch) -> Result<Vec<Count>> {
-    // A role follows from a name, and tables of before had none.
+    // A role is derived from the name, and older tables lack it.
     let columns = COUNTS.iter().filter(|(name, ..)| *name != ROLE);
     let columns: Vec<_> = columns.map(|(name, kind, _)| (*name, *kind)).collect();
     let table = from_arrow(batch, &columns)?;

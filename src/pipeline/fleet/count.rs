@@ -1,5 +1,5 @@
-//! The map: the counts of one bag, or of a part of its time, from its index alone; a pure function of the bag and the
-//! plan.
+//! The map step: the counts of one bag, or of a part of its time, from its index alone; a pure function of the bag and
+//! the plan.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -49,13 +49,13 @@ pub struct CountedBag {
     pub bag: FleetBag,
 }
 
-/// In a bag that is far away, more chunks than this are counted as a whole: each would be a request.
+/// In a remote bag with more chunks than this, chunks are counted as a whole: each would need a request.
 const FAR_CHUNKS: usize = 64;
 
-/// Counts the messages of a bag. A bag that cannot be read, or not all of it, is no error but has a row that says so.
+/// Counts the messages of a bag. An unreadable or damaged bag is not an error but has a row that states it.
 ///
 /// # Errors
-/// [`Error::Remote`], where trying again may help; and if the temporary file of times cannot be used.
+/// [`Error::Remote`], where a retry may help; and if the temporary file of times cannot be used.
 pub fn count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
     match try_count(planned, tally) {
         Err(error) => unreadable(planned, tally, error),
@@ -73,10 +73,10 @@ pub(super) fn try_count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBa
     Ok(CountedBag { counts, bag })
 }
 
-/// What is counted of a bag that cannot be read for this reason.
+/// The result for a bag that cannot be read for this reason.
 ///
 /// # Errors
-/// [`Error::Remote`], which says nothing of the bag.
+/// [`Error::Remote`], which implies nothing about the bag.
 pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: Error) -> Result<CountedBag> {
     if matches!(error, Error::Remote { .. }) {
         return Err(error);
@@ -94,10 +94,10 @@ pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: Error) -> R
     })
 }
 
-/// The size of a bag, and what a store says of its version.
+/// The size of a bag, and its version in a store.
 ///
 /// # Errors
-/// Where a store cannot be asked, or has no such object.
+/// If a store fails or has no such object.
 pub(super) fn version(input: &Input) -> Result<(Option<u64>, Option<String>)> {
     match input {
         Input::Url(url) => bag::version(url).map(|(bytes, etag)| (Some(bytes), etag)),
@@ -128,7 +128,7 @@ fn row(planned: &PlannedBag, tally: &Tally) -> FleetBag {
 }
 
 impl FleetBag {
-    /// Takes in the outcome of reading the bag.
+    /// Adds the outcome of reading the bag.
     fn take(&mut self, report: &Report, taken: &BagTally) {
         let lost: Vec<String> = taken
             .notices
@@ -178,15 +178,15 @@ fn read(
     bag::open(input, &options)?.read(tally.part, taken)
 }
 
-/// The key of a sender: topic, type and publisher.
+/// The key of a publication: topic, type and publisher.
 type SenderKey = (Arc<str>, Arc<str>, Option<Arc<str>>);
 
 /// The messages of one sender.
 #[derive(Default)]
 struct SentMessages {
-    /// The series of messages whose sizes are known, and of the others.
+    /// The series of messages with known sizes, and of the others.
     series: Vec<SeriesId>,
-    /// Numbers of messages counted without times, by the start of their window.
+    /// The number of messages counted without times, by window start.
     lumps: BTreeMap<Stamp, u64>,
 }
 
@@ -267,7 +267,7 @@ impl BagTally {
         let mut open: Option<(Stamp, InWindow)> = None;
         self.stamps.merge(&sent.series, |timed| {
             let size = sized[timed.series].then_some(u64::from(timed.size));
-            // They come in order of time. A start before the range of time is held at its end, and says less.
+            // They are sorted by time. A window start before the range of time saturates, and is less precise.
             let is_open =
                 |start: Stamp| start > Stamp::MIN && timed.time.since(start) < self.period.nanos();
             let start = match &open {
@@ -291,7 +291,7 @@ impl BagTally {
     }
 }
 
-/// The place of the window that begins at `start`.
+/// The index of the window that begins at `start`.
 fn place(start: Stamp, origin: Stamp, period: Period) -> i64 {
     let from_origin = i128::from(start.0) - i128::from(origin.0);
     let place = from_origin.div_euclid(i128::from(period.nanos()));
@@ -319,7 +319,7 @@ impl InWindow {
         }
     }
 
-    /// Takes in the next message.
+    /// Adds the next message.
     fn take(&mut self, time: Stamp, size: Option<u64>) {
         let gap = self.last.map(|last| time.since(last));
         self.n += 1;

@@ -1,4 +1,4 @@
-//! The counts of the bags of a fleet, and the merging of the counts of parts into those of a whole.
+//! The counts of a fleet's bags, and merging the counts of parts of a bag.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::base::time::{Period, Span, Stamp};
 pub const SCHEMA_VERSION: i64 = 2;
 
 /// The messages of one publisher on one topic in one window: a row of the table `counts`. Windows without messages have
-/// none.
+/// no row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Count {
@@ -18,34 +18,34 @@ pub struct Count {
     pub mission: Arc<str>,
     /// The bag, as its path or URL was given.
     pub bag: Arc<str>,
-    /// The format's word: `rosbag1`, `mcap`, `sqlite3`.
+    /// The format's name: `rosbag1`, `mcap`, `sqlite3`.
     pub format: Arc<str>,
     /// The length of a window.
     pub period: Period,
-    /// The window's place from the plan's origin: periods since 1970 with windows by the clock.
+    /// The window's index from the plan's origin: periods since 1970 with windows by the clock.
     pub win: i64,
-    /// The time at which the window begins; it ends a period later.
+    /// The start of the window; it ends a period later.
     pub start: Stamp,
     /// The topic as recorded.
     pub topic: Arc<str>,
-    /// Its type as recorded; empty if the bag does not say.
+    /// Its type as recorded; empty if unknown.
     pub type_name: Arc<str>,
-    /// The node that published, if the bag knows it.
+    /// The publishing node, if known.
     pub node: Option<Arc<str>>,
     /// The number of messages, ≥ 1.
     pub n: u64,
-    /// The number of bytes of their payloads, if the index tells it.
+    /// The number of bytes of their payloads, if the index contains it.
     pub bytes: Option<u64>,
-    /// The first message's time; unknown where a chunk was counted as a whole.
+    /// The first message's time; unknown if a chunk was counted as a whole.
     pub first: Option<Stamp>,
-    /// The last message's time; known as `first` is.
+    /// The last message's time; unknown if `first` is.
     pub last: Option<Stamp>,
-    /// The longest time between two of them, in nanoseconds; unknown of one message, and as `first` is.
+    /// The longest time between two of them, in nanoseconds; unknown for one message, or if `first` is.
     pub max_gap_ns: Option<i64>,
 }
 
-/// The key of counts of the same messages, without the mission and the format, which follow from the bag. It is the
-/// order of a table's rows.
+/// The key of counts, without the mission and the format, which are determined by the bag. Rows of a table are sorted
+/// by it.
 type CountKey = (
     Arc<str>,
     Arc<str>,
@@ -68,12 +68,11 @@ impl Count {
     }
 }
 
-/// Makes one count of those of the same window, topic and node that come from several parts of a bag, in any order:
-/// counts and bytes are added, the longest gap takes in those between the parts. Sorted by mission, bag, window, topic,
-/// type and node.
+/// Merges counts of the same window, topic and node from several parts of a bag, in any order: counts and bytes are
+/// added, and gaps between the parts are included. Sorted by mission, bag, window, topic, type and node.
 ///
-/// Exact for parts that do not overlap in time, as [`count`](super::count()) makes them. All parts of a bag go in at
-/// once: the gap between two parts is only known when no other part lies in it.
+/// Exact for parts that do not overlap in time, as made by [`count`](super::count()). All parts of a bag must be merged
+/// at once: the gap between two parts is only valid if no other part is in between.
 pub fn merge(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
     let mut all: BTreeMap<CountKey, Vec<Count>> = BTreeMap::new();
     for count in counts {
@@ -113,25 +112,25 @@ pub struct FleetBag {
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
-    /// What the store says of its version; none for files.
+    /// Its version in a store; none for files.
     pub etag: Option<String>,
-    /// Its size in bytes, if that is known.
+    /// Its size in bytes, if known.
     pub file_bytes: Option<u64>,
-    /// The format's word, if it is a bag.
+    /// The format's name, if it is a bag.
     pub format: Option<String>,
     /// The tier in which it was read, if it was.
     pub tier: Option<Tier>,
     /// Whether nothing of it was lost.
     pub is_complete: bool,
-    /// The number of all messages; with a part of the time, of those in it.
+    /// The number of messages, in the counted part of the time.
     pub messages: u64,
-    /// From the first message to the last plus 1 ns; unknown where every chunk was counted as a whole.
+    /// From the first message to the last plus 1 ns; unknown if every chunk was counted as a whole.
     pub span: Option<Span>,
     /// The length of a window.
     pub period: Period,
-    /// A moment at which a window begins.
+    /// The start of one of the windows.
     pub origin: Stamp,
-    /// The loss in words, if something was lost.
+    /// A description of the loss, if any.
     pub lost: Option<String>,
     /// The reason why it could not be read.
     pub error: Option<String>,
@@ -161,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gap_between_two_parts_counts() {
+    fn gaps_between_parts_are_counted() {
         let parts = [part(80, 90, 2, Some(10)), part(0, 10, 3, Some(6))];
         let whole = part(0, 90, 5, Some(70));
         assert_eq!(merge(parts), [whole]);
@@ -174,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_of_a_part_is_unknown_of_the_whole() {
+    fn unknown_values_of_a_part_are_unknown_in_the_sum() {
         let lump = Count {
             first: None,
             last: None,
@@ -187,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn other_windows_and_nodes_stay_apart() {
+    fn different_windows_and_nodes_are_not_merged() {
         let other = Count {
             node: Some("/n".into()),
             ..part(0, 0, 1, None)

@@ -1,4 +1,4 @@
-//! The last step: the counts of one mission as a mission, with states, rates and the changes from window to window.
+//! The last step: from the counts of one mission to a mission with states, rates and changes between windows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -16,9 +16,9 @@ use crate::mission::raw::{
 };
 use crate::mission::{Mission, mission_of};
 
-/// Makes a mission of the counts of all its bags together, in any order: every window from the first message to the
-/// last, a publication `active` in windows with messages and `silent` in those between. A node lives as long as it
-/// publishes. Facts from payloads (subscribers, `/rosout`) are not there, nor medians.
+/// Makes a mission from the counts of all its bags, in any order: every window from the first message to the last, a
+/// publication `active` in windows with messages and `silent` in those between. A node is alive while it publishes.
+/// Facts from payloads (subscribers, `/rosout`) and medians are missing.
 ///
 /// # Errors
 /// [`Error::Usage`] for no counts, for those of several missions or periods, and for more than 100,000 windows.
@@ -90,8 +90,8 @@ fn check(counts: &[Count]) -> Result<(Period, usize)> {
     Ok((one.period, usize::try_from(many).unwrap_or(usize::MAX)))
 }
 
-/// The time of the mission: from the first message to the last plus 1 ns; from the first window to the last where no
-/// message's time is known.
+/// The time of the mission: from the first message to the last plus 1 ns; from the first window to the last if no
+/// message times are known.
 fn span(counts: &[Count], period: Period) -> Span {
     let first = counts.iter().map(|c| c.first.unwrap_or(c.start)).min();
     let last = |c: &Count| {
@@ -143,7 +143,7 @@ impl CountSum {
                 .map(|(a, b)| a.saturating_add(b)),
         };
         self.n = self.n.saturating_add(count.n);
-        // Between the messages of two senders nothing is known.
+        // Gaps between the messages of two publishers are unknown.
         self.gap = count.max_gap_ns.filter(|_| self.parts == 0);
         self.parts += 1;
     }

@@ -1,4 +1,4 @@
-//! The plan that is fixed before anything is counted: the bags, the mission of each, and the beginnings of windows.
+//! The plan, fixed before anything is counted: the bags, the mission of each, and the starts of windows.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,15 +17,14 @@ use crate::pipeline::extract::Bounds;
 pub struct Planning {
     /// The length of a window.
     pub period: Period,
-    /// The alignment: windows on whole periods of UTC, or from the first message of each mission.
+    /// The alignment of windows: whole periods of UTC, or from the first message of each mission.
     pub align: Align,
     /// A regular expression whose first group, or whole match, in a bag's path or URL is its mission.
     pub mission: Option<String>,
 }
 
 impl Default for Planning {
-    /// Windows of ten seconds by the clock: those of different missions are comparable, and no bag is read to make the
-    /// plan.
+    /// Windows of ten seconds by the clock: comparable between missions, and no bag is read to make the plan.
     fn default() -> Self {
         Self {
             period: TEN_SECONDS,
@@ -44,13 +43,13 @@ worded! {
     /// The detail in which messages are counted: with their times, or only by their number.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum CountDetail {
-        /// By chunks where a bag is far away and has more than 64 of them, as each would cost a request; else by the index.
+        /// By chunks for remote bags with more than 64 of them, as each would cost a request; else by the index.
         #[default]
         Auto = "auto",
         /// Every message's time, from the index.
         Index = "index",
-        /// By chunks: one that lies in one window is counted as a whole, without times. A bag without chunks is read by its
-        /// index.
+        /// By chunks: a chunk within one window is counted as a whole, without times. A bag without chunks is read by
+        /// its index.
         Chunks = "chunks",
     }
 }
@@ -62,7 +61,7 @@ pub struct PlannedBag {
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
-    /// A moment at which a window begins: the same for all bags of a mission.
+    /// The start of one of the windows: the same for all bags of a mission.
     pub origin: Stamp,
 }
 
@@ -78,10 +77,10 @@ impl PlannedBag {
     }
 }
 
-/// The character that stands in a table for what is no UTF-8.
+/// The character that replaces invalid UTF-8 in a table.
 const UNKNOWN: char = '\u{fffd}';
 
-/// The path whose name is no UTF-8 and reported as `path`; `None` unless there is exactly one.
+/// The path with invalid UTF-8 that is reported as `path`; `None` unless there is exactly one.
 fn named(path: &Path) -> Option<PathBuf> {
     let mut real = PathBuf::new();
     for part in path.components() {
@@ -105,7 +104,7 @@ fn named(path: &Path) -> Option<PathBuf> {
     Some(real)
 }
 
-/// The bags to count, sorted by mission and name, none twice.
+/// The bags to count, sorted by mission and name, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FleetPlan {
     /// The length of a window.
@@ -115,8 +114,8 @@ pub struct FleetPlan {
 }
 
 impl FleetPlan {
-    /// The missions of shard `index` of `count`, counted from 1: missions are dealt to shards one by one, and equal
-    /// plans are dealt equally everywhere.
+    /// The missions of shard `index` of `count`, counted from 1: missions are assigned to shards in turn, and equal
+    /// plans are always divided equally.
     ///
     /// # Errors
     /// [`Error::Usage`] unless `index` is 1 to `count`.
@@ -145,13 +144,12 @@ impl FleetPlan {
 
 /// Makes a plan of bags, folders with bags below them, and prefixes of stores, which end in a slash.
 ///
-/// A folder that is one recording of ROS 2 is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 on
-/// without a hole) are one mission, `x`; so are the files `x/x_0.mcap`, … of a recording of ROS 2 that are given one by
-/// one; every other bag is a mission of its own, named by its path without the format's ending.
+/// A folder that is one ROS 2 recording is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 without
+/// a gap) are one mission, `x`; so are the files `x/x_0.mcap`, … of a ROS 2 recording that are given individually;
+/// every other bag is its own mission, named by its path without the format's extension.
 ///
 /// # Errors
-/// Where a folder cannot be listed, or the pattern is not a regular expression. A bag that cannot be read is noticed
-/// later.
+/// If a folder cannot be listed, or the pattern is not a regular expression. Unreadable bags are detected later.
 pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     let mut uris = Vec::new();
     for source in sources {
@@ -179,7 +177,7 @@ pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     })
 }
 
-/// The bags that a path or URL stands for.
+/// The bags of a path or URL.
 fn listed(source: &str) -> Result<Vec<String>> {
     match Input::parse(source) {
         Input::Url(url) if url.ends_with('/') => {
@@ -194,7 +192,7 @@ fn listed(source: &str) -> Result<Vec<String>> {
     }
 }
 
-/// The endings of the names of bags, the longest first.
+/// The file extensions of bags, longest first.
 fn endings() -> Vec<String> {
     let all = bag::FORMATS.iter().flat_map(|format| format.extensions);
     let mut all: Vec<String> = all.map(|ending| format!(".{ending}")).collect();
@@ -202,7 +200,7 @@ fn endings() -> Vec<String> {
     all
 }
 
-/// Whether an object calls itself a bag: to look into each would be a request each.
+/// Whether an object has a bag's extension: inspecting each would need a request.
 fn is_named(url: &str) -> bool {
     endings().iter().any(|ending| url.ends_with(ending))
 }
@@ -254,7 +252,7 @@ fn split_groups(stems: &[String]) -> Vec<String> {
                 .all(|(number, place)| *number == place)
     };
     let mission = |stem: &String| match numbered(stem) {
-        // `run/run_0.mcap` is how ROS 2 names the files of the recording `run`.
+        // ROS 2 names the files of the recording `run` like `run/run_0.mcap`.
         Some((name, _)) if in_own_folder(name) => {
             let folder = Path::new(name).parent();
             folder.map_or(name.into(), |f| f.to_string_lossy().into_owned())
@@ -265,7 +263,7 @@ fn split_groups(stems: &[String]) -> Vec<String> {
     stems.iter().map(mission).collect()
 }
 
-/// A name and the number behind it: `run` and 12 of `run_12`.
+/// A name and its number: `run` and 12 of `run_12`.
 fn numbered(stem: &str) -> Option<(&str, u32)> {
     let (name, number) = stem.rsplit_once('_')?;
     let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
@@ -279,7 +277,7 @@ fn in_own_folder(name: &str) -> bool {
     folder.is_some() && folder == path.file_name()
 }
 
-/// Lets the windows of each mission begin with its first message. A bag that cannot be read has no say.
+/// Aligns the windows of each mission with its first message. Unreadable bags are ignored.
 fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     for mission in bags.chunk_by_mut(|a, b| a.mission == b.mission) {
         let mut first: Option<Stamp> = None;
@@ -297,7 +295,7 @@ fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     Ok(())
 }
 
-/// The time at which a bag begins, by its tail if that tells it.
+/// The start of a bag, from its tail if possible.
 fn begins(input: &Input) -> Result<Option<Stamp>> {
     if input.is_pipe() {
         return Err(Error::usage(
@@ -324,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_from_zero_on_are_one_mission() {
+    fn parts_numbered_from_zero_are_one_mission() {
         let split = [
             "d/a_0.bag",
             "d/a_1.bag",
@@ -353,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn shards_share_the_missions_and_part_none() {
+    fn shards_divide_the_missions_and_split_none() {
         let bag = |mission: usize, part: usize| PlannedBag {
             uri: format!("{mission}_{part}.bag"),
             mission: mission.to_string(),

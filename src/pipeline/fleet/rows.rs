@@ -5,7 +5,7 @@ use crate::base::role::role;
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::Stamp;
 
-/// The column of a node's name without what is new in every run.
+/// The column of a node's name without its anonymous suffix.
 pub(super) const ROLE: &str = "node_role";
 
 pub(super) const COUNTS: &[ColumnOf<(), Count>] = columns! {

@@ -1,5 +1,5 @@
-//! The job of `bagreel tables`: a file per bag and table, each whole or not there, so that engines read a folder and a
-//! killed run is finished by the next one.
+//! The job of `bagreel tables`: a file per bag and table, written atomically, so that query engines can read the folder
+//! and the next run resumes a killed one.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,10 +25,10 @@ use crate::export::target::Target;
 use crate::pipeline::read::files;
 use crate::pipeline::{Stage, Watch};
 
-/// The treatment of a bag that cannot be read at all.
+/// The treatment of unreadable bags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnError {
-    /// Give it a row in `bags` that says why.
+    /// Add a row with the reason to `bags`.
     #[default]
     Row,
     /// Stop.
@@ -47,18 +47,18 @@ pub struct FleetJob {
     pub detail: CountDetail,
     /// The shard of missions to count: its number, counted from 1, and the number of shards; `None` for all missions.
     pub shard: Option<(usize, usize)>,
-    /// Whether to leave out bags whose tables are there already, made of the same version of them in the same way.
+    /// Whether to skip bags whose tables exist, made from the same version with the same options.
     pub skip_existing: bool,
-    /// The treatment of a bag that cannot be read.
+    /// The treatment of unreadable bags.
     pub on_error: OnError,
-    /// The number of bags to count at a time; by default one per processor.
+    /// The number of bags to count in parallel; by default one per processor.
     pub jobs: Option<NonZeroUsize>,
-    /// The folder in which the folders `counts` and `bags` are made.
+    /// The folder for the folders `counts` and `bags`.
     pub folder: PathBuf,
 }
 
 impl FleetJob {
-    /// A job that counts these bags into that folder, with every option as the command line has it.
+    /// A job that counts these bags into that folder, with the command line's defaults.
     pub fn new(sources: Vec<String>, folder: PathBuf) -> Self {
         Self {
             sources,
@@ -79,27 +79,27 @@ impl FleetJob {
 pub struct Tabled {
     /// The number of bags whose tables were written.
     pub bags: usize,
-    /// The number of bags whose tables were there already.
+    /// The number of bags whose tables existed already.
     pub kept: usize,
-    /// The number of bags written that could not be read.
+    /// The number of written bags that could not be read.
     pub unreadable: usize,
-    /// The number of bags written of which something was lost.
+    /// The number of written bags with losses.
     pub incomplete: usize,
     /// The number of messages counted.
     pub messages: u64,
     /// The number of rows of `counts`.
     pub rows: usize,
-    /// Bags that a store did not give, and why; they have no row, and another run counts them.
+    /// Bags that a store refused, with the reasons; they have no row, and another run counts them.
     pub refused: Vec<(String, String)>,
 }
 
-/// Where answers are waited for, a processor counts so many bags at a time.
+/// The number of remote bags that each processor counts in parallel.
 const FAR_JOBS: usize = 8;
 
 /// Counts every bag of the job and writes its rows.
 ///
 /// # Errors
-/// Where nothing can be listed or written, and for the first bag that cannot be read with [`OnError::Fail`].
+/// If nothing can be listed or written, and for the first unreadable bag with [`OnError::Fail`].
 pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
     watch.stage(Stage::Count);
     let mut plan = plan(&job.sources, &job.planning)?;
@@ -204,7 +204,7 @@ impl FleetWork<'_> {
                 }
                 one => one,
             };
-            // Nobody listens any more once something has failed.
+            // The receiver is gone after a failure.
             if to.send(one).is_err() {
                 return;
             }
@@ -239,7 +239,7 @@ impl FleetWork<'_> {
         })
     }
 
-    /// The version of a bag before it is read; `None` where a store would have to be asked for nothing.
+    /// The version of a bag before it is read; `None` if that would be a needless request.
     fn version(&self, input: &Input) -> Result<Option<BagVersion>> {
         if matches!(input, Input::Url(_)) && !self.job.skip_existing {
             return Ok(None);
@@ -247,7 +247,7 @@ impl FleetWork<'_> {
         BagVersion::of(input).map(Some)
     }
 
-    /// What the files of a bag are called: after where it is, then after all that its rows follow from.
+    /// The names of a bag's files, from a digest of its location and one of everything that determines its rows.
     fn name(&self, bag: &PlannedBag, version: &BagVersion) -> FileName {
         let BagVersion {
             bytes,
@@ -268,7 +268,7 @@ impl FleetWork<'_> {
     }
 }
 
-/// What tells one version of a bag from another.
+/// The version of a bag.
 #[derive(Default)]
 struct BagVersion {
     bytes: Option<u64>,
@@ -277,10 +277,10 @@ struct BagVersion {
 }
 
 impl BagVersion {
-    /// That of a bag now; what is not there has none.
+    /// The current version of a bag; a missing one has none.
     ///
     /// # Errors
-    /// [`Error::Remote`] if a store cannot be asked.
+    /// [`Error::Remote`] if a store fails.
     fn of(input: &Input) -> Result<Self> {
         let (bytes, etag) = match version(input) {
             Err(error @ Error::Remote { .. }) => return Err(error),
@@ -297,7 +297,7 @@ impl BagVersion {
         })
     }
 
-    /// The one that was read of a store.
+    /// The version that was read from a store.
     fn counted(counted: &CountedBag) -> Self {
         Self {
             bytes: counted.bag.file_bytes,
@@ -307,7 +307,7 @@ impl BagVersion {
     }
 }
 
-/// When a file, or the newest in a folder, was written last, in nanoseconds since 1970.
+/// The modification time of a file, or of the newest in a folder, in nanoseconds since 1970.
 fn changed(path: &Path) -> Option<u128> {
     let of = |meta: &fs::Metadata| {
         let at = meta.modified().ok()?;
@@ -322,8 +322,8 @@ fn changed(path: &Path) -> Option<u128> {
     inside.chain(of(&own)).max()
 }
 
-/// The number of hexadecimal digits of a digest, 64 bits: among a million bags the chance that two share a name is one
-/// in 30 million.
+/// The number of hexadecimal digits of a digest, 64 bits: among a million bags the chance of a collision is one in
+/// 30 million.
 const DIGITS: usize = 16;
 
 /// The names of the files of one bag.
@@ -342,7 +342,7 @@ impl FileName {
 struct FleetFiles {
     counts: PathBuf,
     bags: PathBuf,
-    /// The files in either folder, by the part of their names that stands for the bag.
+    /// The files in either folder, by the part of their names that identifies the bag.
     earlier: [BTreeMap<String, Vec<String>>; 2],
 }
 
@@ -360,7 +360,7 @@ impl FleetFiles {
         })
     }
 
-    /// Whether both files of this name are there.
+    /// Whether both files of this name exist.
     fn hold(&self, name: &FileName) -> bool {
         let file = name.file();
         let holds = |all: &BTreeMap<String, Vec<String>>| {
@@ -370,7 +370,7 @@ impl FleetFiles {
         self.earlier.iter().all(holds)
     }
 
-    /// Writes both files, the one with the bag's own row last, and removes those of earlier versions.
+    /// Writes both files, `bags` last, and removes those of earlier versions.
     fn write(&self, name: &FileName, counted: &CountedBag) -> Result<()> {
         let file = name.file();
         write(&self.counts.join(&file), &counts_table(&counted.counts))?;

@@ -1,5 +1,5 @@
-//! Events and findings as lines, each told when it is first known, again when it is sure, and taken back where more
-//! messages tell another story.
+//! Events and findings as lines, each printed when first detected, again when certain, and withdrawn if later messages
+//! contradict it.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,20 @@ use crate::mission::events::{LogFormat, line, quoted};
 use crate::mission::ledger::{Entry, Kind};
 
 worded! {
-    /// How far a line can be relied on.
+    /// The certainty of a line.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub(crate) enum Certainty {
-        /// The next messages may show that it is not so.
+        /// Later messages may contradict it.
         SoFar = "so_far",
-        /// It holds for everything up to now.
+        /// It is final.
         Sure = "sure",
-        /// It was told, and more messages tell otherwise.
+        /// It was printed, and later messages contradict it.
         Withdrawn = "withdrawn",
     }
 }
 
 impl Certainty {
-    /// A line of text, or an object, with the certainty in it.
+    /// A line of text, or an object, with its certainty.
     fn mark(self, line: &str, format: LogFormat) -> String {
         match (format, self) {
             (LogFormat::Ndjson, _) => {
@@ -39,8 +39,8 @@ impl Certainty {
     }
 }
 
-/// An event that was told.
-struct Told {
+/// A printed event.
+struct Printed {
     kind: Kind,
     names: (Option<String>, Option<String>),
     time: Stamp,
@@ -50,47 +50,49 @@ struct Told {
     is_there: bool,
 }
 
-/// The events told so far.
+/// The events printed so far.
 #[derive(Default)]
 pub(crate) struct Feed {
-    told: Vec<Told>,
+    printed: Vec<Printed>,
 }
 
-/// The time for which what ends must stay away until it is sure: as long as the robot's last part, in which nothing that
-/// ends is a finding. Five usual intervals have passed before the log tells of an end at all.
+/// The time after which an end is certain: as long as the mission's closing part, in which ends are not findings. An
+/// end is only logged after five usual intervals anyway.
 const SURE_NS: i64 = CLOSING_NS;
 
 impl Feed {
-    /// The lines that are new in `known`, by time.
+    /// The new lines in `known`, sorted by time.
     pub(crate) fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<String> {
         let mission = &known.mission;
-        // What begins where the kept messages begin was there before.
+        // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
-        self.told.iter_mut().for_each(|told| told.is_there = false);
+        self.printed
+            .iter_mut()
+            .for_each(|printed| printed.is_there = false);
         let mut lines = Vec::new();
         let entries = (0..).zip(&mission.ledger.entries);
         for (id, entry) in entries.filter(|(_, e)| e.is_headline() && e.time >= from) {
             let certainty = certainty(entry, known.now);
             let names = mission.elements.names(entry.what);
             let names = (names.0.map(str::to_owned), names.1.map(str::to_owned));
-            let same = |told: &&mut Told| {
-                let is_near = told.time.since(entry.time).abs() <= TOGETHER_NS;
-                told.kind == entry.kind && told.names == names && is_near && !told.is_there
+            let same = |printed: &&mut Printed| {
+                let is_near = printed.time.since(entry.time).abs() <= TOGETHER_NS;
+                printed.kind == entry.kind && printed.names == names && is_near && !printed.is_there
             };
-            if let Some(told) = self.told.iter_mut().find(same) {
-                told.is_there = true;
-                told.time = entry.time;
-                if told.certainty == Certainty::Sure || certainty == Certainty::SoFar {
+            if let Some(printed) = self.printed.iter_mut().find(same) {
+                printed.is_there = true;
+                printed.time = entry.time;
+                if printed.certainty == Certainty::Sure || certainty == Certainty::SoFar {
                     continue;
                 }
-                told.certainty = certainty;
-                told.line = line(mission, id, entry, format);
-                lines.push(certainty.mark(&told.line, format));
+                printed.certainty = certainty;
+                printed.line = line(mission, id, entry, format);
+                lines.push(certainty.mark(&printed.line, format));
                 continue;
             }
             let line = line(mission, id, entry, format);
             lines.push(certainty.mark(&line, format));
-            self.told.push(Told {
+            self.printed.push(Printed {
                 kind: entry.kind,
                 names,
                 time: entry.time,
@@ -99,17 +101,17 @@ impl Feed {
                 is_there: true,
             });
         }
-        // What lies before the kept messages stays as it was told, and need not be known any more.
-        self.told.retain(|told| told.time >= from || told.is_there);
-        let gone = |told: &mut Told| !told.is_there;
-        let gone = self.told.extract_if(.., gone);
-        lines.extend(gone.map(|told| Certainty::Withdrawn.mark(&told.line, format)));
+        // Events before the kept messages are final and can be dropped.
+        self.printed
+            .retain(|printed| printed.time >= from || printed.is_there);
+        let gone = |printed: &mut Printed| !printed.is_there;
+        let gone = self.printed.extract_if(.., gone);
+        lines.extend(gone.map(|printed| Certainty::Withdrawn.mark(&printed.line, format)));
         lines
     }
 }
 
-/// Whether an event can still turn out to be another one: what ends may come back, and a rate is only known when it has
-/// held.
+/// Whether an event is certain: an ended element may return, and a rate must last for a while.
 fn certainty(entry: &Entry, now: Stamp) -> Certainty {
     let is_open = matches!(entry.kind, Kind::Stopped | Kind::Vanished | Kind::Rate);
     let is_away = entry.kind == Kind::Silent && entry.until.is_none();
@@ -121,14 +123,14 @@ fn certainty(entry: &Entry, now: Stamp) -> Certainty {
     }
 }
 
-/// The findings of an expectation that were seen, by fingerprint: since when, and the line once it was told.
+/// The findings of an expectation so far, by fingerprint: since when, and the line once it was printed.
 #[derive(Default)]
 pub(crate) struct FindingFeed {
     seen: BTreeMap<String, (Stamp, Option<String>)>,
 }
 
 impl FindingFeed {
-    /// The lines about findings that have held long enough to be sure, and about those that hold no longer.
+    /// The lines about findings that have become certain, and about those that no longer apply.
     pub(crate) fn news(&mut self, verdict: &Verdict, now: Stamp, format: LogFormat) -> Vec<String> {
         let mut lines = Vec::new();
         let mut there = BTreeMap::new();
@@ -138,8 +140,8 @@ impl FindingFeed {
             }
             let (severity, kind) = (finding.severity.word(), finding.kind.word());
             let key = finding.fingerprint();
-            let (since, mut told) = self.seen.remove(&key).unwrap_or((now, None));
-            if told.is_none() && now.since(since) >= SURE_NS {
+            let (since, mut printed) = self.seen.remove(&key).unwrap_or((now, None));
+            if printed.is_none() && now.since(since) >= SURE_NS {
                 let line = if format == LogFormat::Ndjson {
                     format!(
                         "{{\"kind\":\"finding\",\"finding\":\"{kind}\",\"severity\":\"{severity}\",\"name\":{},\"text\":{},\"time_ns\":{}}}",
@@ -151,12 +153,12 @@ impl FindingFeed {
                     format!("{severity}[{kind}]: {}", finding.says)
                 };
                 lines.push(Certainty::Sure.mark(&line, format));
-                told = Some(line);
+                printed = Some(line);
             }
-            there.insert(key, (since, told));
+            there.insert(key, (since, printed));
         }
         let gone = std::mem::replace(&mut self.seen, there).into_values();
-        let gone = gone.filter_map(|(_, told)| told);
+        let gone = gone.filter_map(|(_, printed)| printed);
         lines.extend(gone.map(|line| Certainty::Withdrawn.mark(&line, format)));
         lines
     }

@@ -31,13 +31,13 @@ fn example(name: &str) -> Vec<u8> {
 
 fn reading(path: &Path) -> Reading {
     let mut reading = Reading::of([path]);
-    // The index does not tell what the records do.
+    // The index does not contain everything in the records.
     reading.collect.sizes = true;
     reading.collect.payload_bytes = 0;
     reading
 }
 
-/// A mission's JSON, but for the way in which its bag was read.
+/// A mission's JSON, except how its bag was read.
 fn json(mut mission: Mission) -> String {
     mission.bags.clear();
     mission.notices = Notices::new();
@@ -46,7 +46,7 @@ fn json(mut mission: Mission) -> String {
     String::from_utf8(json).unwrap()
 }
 
-/// Follows `bytes` as they are appended in random cuts; returns what was known at the end, and the lines that held.
+/// Follows `bytes` as they are appended in random cuts; returns the final mission, and the lines that were not revised.
 fn followed(path: &Path, bytes: &[u8], seed: u64) -> (Mission, Vec<String>) {
     let mut chance = Chance(seed);
     let mut file = std::fs::File::create(path).unwrap();
@@ -88,7 +88,7 @@ fn followed(path: &Path, bytes: &[u8], seed: u64) -> (Mission, Vec<String>) {
     (known.mission, lines)
 }
 
-/// What a line of the log says, without its time, its rates, and the length of a silence: these are known better at the end.
+/// A line of the log without time, rates, and length of a silence, which are more precise at the end.
 fn what(line: &str) -> &str {
     let line = line.trim_end_matches(" (so far)");
     let (_, words) = line.trim_start().split_once("  ").unwrap();
@@ -107,7 +107,7 @@ fn holds(name: &str, seeds: std::ops::Range<u64>) {
     let closed = read(&reading(&path), &mut Unwatched).unwrap();
     let expected = json(closed.clone());
     let log = log(&closed, LogFormat::Text, LogOptions::default());
-    // Several events together are a switch: that is known at the end.
+    // Whether several events are a mode switch is only known at the end.
     let events = log.lines().filter(|line| !line.contains("mode switch"));
     let log: Vec<&str> = events.map(what).collect();
     for seed in seeds {
@@ -123,7 +123,7 @@ fn holds(name: &str, seeds: std::ops::Range<u64>) {
 }
 
 #[test]
-fn what_is_known_at_the_end_is_what_the_closed_recording_tells() {
+fn the_followed_mission_equals_the_closed_recording() {
     for name in ["courier.mcap", "warehouse.bag"] {
         holds(name, 0..4);
     }
@@ -132,14 +132,14 @@ fn what_is_known_at_the_end_is_what_the_closed_recording_tells() {
 /// `cargo test --release --lib follow -- --ignored`
 #[test]
 #[ignore = "takes minutes"]
-fn a_thousand_recordings_are_followed_to_what_they_tell() {
+fn a_thousand_followed_recordings_equal_the_closed_ones() {
     for name in ["courier.mcap", "warehouse.bag"] {
         holds(name, 0..1000);
     }
 }
 
 #[test]
-fn old_messages_are_forgotten_and_their_events_stay_told() {
+fn dropped_messages_keep_their_printed_events() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("courier.mcap");
     std::fs::write(&path, example("courier.mcap")).unwrap();
