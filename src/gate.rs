@@ -1,7 +1,7 @@
-//! Judgements of missions: compared with each other, written down as an expectation, held against one.
+//! Checks of missions: compares them with each other, generates expectations, and checks against them.
 //!
-//! Everything here judges lives, rates and the ledger, never the difference of two windows. An element without evidence
-//! in the bag is not absent: it is undecidable, and reported as such.
+//! Everything here is based on lifetimes, rates and the ledger, never on the difference of two windows. An element
+//! without evidence in the bag is not absent but undecidable, and reported as such.
 
 mod baseline;
 mod difference;

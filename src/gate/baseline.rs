@@ -1,4 +1,4 @@
-//! Writes the expectation of healthy runs: the smallest one that holds in all of them, a line per element.
+//! Generates an expectation from healthy runs: the strictest one that all of them meet, one line per element.
 
 mod draft;
 mod edit;
@@ -13,22 +13,21 @@ use crate::mission::Mission;
 pub(super) use draft::{Draft, NodeLine, TopicLine};
 pub(crate) use update::update;
 
-/// The largest length of a name in the file, in bytes; longer ones are left out: YAML takes no longer keys, and ROS
-/// allows 255.
+/// The longest name in the file, in bytes; longer ones are left out: YAML allows no longer keys, and ROS allows 255.
 const LONGEST: usize = 1000;
-/// The share of a document's limits that the lines before the first name take.
+/// The share of a document's limits reserved for the lines before the first name.
 const HEAD: usize = 1 << 16;
 
-/// An expectation that was written.
+/// A generated expectation.
 #[derive(Debug, Default)]
 pub(crate) struct Written {
     pub(crate) text: String,
-    /// The number of nodes and topics that found no room in it.
+    /// The number of nodes and topics that did not fit.
     pub(crate) left_out: usize,
 }
 
-/// The expectation that holds in all of these runs, which were read with windows of one length; without times if each `is_part`
-/// of a recording. `from` names them, for the reader only.
+/// The expectation that all of these runs meet, which were read with one period; without times if each `is_part` of a
+/// recording. `from` names them in a comment.
 pub(crate) fn write(runs: &[Mission], is_part: bool, from: &str) -> Written {
     let written = |first: &Mission| written(&Draft::of(runs, is_part), from, first.period);
     runs.first().map(written).unwrap_or_default()
@@ -42,7 +41,7 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     };
     let nodes = draft.nodes.iter().map(|(name, line)| (name, line.text()));
     let nodes = room.section("nodes", nodes);
-    // Who found no room is not unexpected.
+    // Elements that did not fit are not unexpected.
     let others = if room.left_out == 0 { "warn" } else { "allow" };
     let topics = draft.topics.iter();
     let topics = topics.map(|(name, line)| (name, line.text() + &line.comment()));
@@ -63,7 +62,7 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     }
 }
 
-/// The rest of the limits within which a document can be read again.
+/// The remaining limits within which the document can be read back.
 struct Room {
     bytes: usize,
     values: usize,
@@ -71,7 +70,7 @@ struct Room {
 }
 
 impl Room {
-    /// A section with a line per name, without those that find no room; empty if none does.
+    /// A section with a line per name, without those that do not fit; empty if none fits.
     fn section<'a>(
         &mut self,
         key: &str,
@@ -93,9 +92,9 @@ impl Room {
         out
     }
 
-    /// Takes the room for a line; whether there was enough.
+    /// Reserves space for a line; returns whether it fits.
     fn takes(&mut self, line: &str) -> bool {
-        // A pair is two values, and so is what opens a mapping or a list with its first member; a comma begins another.
+        // A pair is two values, and so is a mapping or list with its first member; a comma begins another.
         let signs = line
             .bytes()
             .filter(|b| matches!(b, b':' | b',' | b'[' | b'{'));
@@ -111,7 +110,7 @@ impl Room {
     }
 }
 
-/// A length of time as the command line takes it.
+/// A length of time in the command line's syntax.
 fn length(nanos: i64) -> String {
     const SECOND: i64 = 1_000_000_000;
     if nanos % SECOND == 0 {
@@ -133,7 +132,7 @@ fn two_digits(nanos: i64) -> i64 {
         .saturating_mul(step)
 }
 
-/// Text as YAML: as it is where YAML takes it for a text, in quotes otherwise.
+/// Text as YAML: plain if YAML reads it as text, otherwise quoted.
 fn scalar(text: &str) -> String {
     const WORDS: [&str; 9] = ["true", "false", "null", "yes", "no", "on", "off", "y", "n"];
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '/' | '_' | '-' | '.');
@@ -167,7 +166,7 @@ mod tests {
     use super::*;
     use crate::gate::read;
 
-    /// An expectation of `nodes` nodes, and of topics with these names; it must be one that can be read.
+    /// An expectation of `nodes` nodes, and of topics with these names, which must be readable.
     fn of(nodes: usize, topics: &[String]) -> (Written, usize) {
         let mut draft = Draft::default();
         for n in 0..nodes {
@@ -187,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_can_be_read_however_many_names_there_are() {
+    fn expectations_with_any_number_of_names_can_be_read() {
         let (small, kept) = of(2, &["/a".to_owned()]);
         assert_eq!((small.left_out, kept), (0, 3));
         assert!(small.text.contains("unexpected_nodes: warn") && !small.text.contains("no room"));
@@ -198,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_names_come_back_as_they_were() {
+    fn unusual_names_round_trip() {
         let signs = "\u{fffe}\u{ffff}\u{feff}\u{2028}\u{85}\u{7f}\u{1}\u{9b}\u{a0}\u{202e}\u{e0001}\u{1f600}\u{10ffff}\t\n\r\"'\\:#&*!|>%@`,[]{}?-~=<^$+ ß";
         for sign in signs.chars() {
             let name = format!("/a{sign}b");
@@ -211,8 +210,8 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_keys_are_left_out() {
-        // As long as they are when they are written.
+    fn names_that_are_not_valid_keys_are_left_out() {
+        // Of their length when written.
         let names = [
             "/a".repeat(495),
             "/a".repeat(505),
@@ -223,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_quoted_where_yaml_would_read_something_else() {
+    fn text_is_quoted_if_yaml_would_read_another_value() {
         assert_eq!(scalar("/nav/amcl_1"), "/nav/amcl_1");
         assert_eq!(
             scalar("sensor_msgs/msg/LaserScan"),

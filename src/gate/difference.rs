@@ -13,18 +13,18 @@ pub(crate) use pairs::pairs;
 pub(crate) use report::{DIFF_FORMATS, DiffFormat, DiffSubject};
 pub(crate) use union::{Side, union};
 
-/// The one of two missions, or both, that have something.
+/// Which of two missions contain an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Where {
     /// Only in the first.
     First,
     /// Only in the second.
     Second,
-    /// In both, and not the same.
+    /// In both, but different.
     Both,
 }
 
-/// One thing that differs.
+/// One difference.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Difference {
     /// The kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
@@ -36,12 +36,12 @@ pub(crate) struct Difference {
     pub(crate) first: String,
     /// The value in the second mission; empty for none.
     pub(crate) second: String,
-    /// Whether both missions can tell. An element without evidence in one is not absent from it.
+    /// Whether it is observable in both missions. An element without evidence in one is not absent from it.
     pub(crate) is_known: bool,
 }
 
 impl Difference {
-    /// The difference of something that only one mission has.
+    /// A difference in something that only one mission has.
     fn only(kind: &'static str, name: impl Into<String>, side: Where, what: &str) -> Self {
         let (first, second) = match side {
             Where::Second => (String::new(), what.to_owned()),
@@ -57,7 +57,7 @@ impl Difference {
         }
     }
 
-    /// The difference of something that both missions have with different values.
+    /// A difference in something that both missions have with different values.
     fn changed(
         kind: &'static str,
         name: impl Into<String>,
@@ -75,14 +75,14 @@ impl Difference {
     }
 }
 
-/// All differences, elements before events, each kind by name. A rate must differ by more than the share `rate_change`,
-/// and by more than chance explains.
+/// All differences, elements before events, each kind sorted by name. A rate must differ by more than the fraction
+/// `rate_change`, and significantly.
 pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
     let (a, b) = (Facts::new(first), Facts::new(second));
     let mut all = elements::differences(&a, &b, rate_change);
     all.extend(happened::differences(&a, &b));
     if a.is_rewritten() || b.is_rewritten() {
-        // Whose messages are whose is lost there, and with it when nodes end and come back.
+        // Senders are unknown there, and so are ends and restarts of nodes.
         let lost = ["publishes", "end", "restarts", "event"];
         for one in all.iter_mut().filter(|d| lost.contains(&d.kind)) {
             one.is_known = false;

@@ -1,4 +1,4 @@
-//! The expectation of a mission: the values of `graph.yaml`, each with its place in the file.
+//! The expectation of a mission: the values of `graph.yaml`, each with its position in the file.
 
 mod fields;
 mod parse;
@@ -19,7 +19,7 @@ pub(crate) use parse::read;
 /// The first line of every expectation.
 pub(crate) const SCHEMA: &str = "bagreel.expect/1";
 
-/// A value and its place in the file.
+/// A value and its position in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct At<T> {
     pub(crate) at: YamlPlace,
@@ -29,9 +29,9 @@ pub(crate) struct At<T> {
 /// A whole `graph.yaml`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Expectation {
-    /// The file, as it was named.
+    /// The file as given.
     pub(crate) file: PathBuf,
-    /// The length of the windows in which rates are judged.
+    /// The length of the windows in which rates are checked.
     pub(crate) period: Option<Period>,
     pub(crate) policy: Policy,
     pub(crate) nodes: Vec<Named<NodeFacts>>,
@@ -44,14 +44,14 @@ pub(crate) struct Expectation {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Named<T> {
     pub(crate) name: Pattern,
-    /// The place of the name.
+    /// The position of the name.
     pub(crate) at: YamlPlace,
-    /// The place at which its facts begin.
+    /// The position at which its facts begin.
     pub(crate) body: YamlPlace,
     pub(crate) facts: T,
 }
 
-/// The policy for elements of the bag that the file does not name.
+/// The policy for elements of the bag that are not in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Policy {
     pub(crate) at: YamlPlace,
@@ -74,7 +74,7 @@ pub(crate) const REMARKS: [(&str, Kind, FindingKind); 3] = [
     ("messages_lost", Kind::Lost, FindingKind::MessagesLost),
 ];
 
-/// The severity of something that is not named.
+/// The severity of an element that is not in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unlisted {
     Allow,
@@ -85,18 +85,18 @@ pub(crate) enum Unlisted {
 /// The facts that can be expected of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeFacts {
-    /// Whether it must not be there.
+    /// Whether it must be absent.
     pub(crate) forbidden: bool,
-    /// Whether it need not be there.
+    /// Whether it may be absent.
     pub(crate) optional: bool,
-    /// The stretch in which it may end; `None` if it must stay.
+    /// The time range in which it may end; `None` if it must stay.
     pub(crate) may_end: Option<At<During>>,
-    /// Whether only its log names it, so that it may be there unnamed.
+    /// Whether only its log names it, so it may run unnamed.
     pub(crate) is_logged: bool,
     pub(crate) restarts: Option<At<Range>>,
-    /// The state that it is in at the end.
+    /// Its state at the end.
     pub(crate) lifecycle: Option<At<String>>,
-    /// The stretch in which it must appear.
+    /// The time range in which it must appear.
     pub(crate) within: Option<At<During>>,
 }
 
@@ -105,36 +105,36 @@ pub(crate) struct NodeFacts {
 pub(crate) struct TopicFacts {
     pub(crate) forbidden: bool,
     pub(crate) optional: bool,
-    /// The stretch in which its last message may come, up to which its rate is judged; `None` if it must stay.
+    /// The time range for its last message, until which its rate is checked; `None` if it must stay.
     pub(crate) may_end: Option<At<During>>,
     pub(crate) kind: Option<At<String>>,
     /// The nodes that publish it: these and no others.
     pub(crate) by: Option<At<Vec<At<Pattern>>>>,
-    /// The nodes that subscribe it: these at least.
+    /// The nodes that subscribe to it: these at least.
     pub(crate) to: Option<At<Vec<At<Pattern>>>>,
     /// Messages per second in every window.
     pub(crate) hz: Option<At<Range>>,
     /// Messages per second from its first to its last one.
     pub(crate) mean_hz: Option<At<Range>>,
-    /// The stretch in which its first message must come.
+    /// The time range for its first message.
     pub(crate) within: Option<At<During>>,
-    /// The share of windows in which the rate must hold, in per cent; all if `None`.
+    /// The percentage of windows in which the rate must be met; all if `None`.
     pub(crate) percent: Option<f64>,
     /// The longest silence in nanoseconds.
     pub(crate) max_gap: Option<At<i64>>,
     /// The ranges of [`MEASURES`] in every window.
     pub(crate) measures: [Option<At<Range>>; MEASURES.len()],
     pub(crate) latched: Option<At<bool>>,
-    /// Words that its quality of service must hold.
+    /// Text that its quality of service must contain.
     pub(crate) qos: Option<At<String>>,
-    /// The time in which rate and gaps are judged; the whole mission if `None`.
+    /// The time range in which rate and gaps are checked; the whole mission if `None`.
     pub(crate) during: Option<During>,
-    /// The condition on the windows in which they are judged; all if `None`.
+    /// The condition on the windows in which they are checked; all if `None`.
     pub(crate) whilst: Option<While>,
 }
 
 impl TopicFacts {
-    /// Whether something is asked of its messages, so that it must have some.
+    /// Whether any fact requires messages.
     pub(crate) fn wants_messages(&self) -> bool {
         self.hz.is_some()
             || self.mean_hz.is_some()
@@ -149,11 +149,11 @@ impl TopicFacts {
 pub(crate) enum While {
     /// A topic has this rate.
     Rate(Pattern, Range),
-    /// A node is there.
+    /// A node is present.
     Node(Pattern),
 }
 
-/// An expectation with a name of its own.
+/// A named expectation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Rule {
     pub(crate) id: String,
@@ -168,19 +168,19 @@ pub(crate) enum Demand {
     Nodes(Vec<At<Pattern>>, NodeFacts),
     /// Facts of a topic.
     Topic(At<Pattern>, Box<TopicFacts>),
-    /// That nodes begin one after the other.
+    /// The order in which nodes start.
     Order(Vec<At<Pattern>>),
-    /// That one thing follows another within so many nanoseconds.
+    /// An event that follows another within this many nanoseconds.
     Reaction {
         when: Event,
         expect: Event,
         within: i64,
     },
-    /// That the number of reconfigurations lies in a range.
+    /// The range of the number of reconfigurations.
     Changes { during: Option<During>, many: Range },
 }
 
-/// An event that the ledger may tell of.
+/// An event of the ledger.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Event {
     pub(crate) kind: EventKind,
@@ -205,13 +205,13 @@ worded! {
     }
 }
 
-/// A finding that is known and forgiven.
+/// An accepted known finding.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AllowedFinding {
     pub(crate) at: YamlPlace,
     pub(crate) finding: super::FindingKind,
     pub(crate) name: Pattern,
-    /// The time from which on it does not hold, by the beginning of the bag; `None` for always.
+    /// The expiry, compared with the start of the bag; `None` for never.
     pub(crate) until: Option<At<Stamp>>,
     pub(crate) why: String,
 }

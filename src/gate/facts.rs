@@ -1,4 +1,4 @@
-//! The facts of a mission by name: its nodes and topics, their times and rates, and whether the bag can tell at all.
+//! The facts of a mission by name: its nodes and topics, their times and rates, and whether they are observable.
 
 mod cause;
 mod tempo;
@@ -19,16 +19,16 @@ use crate::mission::ledger::{Entry, Kind};
 
 pub(crate) use tempo::{Rate, TopicSilence};
 
-/// A mission, with facts that are asked for often worked out once.
+/// A mission with precomputed facts.
 pub(crate) struct Facts<'a> {
     pub(crate) mission: &'a Mission,
     /// The strongest degree to which each element is known.
     degrees: PerElement<Degree>,
     /// The number of messages of each topic.
     messages: Vec<u64>,
-    /// Whether a tool rewrote the bag, so that it names false publishers.
+    /// Whether a tool rewrote the bag, so that it names wrong publishers.
     is_rewritten: bool,
-    /// Nodes that are there, by role.
+    /// Present nodes by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The role of each of them.
     names: BTreeMap<&'a str, &'a str>,
@@ -39,7 +39,7 @@ pub(crate) struct Facts<'a> {
 
 /// Words of evidence for what should be, not for what was. A file of the user's tells what was.
 const DECLARING: [&str; 2] = ["source", "launch"];
-/// Words of evidence that names every node of ROS 1 that sends something recorded.
+/// Kinds of evidence that name every ROS 1 node with recorded messages.
 const NAMING: [&str; 5] = [
     "connection",
     "statistics",
@@ -47,12 +47,12 @@ const NAMING: [&str; 5] = [
     "discovery",
     "topology",
 ];
-/// Evidence that names every node of ROS 2 that starts while the recorder is there: it has parameters from then on.
+/// Evidence that names every ROS 2 node started during the recording: it declares parameters then.
 const STARTING: [&str; 1] = ["parameter_events"];
 /// Evidence that lists all subscribers of a topic.
 const LISTING: [&str; 4] = ["rosgraph", "discovery", "statistics", "topic_statistics"];
 
-/// Whether something was seen, not only declared.
+/// Whether an element was observed, not only declared.
 fn is_seen(evidence: Evidence) -> bool {
     !evidence.is_guess() && evidence.words().any(|word| !DECLARING.contains(&word))
 }
@@ -99,14 +99,14 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// The roles that are there, each with its nodes.
+    /// The present roles, each with its nodes.
     pub(crate) fn roles(&self) -> impl Iterator<Item = (&'a str, &[NodeId])> {
         self.roles
             .iter()
             .map(|(role, nodes)| (*role, nodes.as_slice()))
     }
 
-    /// The roles that a pattern stands for; a name that has a role stands for it too.
+    /// The roles that a pattern matches; a node name matches its role too.
     pub(crate) fn nodes(&self, pattern: &Pattern) -> Vec<(&'a str, &[NodeId])> {
         if pattern.is_name() {
             let name = pattern.as_str();
@@ -131,12 +131,12 @@ impl<'a> Facts<'a> {
             .collect()
     }
 
-    /// Whether a pattern stands for a node.
+    /// Whether a pattern matches a node.
     pub(crate) fn fits(&self, pattern: &Pattern, node: NodeId) -> bool {
         pattern.matches(self.node(node)) || pattern.matches(self.role(node))
     }
 
-    /// The topics that are there and that a pattern stands for.
+    /// The present topics that a pattern matches.
     pub(crate) fn topics(&self, pattern: &Pattern) -> Vec<TopicId> {
         if pattern.is_name() {
             let own = self.topics.get(pattern.as_str()).copied();
@@ -149,7 +149,8 @@ impl<'a> Facts<'a> {
             .collect()
     }
 
-    /// Whether a topic was seen, not only declared: with messages, with a seen publisher, or without a seen subscriber.
+    /// Whether a topic was observed, not only declared: with messages, an observed publisher, or no observed
+    /// subscriber.
     pub(crate) fn is_there(&self, topic: TopicId) -> bool {
         let elements = &self.mission.elements;
         let any = |of: usize, edges: &[Edge]| {
@@ -201,8 +202,8 @@ impl<'a> Facts<'a> {
         nodes.iter().any(sure)
     }
 
-    /// The publishers of a topic: the node, the publication, and the degree to which it is known; one that only code
-    /// and launch files tell is declared.
+    /// The publishers of a topic: the node, the publication, and its degree; one known only from code and launch
+    /// files is declared.
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
         let own = self.edges[0][topic as usize].iter();
         own.map(|id| {
@@ -222,15 +223,14 @@ impl<'a> Facts<'a> {
         .collect()
     }
 
-    /// Whether a tool rewrote the bag: senders that it merged cannot be distinguished.
+    /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
     pub(crate) fn is_rewritten(&self) -> bool {
         self.is_rewritten
     }
 
-    /// Whether the bag names nodes, so that one that it does not name is not there, if it does not name so many that are
-    /// looked for. Where a tool merged senders it does not; where it dropped their names a log that most nodes never write
-    /// to is all that is left. Of ROS 2 it names those that start while it is recorded: more that are not there than it
-    /// names were there before the recorder.
+    /// Whether the bag names nodes reliably, so that an unnamed one is absent; `lost` expected nodes are unnamed.
+    /// Rewritten bags do not: publishers are merged, or only a log is left, to which most nodes never write. ROS 2 bags
+    /// name nodes that start during the recording: if more are missing than named, they ran before the recorder.
     pub(crate) fn names_nodes(&self, lost: usize) -> bool {
         let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
         let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
@@ -241,13 +241,13 @@ impl<'a> Facts<'a> {
         !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
     }
 
-    /// Whether nodes of ROS 1 were recorded, by what they log.
+    /// Whether ROS 1 nodes were recorded, judging by their logs.
     pub(crate) fn is_ros1(&self) -> bool {
         let mut types = self.mission.elements.topics.iter().flat_map(|t| &t.types);
         types.any(|word| &**word == "rosgraph_msgs/Log")
     }
 
-    /// Whether the bag tells all publishers of a topic.
+    /// Whether the bag names all publishers of a topic.
     pub(crate) fn tells_publishers(&self, topic: TopicId) -> bool {
         let unknown = self.mission.elements.topics[topic as usize].unknown_publishers;
         let known = self.publishers(topic);
@@ -256,8 +256,8 @@ impl<'a> Facts<'a> {
             && known.iter().any(|(.., degree)| *degree <= Degree::Stated)
     }
 
-    /// Whether the bag lists subscribers, so that a node that is not listed is not a subscriber: everywhere, or of
-    /// these nodes.
+    /// Whether the bag lists all subscribers, in general or for these nodes, so that an unlisted node is not a
+    /// subscriber.
     pub(crate) fn tells_subscribers(&self, nodes: &[NodeId]) -> bool {
         self.mission.elements.subscribes.iter().any(|edge| {
             let own = nodes.contains(&edge.node) && has(edge.evidence, &["links"]);
@@ -265,7 +265,7 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The times in which any of these nodes is there; in order, none overlapping.
+    /// The times in which any of these nodes is present; sorted, without overlaps.
     pub(crate) fn lives(&self, nodes: &[NodeId]) -> Vec<Span> {
         let mut all: Vec<Span> = Vec::new();
         for id in nodes {
@@ -279,13 +279,13 @@ impl<'a> Facts<'a> {
         Span::joined(all, 0)
     }
 
-    /// The windows in which a node is, for a mission without finer times.
+    /// The windows that contain a node, for a mission without finer times.
     fn windows_of(&self, node: NodeId) -> impl Iterator<Item = Span> + use<'a> {
         let rows = self.mission.graphs.rows(Element::Node(node));
         rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
-    /// The time in which a node published a topic, as far as the bag tells, and the number of its messages.
+    /// The time in which a node published a topic, if known, and the number of its messages.
     pub(crate) fn sent(&self, node: NodeId, edge: u32) -> Option<(Span, u64)> {
         let mission = self.mission;
         let runs = match mission.elements.runs(Element::Publish(edge)) {
@@ -304,7 +304,7 @@ impl<'a> Facts<'a> {
         all.filter(|e| e.kind == kind).collect()
     }
 
-    /// The lifecycle state that a role was last seen in.
+    /// The last known lifecycle state of a role.
     pub(crate) fn lifecycle(&self, nodes: &[NodeId]) -> Option<&'a str> {
         let graphs = &self.mission.graphs;
         let last = |node: &NodeId| {
@@ -316,7 +316,7 @@ impl<'a> Facts<'a> {
         last.map(|(.., state)| state)
     }
 
-    /// Whether a topic's last message stands for it; `None` where the bag does not tell.
+    /// Whether a topic is latched; `None` if unknown.
     pub(crate) fn is_latched(&self, topic: TopicId) -> Option<bool> {
         let own = &self.mission.elements.topics[topic as usize];
         let states = self.mission.graphs.rows(Element::Topic(topic));
@@ -324,13 +324,13 @@ impl<'a> Facts<'a> {
         match &own.qos {
             _ if states.contains(&State::Latched) => Some(true),
             Some(qos) => Some(qos.contains("transient_local")),
-            // Without a message in the time that is judged nobody knows.
+            // Without a message in the checked time it is unknown.
             None if states.contains(&State::Silent) && self.messages(topic) > 0 => Some(false),
             None => None,
         }
     }
 
-    /// The time at which a role first appeared, as well as it is known, with its bounds.
+    /// The best estimate of the time at which a role first appeared, with its bounds.
     pub(crate) fn began(&self, nodes: &[NodeId]) -> Option<Bound> {
         let first = self.lives(nodes).first()?.start;
         let started = self.entries(nodes, Kind::Started);
@@ -350,8 +350,7 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The time at which a role was last there, if that is before the mission is closed down, and the uncertainty of that
-    /// time in nanoseconds.
+    /// The time at which a role was last present, if before the mission's shutdown, and its uncertainty in nanoseconds.
     pub(crate) fn ended(&self, nodes: &[NodeId]) -> Option<(Stamp, i64)> {
         let end = self.lives(nodes).last()?.end;
         if self.mission.span.end.since(end) <= CLOSING_NS {
@@ -362,7 +361,7 @@ impl<'a> Facts<'a> {
         Some((end, doubt))
     }
 
-    /// Whether a role is known by its log alone: nothing else of it was recorded, and nothing lists the nodes.
+    /// Whether a role is only known from its log: nothing else of it was recorded, and no evidence lists all nodes.
     pub(crate) fn is_logged_only(&self, nodes: &[NodeId]) -> bool {
         let elements = &self.mission.elements;
         let is_listed = |id: &NodeId| {

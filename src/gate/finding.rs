@@ -9,16 +9,16 @@ use crate::base::words::visible;
 use crate::base::words::worded;
 use crate::base::yaml::YamlPlace;
 
-/// The kinds of findings: the word, the meaning, and the way it is decided.
+/// The kinds of findings: the name, the meaning, and how it is decided.
 macro_rules! kinds {
     ($($kind:ident $word:literal: $says:literal, $more:literal;)+) => {
-        /// A kind of finding: its place in [`KINDS`].
+        /// A kind of finding: its index in [`KINDS`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub(crate) enum FindingKind {
             $($kind,)+
         }
 
-        /// All kinds in their order: the word, the meaning, and the way it is decided.
+        /// All kinds in order: the name, the meaning, and how it is decided.
         pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] =
             &[$((FindingKind::$kind, $word, $says, $more),)+];
     };
@@ -157,58 +157,58 @@ worded! {
     pub(crate) enum Severity {
         Error = "error",
         Warning = "warning",
-        /// The bag does not tell.
+        /// Not observable in the bag.
         Unknown = "unknown",
-        /// Known and forgiven.
+        /// Known and accepted.
         Allowed = "allowed",
     }
 }
 
-/// The cause of findings, as the ledger tells it, by which they are grouped.
+/// The cause of findings in the ledger, by which they are grouped.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Cause {
-    /// The time at which it happened, if the ledger tells.
+    /// The time at which it happened, if known.
     pub(crate) time: Option<Stamp>,
-    /// The event in words: `/lidar stopped at 04:50`.
+    /// The event as text: `/lidar stopped at 04:50`.
     pub(crate) text: String,
 }
 
 impl Cause {
-    /// Whether it is about this name, so that the findings about the name say it themselves.
+    /// Whether it is about this name, so that findings about the name need not repeat it.
     pub(crate) fn is_about(&self, name: &str) -> bool {
         let rest = self.text.strip_prefix(name);
         rest.is_some_and(|rest| rest.starts_with(' '))
     }
 }
 
-/// One finding. All its texts are visible: control characters are spelled out.
+/// One finding. Control characters in its texts are escaped.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
     pub(crate) kind: FindingKind,
     pub(crate) severity: Severity,
-    /// The place of the expectation in the file.
+    /// The position of the expectation in the file.
     pub(crate) place: YamlPlace,
     /// The node or topic that it is about.
     pub(crate) name: String,
     /// The finding in one sentence.
     pub(crate) says: String,
-    /// The observed value, in few words.
+    /// The observed value, in short.
     pub(crate) seen: String,
     /// The expected value.
     pub(crate) expected: String,
-    /// The time it is about, if it is about one.
+    /// The time range that it is about, if any.
     pub(crate) when: Option<Span>,
-    /// Lines that tell more.
+    /// Lines with details.
     pub(crate) details: Vec<String>,
-    /// The cause, if it is known.
+    /// The cause, if known.
     pub(crate) cause: Option<Cause>,
     /// Hints for the user.
     pub(crate) help: Vec<String>,
-    /// The name in the file that `baseline --update` would write anew.
+    /// The name in the file that `baseline --update` would rewrite.
     pub(crate) accept: Option<String>,
-    /// The reason why it is forgiven.
+    /// The reason why it is accepted.
     pub(crate) why: Option<String>,
-    /// The number of findings before it in the file that look the same to [`Self::fingerprint`].
+    /// The number of earlier findings in the file with the same [`Self::fingerprint`] input.
     pub(crate) nth: usize,
 }
 
@@ -238,7 +238,7 @@ impl Finding {
         }
     }
 
-    /// A finding that the bag does not tell, with the reason in `says`.
+    /// A finding that is not observable, with the reason in `says`.
     pub(crate) fn unknown(
         kind: FindingKind,
         name: &str,
@@ -276,14 +276,14 @@ impl Finding {
         self
     }
 
-    /// The sentence and every line that tells more, with `between` them.
+    /// The sentence and all details, separated by `between`.
     pub(crate) fn told(&self, between: &str) -> String {
         let mut all = vec![self.says.as_str()];
         all.extend(self.details.iter().map(String::as_str));
         all.join(between)
     }
 
-    /// Twelve hex digits that stay the same from run to run, and when lines of the file move.
+    /// Twelve hex digits that are stable across runs and when lines of the file move.
     pub(crate) fn fingerprint(&self) -> String {
         let look = self.look();
         match self.nth {
@@ -292,7 +292,7 @@ impl Finding {
         }
     }
 
-    /// The part of it that stays the same from run to run: unexpected publishers do, numbers do not.
+    /// The part of it that is stable across runs: unexpected publishers are, numbers are not.
     fn look(&self) -> String {
         let who = match self.kind {
             FindingKind::PublisherUnexpected => self.seen.as_str(),
@@ -303,7 +303,7 @@ impl Finding {
     }
 }
 
-/// Numbers findings that look the same, in the order of the file, so that no two have one fingerprint.
+/// Numbers equal findings in file order, so that fingerprints are unique.
 pub(crate) fn number<'a>(findings: impl Iterator<Item = &'a mut Finding>) {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     for finding in findings {
@@ -318,7 +318,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_stands_at_its_place_with_a_word_of_its_own() {
+    fn every_kind_has_its_index_and_a_unique_name() {
         for (at, (kind, word, ..)) in KINDS.iter().enumerate() {
             assert_eq!(*kind as usize, at, "{word}");
             assert_eq!(FindingKind::from_word(word), Some(*kind));
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fingerprint_does_not_know_lines_or_numbers_seen() {
+    fn a_fingerprint_is_independent_of_lines_and_numbers() {
         let at = |line| YamlPlace { line, column: 1 };
         let one = Finding::new(FindingKind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
         let two = Finding::new(FindingKind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");

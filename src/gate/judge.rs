@@ -1,4 +1,4 @@
-//! Holds a mission against an expectation: every fact of the file is judged by itself.
+//! Checks a mission against an expectation: every fact of the file separately.
 
 mod allow;
 mod event;
@@ -19,16 +19,16 @@ use crate::base::nearest::nearest;
 use crate::base::words::visible;
 use crate::mission::Mission;
 
-/// One fact of the file, judged.
+/// One checked fact of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Checked {
     /// Its title: `/scan hz`, or a rule's `id`.
     pub(crate) title: String,
-    /// Its place in the file.
+    /// Its position in the file.
     pub(crate) place: YamlPlace,
-    /// The findings; none where it is kept.
+    /// The findings; none if it is met.
     pub(crate) findings: Vec<Finding>,
-    /// Whether there was nothing to judge, because its node or topic is not there.
+    /// Whether there was nothing to check, because its node or topic is absent.
     pub(crate) is_moot: bool,
 }
 
@@ -56,14 +56,14 @@ impl Checked {
     }
 }
 
-/// Everything that was judged, in the order of the file.
+/// All checked facts, in file order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Verdict {
     pub(crate) checks: Vec<Checked>,
 }
 
 impl Verdict {
-    /// All findings, the worst first, then in the order of the file.
+    /// All findings, the worst first, then in file order.
     pub(crate) fn findings(&self) -> Vec<&Finding> {
         let mut all: Vec<&Finding> = self.checks.iter().flat_map(|c| &c.findings).collect();
         all.sort_by_key(|f| f.severity);
@@ -82,7 +82,7 @@ impl Verdict {
         all.filter(|c| c.judgement() == judgement).count()
     }
 
-    /// Makes errors of findings that cannot be decided.
+    /// Turns undecidable findings into errors.
     pub(crate) fn decide(&mut self) {
         let all = self.checks.iter_mut().flat_map(|c| &mut c.findings);
         for finding in all.filter(|f| f.severity == Severity::Unknown) {
@@ -97,7 +97,7 @@ impl Verdict {
     }
 }
 
-/// Judges a mission. Times since its start are not judged where it `is_part` of a recording.
+/// Checks a mission. Times since its start are not checked if it `is_part` of a recording.
 pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool) -> Verdict {
     let facts = Facts::new(mission);
     let mut judge = Judge {
@@ -124,7 +124,7 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool)
     Verdict { checks }
 }
 
-/// How many nodes are expected and not named by the bag.
+/// The number of expected nodes that the bag does not name.
 fn lost(expectation: &Expectation, facts: &Facts<'_>) -> usize {
     let wanted = expectation.nodes.iter();
     let wanted = wanted.filter(|named| !named.facts.forbidden && !named.facts.optional);
@@ -132,30 +132,30 @@ fn lost(expectation: &Expectation, facts: &Facts<'_>) -> usize {
     lost.count()
 }
 
-/// The work under way.
+/// The check in progress.
 struct Judge<'a> {
     facts: &'a Facts<'a>,
-    /// Whether a node that the bag does not name is not there.
+    /// Whether a node that the bag does not name is absent.
     names_nodes: bool,
     expectation: &'a Expectation,
     is_part: bool,
     checks: Vec<Checked>,
-    /// The number of names that were looked for among those that are there.
+    /// The number of names for which a similar one was searched.
     told: Cell<usize>,
 }
 
-/// The largest number of missing names for which the nearest one is reported; with more the file is of another robot.
+/// The most missing names for which the nearest one is reported; with more, the file is for another robot.
 const NEAR: usize = 50;
 
 impl Judge<'_> {
-    /// The hint where a name is not there: the nearest one.
+    /// The hint for a missing name: the nearest one.
     fn near<'k>(&self, pattern: &Pattern, known: impl Iterator<Item = &'k str>) -> Option<String> {
         self.told.set(self.told.get() + 1);
         let near = (self.told.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
         Some(format!("the nearest name in the bag is `{}`", near??))
     }
 
-    /// Notes the findings of one fact.
+    /// Adds the findings of one fact.
     fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
         self.checks.push(Checked {
             title: title.into(),
@@ -165,7 +165,7 @@ impl Judge<'_> {
         });
     }
 
-    /// Notes a fact about something that is not there.
+    /// Adds a fact about an absent element.
     fn moot(&mut self, title: impl Into<String>, place: YamlPlace) {
         self.checks.push(Checked {
             title: title.into(),

@@ -1,4 +1,4 @@
-//! Numbers of a topic that a bag may know besides its rate: how they are written in a file, found in a window, and shown.
+//! Optional measures of a topic besides its rate: their syntax in a file, their value in a window, and their format.
 
 use super::finding::FindingKind;
 use super::range::Range;
@@ -6,7 +6,7 @@ use crate::base::time::{Span, parse_nanos};
 use crate::base::words;
 use crate::graph::Row;
 
-/// A number of a topic in each window.
+/// A measure of a topic in each window.
 pub(crate) struct Measure {
     /// The key of its range in a file.
     pub(crate) key: &'static str,
@@ -15,9 +15,9 @@ pub(crate) struct Measure {
     pub(crate) hint: &'static str,
     /// Reads an end of a range.
     pub(crate) parse: fn(&str) -> Option<f64>,
-    /// The number in a window, if the bag knows it.
+    /// The value in a window, if known.
     pub(crate) of: fn(&Row, Span) -> Option<f64>,
-    /// The number in words.
+    /// Formats the value.
     pub(crate) shown: fn(f64) -> String,
 }
 
@@ -61,7 +61,7 @@ impl Measure {
         Range::parse_ends(text, self.parse)
     }
 
-    /// A range in words.
+    /// Formats a range.
     pub(crate) fn range_shown(&self, range: Range) -> String {
         let end = |end: Option<f64>| end.map(self.shown).unwrap_or_default();
         format!("{}..{}", end(range.from), end(range.to))

@@ -1,9 +1,9 @@
-//! Patterns with wildcards: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
+//! Patterns with wildcards: `*` matches any characters except `/`, `**` any characters, `?` one that is not `/`.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// A name that may hold wildcards.
+/// A name that may contain wildcards.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Pattern {
     text: String,
@@ -44,17 +44,17 @@ impl Pattern {
         &self.text
     }
 
-    /// Whether it stands for one name only.
+    /// Whether it has no wildcards.
     pub(crate) fn is_name(&self) -> bool {
         self.parts.iter().all(|p| matches!(p, PatternPart::This(_)))
     }
 
-    /// Whether the name is one of those that it stands for. The work is the product of both lengths at most.
+    /// Whether it matches a name. The cost is at most the product of both lengths.
     pub(crate) fn matches(&self, name: &str) -> bool {
         if self.is_name() {
             return self.text == name;
         }
-        // Which beginnings of the pattern fit what was read of the name.
+        // Which prefixes of the pattern match the part of the name read so far.
         let mut fits = vec![false; self.parts.len() + 1];
         fits[0] = true;
         self.skip_blanks(&mut fits);
@@ -74,7 +74,7 @@ impl Pattern {
         fits.last().copied().unwrap_or(false)
     }
 
-    /// Lets wildcards stand for nothing.
+    /// Lets wildcards match nothing.
     fn skip_blanks(&self, fits: &mut [bool]) {
         for (at, part) in self.parts.iter().enumerate() {
             if fits[at] && matches!(part, PatternPart::Some | PatternPart::All) {
@@ -84,7 +84,7 @@ impl Pattern {
     }
 }
 
-/// A set of names and patterns that can be asked whether a name is one of them.
+/// A set of names and patterns.
 #[derive(Debug, Default)]
 pub(crate) struct NamePatterns<'a> {
     exact: BTreeSet<&'a str>,
@@ -106,7 +106,7 @@ impl<'a> FromIterator<&'a Pattern> for NamePatterns<'a> {
 }
 
 impl NamePatterns<'_> {
-    /// Whether one of them stands for this name.
+    /// Whether one of them matches this name.
     pub(crate) fn hold(&self, name: &str) -> bool {
         self.exact.contains(name) || self.patterns.iter().any(|p| p.matches(name))
     }
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_names_hold_what_one_of_them_stands_for() {
+    fn a_set_contains_what_one_of_its_patterns_matches() {
         let all = ["/a", "/cam_*", "/b"].map(Pattern::new);
         let names: NamePatterns<'_> = all.iter().collect();
         let held = ["/a", "/b", "/cam_1", "/c", "/cam_1/x"].map(|name| names.hold(name));
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn blanks_stand_for_parts_of_names() {
+    fn wildcards_match_parts_of_names() {
         let table = [
             ("/scan", "/scan", true),
             ("/scan", "/scan2", false),

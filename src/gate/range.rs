@@ -1,10 +1,10 @@
-//! Ranges as people write them: `13.5..16.5`, `5..`, `..1`; times on either side of `..` for stretches of a mission.
+//! Ranges as people write them: `13.5..16.5`, `5..`, `..1`; times on either side of `..` for parts of a mission.
 
 use std::fmt;
 
 use crate::base::time::{Moment, Span};
 
-/// A range of numbers from one to another, both included; an open end allows everything on its side.
+/// An inclusive range of numbers; an open end is unlimited.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Range {
     pub(crate) from: Option<f64>,
@@ -12,7 +12,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// Reads a range of numbers ≥ 0; `None` if it is not a range, or if nothing lies in it.
+    /// Parses a range of numbers ≥ 0; `None` if it is not a range or is empty.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let plain = |c: char| c.is_ascii_digit() || c == '.';
         Self::parse_ends(text, |end| {
@@ -20,7 +20,7 @@ impl Range {
         })
     }
 
-    /// As [`Self::parse`], with ends that `parse` reads.
+    /// As [`Self::parse`], with ends read by `parse`.
     pub(crate) fn parse_ends(text: &str, parse: impl Fn(&str) -> Option<f64>) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
         let end = |text: &str| match text.trim() {
@@ -36,17 +36,17 @@ impl Range {
         (is_some && is_ordered).then_some(range)
     }
 
-    /// Whether the number lies below it.
+    /// Whether the number is below it.
     pub(crate) fn is_above(&self, value: f64) -> bool {
         self.from.is_some_and(|from| value < from)
     }
 
-    /// Whether the number lies beyond it.
+    /// Whether the number is above it.
     pub(crate) fn is_below(&self, value: f64) -> bool {
         self.to.is_some_and(|to| value > to)
     }
 
-    /// Whether the number lies in it.
+    /// Whether the number is in it.
     pub(crate) fn holds(&self, value: f64) -> bool {
         !self.is_above(value) && !self.is_below(value)
     }
@@ -65,7 +65,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// A stretch of a mission: `1:30..2m`, `-30s..`.
+/// A time range of a mission: `1:30..2m`, `-30s..`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct During {
     from: Option<Moment>,
@@ -92,7 +92,7 @@ impl During {
         self.to.is_some_and(|to| to.on(mission) > mission.end)
     }
 
-    /// Reads a stretch; `None` if it is not one.
+    /// Parses a time range; `None` if it is not one.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
         let moment = |text: &str| match text.trim() {
@@ -106,7 +106,7 @@ impl During {
         (during.from.is_some() || during.to.is_some()).then_some(during)
     }
 
-    /// The stretch of a mission, within its time.
+    /// The time range in a mission, clipped to its time.
     pub(crate) fn on(&self, mission: Span) -> Span {
         let start = self.from.map_or(mission.start, |m| m.on(mission));
         let end = self.to.map_or(mission.end, |m| m.on(mission));
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn stretches_count_from_either_end() {
+    fn time_ranges_count_from_either_end() {
         let second = |s: i64| Stamp(s * 1_000_000_000);
         let mission = Span::new(second(100), second(200));
         let on = |text| {

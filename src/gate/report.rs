@@ -1,4 +1,4 @@
-//! Verdicts in formats for people, for programs, and for the services that run jobs.
+//! Verdicts in formats for people, for programs, and for CI services.
 
 mod github;
 mod gitlab;
@@ -17,33 +17,33 @@ use crate::base::columns::hang;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
 
-/// The subject of a report: the mission, with the names that the user typed.
+/// The subject of a report: the mission, with the names as given.
 #[derive(Clone, Debug)]
 pub(crate) struct Subject<'a> {
     pub(crate) mission: &'a Mission,
-    /// The bags, as they were typed.
+    /// The bags, as given.
     pub(crate) bags: Vec<String>,
-    /// The expectation, as it was typed.
+    /// The expectation, as given.
     pub(crate) file: String,
-    /// The expectation from the root of its repository, as services compare it with changed files.
+    /// The path of the expectation from the root of its repository, which services compare with changed files.
     pub(crate) tracked: String,
     /// Names and addresses of links in the report.
     pub(crate) links: Vec<(String, String)>,
 }
 
-/// A format that a verdict can be written in.
+/// A format of a verdict.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Format {
-    /// Its word, in `--format` and before a colon in `-o`.
+    /// Its name in `--format` and before a colon in `-o`.
     pub(crate) word: &'static str,
-    /// The endings of its file names.
+    /// Its file extensions.
     pub(crate) endings: &'static [&'static str],
     /// Its description, for the help.
     pub(crate) what: &'static str,
     pub(crate) write: fn(&Subject<'_>, &Verdict) -> String,
 }
 
-/// All formats. Endings are looked for in this order.
+/// All formats. Extensions are matched in this order.
 pub(crate) const FORMATS: &[Format] = &[
     Format {
         word: "text",
@@ -104,7 +104,7 @@ impl Format {
         FORMATS.iter().find(|f| f.word == word)
     }
 
-    /// The format that a file's name tells: the longest ending of all that fit.
+    /// The format of a file name: the one with the longest matching extension.
     pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
         let name = name.to_ascii_lowercase();
         let fitting = |f: &&Self| {
@@ -139,7 +139,7 @@ impl Subject<'_> {
 }
 
 impl Verdict {
-    /// The number of errors and warnings in words: `2 errors, 1 warning`; empty without any.
+    /// The number of errors and warnings as text: `2 errors, 1 warning`; empty without any.
     fn broken(&self) -> String {
         let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
         let counts = counts.map(|(severity, word)| (self.count(severity), word));
@@ -148,7 +148,7 @@ impl Verdict {
         words.join(", ")
     }
 
-    /// The number of findings in words: `2 errors, 1 warning, 1 unknown`.
+    /// The number of findings as text: `2 errors, 1 warning, 1 unknown`.
     fn summary(&self) -> String {
         let broken = self.broken();
         let mut parts: Vec<String> = Some(broken).into_iter().filter(|b| !b.is_empty()).collect();
@@ -168,7 +168,7 @@ impl Verdict {
     }
 }
 
-/// Text as one word of a shell; harmless names as they are.
+/// Text quoted for a shell, if necessary.
 fn quoted(text: &str) -> String {
     let text = visible(text);
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ':');
@@ -187,7 +187,7 @@ pub(crate) fn explain(word: &str) -> Option<String> {
     ))
 }
 
-/// The findings grouped by cause, in the order of the worst of each; those without a cause stand alone.
+/// The findings grouped by cause, ordered by the worst of each; those without a cause are separate.
 fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
     let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();
@@ -202,7 +202,7 @@ fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Findin
     groups
 }
 
-/// The kinds found, once each, in their order.
+/// The distinct kinds found, in order.
 fn kinds(findings: &[&Finding]) -> Vec<FindingKind> {
     let mut kinds: Vec<FindingKind> = findings.iter().map(|f| f.kind).collect();
     kinds.sort_unstable();

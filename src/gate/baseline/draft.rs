@@ -1,4 +1,4 @@
-//! The facts that runs have in common, by name: those that hold in each of them, widened by no more than noise needs.
+//! The facts that runs have in common, by name, widened only by as much as noise requires.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,33 +14,33 @@ use crate::graph::{NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::Kind;
 
-/// The share by which a rate may differ from run to run.
+/// The fraction by which a rate may differ between runs.
 const SHARE: f64 = 0.1;
-/// The share by which the mean rate of an uneven topic may differ from run to run.
+/// The fraction by which the mean rate of an uneven topic may differ between runs.
 const MEAN_SHARE: f64 = 0.15;
-/// The fewest messages that show a mean rate: chance moves a count by its square root, that of 40 by a sixth.
+/// The fewest messages for a mean rate: a count has a random error of its square root, a sixth for 40.
 const FEWEST_OF_MEAN: u64 = 40;
-/// A silence may be so many times as long as the longest of the runs.
+/// The allowed silence, as a multiple of the longest in the runs.
 const GAPS: i64 = 2;
-/// It may be so many usual intervals long besides: one or two messages are lost now and then.
+/// In addition, this many usual intervals: one or two messages are lost now and then.
 const INTERVALS: i64 = 4;
-/// The number of times the spread between windows by which a rate may differ besides.
+/// In addition, a rate may differ by this multiple of the spread between windows.
 const SPREADS: f64 = 3.0;
 
 const SECOND: i64 = 1_000_000_000;
 
-/// The facts that hold in all runs.
+/// The facts that are true in all runs.
 #[derive(Debug, Default)]
 pub(crate) struct Draft {
     pub(crate) nodes: BTreeMap<String, NodeLine>,
     pub(crate) topics: BTreeMap<String, TopicLine>,
 }
 
-/// The facts that hold of a node.
+/// The common facts of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLine {
     pub(crate) optional: bool,
-    /// The stretches in which it began, and may end, as they are written.
+    /// The time ranges in which it must start and may end, as text.
     pub(crate) within: Option<String>,
     pub(crate) may_end: Option<String>,
     pub(crate) is_logged: bool,
@@ -48,7 +48,7 @@ pub(crate) struct NodeLine {
     pub(crate) lifecycle: Option<String>,
 }
 
-/// The facts that hold of a topic.
+/// The common facts of a topic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TopicLine {
     pub(crate) optional: bool,
@@ -62,7 +62,7 @@ pub(crate) struct TopicLine {
     /// The longest silence in nanoseconds.
     pub(crate) max_gap: Option<i64>,
     pub(crate) is_latched: bool,
-    /// The rates that no rule would hold, for the reader.
+    /// The rates for which no rule is generated, for a comment.
     pub(crate) unjudged: Option<String>,
 }
 
@@ -87,7 +87,7 @@ impl NodeLine {
 }
 
 impl TopicLine {
-    /// The rest of the line, for the reader.
+    /// The comment at the end of the line.
     pub(crate) fn comment(&self) -> String {
         let rates = self.unjudged.as_ref();
         rates.map_or_else(String::new, |rates| format!("  # {rates}: not judged"))
@@ -170,7 +170,7 @@ fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
         .collect();
     let is_sure = ends.iter().all(|(_, is_sure)| *is_sure);
     let ends: Vec<i64> = ends.into_iter().map(|(end, _)| end).collect();
-    // A start that is known to within seconds; that of a node that was there before the recorder is not.
+    // A start known to within seconds, unlike that of a node that ran before the recorder.
     let began = seen.iter().map(|s| {
         let began = s.facts.began(s.nodes)?;
         let is_sure =
@@ -193,12 +193,12 @@ fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
     }
 }
 
-/// The time by which starts and ends differ from run to run.
+/// How starts and ends differ between runs.
 struct Times {
     /// The shortest of the runs.
     shortest: i64,
     runs: usize,
-    /// Whether each run is a part of a recording, whose times mean nothing.
+    /// Whether each run is a part of a recording, whose times are meaningless.
     is_part: bool,
 }
 
@@ -212,8 +212,8 @@ impl Times {
         }
     }
 
-    /// The headroom on both sides of these times: a tenth of the time, which no two runs take alike; at least 5 s, less in
-    /// a short mission; and as much as the runs differ. One run does not show how much that is.
+    /// The headroom on both sides of these times: a tenth of the time, as runs vary; at least 5 s, less in a short
+    /// mission; and the difference between runs, which a single run does not show.
     fn room(&self, times: &[i64]) -> Option<(i64, i64, i64)> {
         let (first, last) = (*times.iter().min()?, *times.iter().max()?);
         let usual = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
@@ -222,7 +222,7 @@ impl Times {
         Some((first, last, room))
     }
 
-    /// The stretch in which something begins that began at these times.
+    /// The time range for the start of an element that started at these times.
     fn within(&self, times: &[i64]) -> Option<String> {
         let (first, last, room) = self.room(times).filter(|_| !self.is_part)?;
         let to = length((last + room + SECOND - 1) / SECOND * SECOND);
@@ -234,7 +234,7 @@ impl Times {
         })
     }
 
-    /// The stretch in which something may end that was silent for no more than `tail` nanoseconds in the end.
+    /// The time range for the end of an element that was silent for at most `tail` nanoseconds at the end.
     fn stays(&self, tail: i64) -> Option<String> {
         let room = (self.shortest / 10).max(SECOND);
         let room = tail + if self.runs > 1 { room } else { 2 * room };
@@ -242,7 +242,7 @@ impl Times {
         is_some.then(|| format!("-{}..", length((room + SECOND - 1) / SECOND * SECOND)))
     }
 
-    /// The stretch in which something may end that ended at these times; `None` if it never did.
+    /// The time range for the end of an element that ended at these times; `None` if it never did.
     fn may_end(&self, times: &[i64], is_sure: bool) -> Option<String> {
         let (first, _, room) = self.room(times)?;
         let from = (first - room) / SECOND * SECOND;
@@ -305,13 +305,13 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
     let is_even = rates.iter().all(|own| Rate::are_even(own));
     let hz = band(&rates.concat(), is_even).filter(|_| is_rated);
     let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
-    // What comes once, when somebody asks for it, has no times of its own.
+    // Messages sent once on request have no times of their own.
     let is_regular = hz.is_some()
         || seen
             .iter()
             .all(|s| s.facts.messages(s.id) >= FEWEST_OF_MEAN);
     let is_timed = !is_latched && is_regular;
-    // What is even stays; of all else the last message shows whether it does.
+    // An even topic stays; for others, the last message shows whether they do.
     let tails = heard().map(|(s, heard)| s.facts.mission.span.end.since(heard.end));
     let stays = times
         .stays(tails.max().unwrap_or(0))
@@ -333,8 +333,8 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
     }
 }
 
-/// The range of a topic's rate from its first to its last message, where the one that holds in each window is too wide to
-/// show that a fifth of the messages is lost.
+/// The range of a topic's rate from its first to its last message, if the one for each window is too wide to detect the
+/// loss of a fifth of the messages.
 fn mean(seen: &[TopicInRun<'_>], hz: Option<Range>) -> Option<Range> {
     let rates = seen.iter().map(|s| s.facts.mean(s.id));
     let rates: Vec<Rate> = rates.collect::<Option<_>>()?;
@@ -349,7 +349,7 @@ fn mean(seen: &[TopicInRun<'_>], hz: Option<Range>) -> Option<Range> {
     if is_shown || fewest + 1 < FEWEST_OF_MEAN {
         return None;
     }
-    // One run does not show how much runs differ; chance is the least.
+    // One run does not show how much runs differ; random variation is the minimum.
     let chance = if rates.len() > 1 {
         0.0
     } else {
@@ -362,7 +362,7 @@ fn mean(seen: &[TopicInRun<'_>], hz: Option<Range>) -> Option<Range> {
     })
 }
 
-/// The rates that a topic had, from the least to the most; where they show nothing, the number of its messages.
+/// The lowest and highest rates of a topic; if they are meaningless, the number of its messages.
 fn unjudged(seen: &[TopicInRun<'_>], rates: &[Rate]) -> String {
     let values = || rates.iter().map(Rate::hz);
     let (least, most) = values().fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
@@ -375,7 +375,7 @@ fn unjudged(seen: &[TopicInRun<'_>], rates: &[Rate]) -> String {
     words::rate_range(least, most)
 }
 
-/// The longest silence of the runs with headroom, in nanoseconds, unless it is so long that it shows nothing.
+/// The longest silence of the runs with headroom, in nanoseconds, unless it is too long to be meaningful.
 fn longest(seen: &[TopicInRun<'_>], may_end: bool) -> Option<i64> {
     let silence = |s: &TopicInRun<'_>| {
         let all = s.facts.silences(s.id, may_end, s.facts.mission.span);
@@ -427,7 +427,7 @@ impl TopicInRun<'_> {
             .then(|| names.map(|node| self.facts.role(node).to_owned()).collect())
     }
 
-    /// The nodes that subscribe it, as far as that is measured or stated.
+    /// The nodes that subscribe to it, if measured or stated.
     fn to(&self) -> BTreeSet<String> {
         let known = self.facts.subscribers(self.id);
         let sure = known
@@ -440,9 +440,8 @@ impl TopicInRun<'_> {
     }
 }
 
-/// The range around the median rate that noise explains, and that holds every window seen; `None` for topics that come
-/// in bursts, where it would hold everything. The count of an uneven topic may differ by its square root, as chance
-/// does.
+/// The range around the median rate that covers noise and every window seen; `None` for bursty topics, where it would
+/// cover everything. The count of an uneven topic may differ by its square root.
 fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
     let count: u64 = rates.iter().map(|r| r.count).sum();
     let mut values: Vec<f64> = rates.iter().map(Rate::hz).collect();
@@ -478,7 +477,7 @@ fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
         near if (digits - near).abs() < 1e-9 * near => near,
         _ => round(digits),
     };
-    // Dividing by a power of ten keeps 0.3 what it is.
+    // Dividing by a power of ten keeps 0.3 exact.
     if power >= 0.0 {
         whole(value * scale) / scale
     } else {
@@ -506,13 +505,13 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_rate_has_a_tenth_of_room() {
+    fn a_steady_rate_has_ten_percent_headroom() {
         assert_eq!(written(&[100, 100, 100], true).as_deref(), Some("9..11"));
         assert_eq!(written(&[10, 10, 10], true).as_deref(), Some("0.9..1.1"));
     }
 
     #[test]
-    fn every_window_seen_lies_inside() {
+    fn every_window_seen_is_in_range() {
         assert_eq!(
             written(&[100, 100, 100, 100, 100, 100, 60], true).as_deref(),
             Some("5.8..14.2")

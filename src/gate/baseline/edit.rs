@@ -6,11 +6,11 @@ use crate::base::yaml::{BadYaml, YamlData, YamlPart, YamlPlace, parse_placed};
 #[derive(Clone, Debug)]
 pub(super) struct EditedText(pub(super) String);
 
-/// A pair of a mapping: the key, its place, and the value.
+/// A pair of a mapping: the key, its position, and the value.
 type Pair = (String, YamlPlace, YamlPart);
 
 impl EditedText {
-    /// Sets `key` of an entry to `value`, both as YAML; does nothing where there is no such entry.
+    /// Sets `key` of an entry to `value`, both as YAML; does nothing without such an entry.
     pub(super) fn set(
         &mut self,
         section: &str,
@@ -57,7 +57,7 @@ impl EditedText {
         Ok(())
     }
 
-    /// Adds an entry where its name belongs; `key` is the name as YAML.
+    /// Adds an entry in sorted position; `key` is the name as YAML.
     pub(super) fn insert(
         &mut self,
         section: &str,
@@ -89,7 +89,7 @@ impl EditedText {
         Ok(())
     }
 
-    /// Adds a section that is not there, or holds nothing.
+    /// Adds a section that is missing or empty.
     fn begin(&mut self, whole: &YamlPart, section: &str, key: &str, value: &str) {
         let line = format!("  {key}: {value}\n");
         if let Some((_, at, _)) = find_pair(whole, section) {
@@ -111,7 +111,7 @@ impl EditedText {
     fn replace(&mut self, pair: &Pair, value: &str) {
         let colon = self.after_key(pair.1);
         let end = self.end(pair);
-        // What stands on the line stays on it; a list below its key becomes one beside it.
+        // An inline value stays inline; a block list becomes inline.
         let start = if self.line_of(colon) == pair.2.at.line {
             self.offset(pair.2.at).max(colon)
         } else {
@@ -187,7 +187,7 @@ impl EditedText {
         start + line[..end].trim_end().len()
     }
 
-    /// The byte behind the one that closes the bracket or quote at `start`.
+    /// The byte after the closing bracket or quote of the one at `start`.
     fn close(&self, start: usize) -> usize {
         let mut depth = 0_usize;
         let mut chars = self.0[start..].char_indices().peekable();
@@ -226,7 +226,7 @@ impl EditedText {
         self.0[self.offset(part.at)..].starts_with(['{', '['])
     }
 
-    /// The byte behind the colon of a key.
+    /// The byte after the colon of a key.
     fn after_key(&self, at: YamlPlace) -> usize {
         let start = self.offset(at);
         let key = match self.0[start..].chars().next() {
@@ -241,7 +241,7 @@ impl EditedText {
         ends.next().map_or(self.0.len(), |end| key + end)
     }
 
-    /// The byte at which a place stands.
+    /// The byte offset of a position.
     fn offset(&self, at: YamlPlace) -> usize {
         let start = self.line_start(at.line);
         let line = &self.0[start..];
@@ -317,7 +317,7 @@ topics:
     }
 
     #[test]
-    fn a_value_changes_in_its_place_and_nothing_else() {
+    fn only_the_value_is_changed() {
         let text = edited(|t| t.set("topics", "/scan", "hz", "5..6"));
         assert_eq!(text, FILE.replace("9..11", "5..6"));
         let text = edited(|t| t.set("topics", "/scan", "by", "[/z]"));
@@ -332,7 +332,7 @@ topics:
     }
 
     #[test]
-    fn keys_are_added_where_there_are_some_or_none() {
+    fn keys_are_added_to_entries_with_or_without_keys() {
         let text = edited(|t| t.set("nodes", "/a", "may_end", "true"));
         assert_eq!(text, FILE.replace("/a: {} #", "/a: {may_end: true} #"));
         let text = edited(|t| t.set("nodes", "/c", "may_end", "true"));
@@ -345,7 +345,7 @@ topics:
     }
 
     #[test]
-    fn entries_come_and_go_with_their_lines() {
+    fn entries_are_added_and_removed_with_their_lines() {
         let text = edited(|t| t.drop_entry("nodes", "/a"));
         assert_eq!(text, FILE.replace("  /a: {} # first\n", ""));
         let text = edited(|t| t.drop_entry("topics", "/null"));

@@ -1,4 +1,4 @@
-//! Brings an expectation up to date: facts that no longer hold are written anew, every other character stays.
+//! Updates an expectation: rewrites facts that no longer hold and keeps every other character.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,24 +15,24 @@ use crate::gate::pattern::Pattern;
 use crate::gate::{Expectation, judge, read};
 use crate::mission::Mission;
 
-/// More facts than this are not written anew: each takes a look at the whole file, and nothing of it is left to keep.
+/// The most facts that are rewritten: each requires parsing the whole file, and with more little of it would be left.
 const MOST: usize = 1000;
 
-/// An expectation brought up to date.
+/// An updated expectation.
 #[derive(Debug)]
 pub(crate) struct Update {
     /// The whole file.
     pub(crate) text: String,
-    /// The number of facts that were written anew.
+    /// The number of rewritten facts.
     pub(crate) changed: usize,
     /// The number of findings that only the author of a rule can resolve.
     pub(crate) left: usize,
 }
 
-/// Writes anew the facts that these runs, or parts of runs, break: of all names, or of those that `only` holds.
+/// Rewrites the facts that these runs, or parts of runs, break: for all names, or for those in `only`.
 ///
 /// # Errors
-/// As [`read`], and where the file is written in a way that cannot be changed in place.
+/// As [`read`], and if the file cannot be edited in place.
 pub(crate) fn update(
     text: &str,
     path: &Path,
@@ -144,7 +144,7 @@ fn fact(kind: FindingKind) -> &'static str {
     }
 }
 
-/// An update being made.
+/// An update in progress.
 struct Work<'a> {
     text: EditedText,
     expectation: &'a Expectation,
@@ -153,7 +153,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Writes anew the fact that one finding is about; `name` is the entry's.
+    /// Rewrites the fact that a finding is about; `name` is the entry's.
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
         let key = fact(finding.kind);
         match finding.kind {
@@ -238,7 +238,7 @@ impl Work<'_> {
         }
     }
 
-    /// The value of a node's key that holds in all runs; for a pattern, the one that holds of all nodes it stands for.
+    /// The value of a node's key common to all runs; for a pattern, common to all matching nodes.
     fn of_node(&self, name: &str, key: &str) -> Option<String> {
         let pattern = Pattern::new(name);
         let lines = self
@@ -273,7 +273,7 @@ impl Work<'_> {
         }
     }
 
-    /// The stretch of whole seconds in which a node appeared in all runs.
+    /// The time range in whole seconds in which a node appeared in all runs.
     fn began(&self, pattern: &Pattern) -> Option<String> {
         let mut latest = 0;
         for run in self.runs {
@@ -286,13 +286,13 @@ impl Work<'_> {
         Some(format!("..{}", length(whole(latest))))
     }
 
-    /// The value of a topic's key that holds in all runs.
+    /// The value of a topic's key common to all runs.
     fn of_topic(&self, name: &str, key: &str) -> Option<String> {
         let pattern = Pattern::new(name);
         if key == "max_gap" {
             return self.longest(&pattern);
         }
-        // What differs between the topics of a pattern is not said of all of them.
+        // A value that differs between the topics of a pattern is not used.
         let lines = self
             .draft
             .topics

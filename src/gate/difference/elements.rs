@@ -1,4 +1,4 @@
-//! The nodes, topics and edges that are in one mission only, and the differences of those in both.
+//! The nodes, topics and edges in only one mission, and the differences between those in both.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,9 +12,9 @@ use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::ledger::Kind;
 
-/// An end is certain if the silence after it is so many times as long as its time is uncertain.
+/// An end is certain if the silence after it is this many times its uncertainty.
 const DOUBTS: i64 = 8;
-/// The number of standard deviations beyond which rates differ by more than chance.
+/// The number of standard deviations beyond which rates differ significantly.
 const SIGMAS: f64 = 3.0;
 
 /// All differences of elements.
@@ -72,7 +72,7 @@ fn presence<'a>(
     })
 }
 
-/// The roles that are measured or stated to be there, without tools.
+/// The measured or stated roles, without tools.
 fn nodes<'a, 'f>(facts: &'f Facts<'a>) -> BTreeMap<&'a str, &'f [NodeId]> {
     let sure = |nodes: &[NodeId]| facts.is_sure(nodes) && !facts.is_tool(nodes);
     facts.roles().filter(|(_, nodes)| sure(nodes)).collect()
@@ -103,7 +103,7 @@ fn node(
         ));
     }
     let (one, other) = (a.lifecycle(first), b.lifecycle(second));
-    // A node on its way from one state to another is in both, as close as messages come in order.
+    // A node in transition is in both states, to within the accuracy of the order of messages.
     let is_step = |state: &&str| state.ends_with("ing");
     if let (Some(one), Some(other)) = (&one, &other)
         && one != other
@@ -113,7 +113,7 @@ fn node(
         all.push(Difference::changed("lifecycle", name, *one, *other));
     }
     let (one, other) = (a.ended(first), b.ended(second));
-    // What is silent at times may be silent at the end: its end is one where the silence is far longer than its doubt.
+    // An intermittent topic may be silent at the end: it only ended if the silence far exceeds the uncertainty.
     let is_over = |facts: &Facts<'_>, (end, doubt): (Stamp, i64)| {
         let rest = facts.mission.span.end.since(end);
         doubt <= CLOSING_NS || doubt.saturating_mul(DOUBTS) <= rest
@@ -175,7 +175,7 @@ fn topic(
         sure(b.subscribers(second), b),
     );
     let tells = |side: Where, role: &str, kind: &str| {
-        // Whether the mission that lacks the edge would tell of it.
+        // Whether the edge would be observable in the mission that lacks it.
         let (facts, id) = if side == Where::First {
             (b, second)
         } else {
@@ -238,7 +238,7 @@ fn rates(
         return;
     };
     let (from, to) = (one.0 / one.1, other.0 / other.1);
-    // What comes at even times is known to a message; chance moves a count by its square root, bursts by more.
+    // The count of an even topic is exact to a message; a random one varies by its square root, bursts by more.
     let doubt = |(count, seconds, is_even, spread): (f64, f64, bool, f64)| {
         let chance = if is_even { 1.0 } else { libm::sqrt(count) };
         (chance / seconds).max(spread)

@@ -1,4 +1,4 @@
-//! The differences in events: those in one mission only, or at another time.
+//! The differences in events: those in only one mission, or at another time.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,17 +9,17 @@ use crate::gate::facts::Facts;
 use crate::graph::Element;
 use crate::mission::ledger::{Entry, Kind};
 
-/// The difference in nanoseconds up to which times of two runs count as the same: nodes of one launch file come up in any
+/// The difference in nanoseconds up to which times of two runs count as equal: nodes of one launch file start in any
 /// order, a second apart.
 const APART_NS: i64 = 2_000_000_000;
-/// The part of the time since the start by which two runs are not equally fast: a fiftieth.
+/// The part of the time since the start by which two runs may drift: a fiftieth.
 const PACE: i64 = 50;
 
 /// The key of an entry: its kind, the name it is about, and its number among the entries of both, counted from 1.
 type Key = (Kind, String, usize);
 
-/// An entry, told without the mission.
-struct ToldEntry {
+/// An entry with names instead of ids.
+struct NamedEntry {
     key: Key,
     time: Stamp,
     /// The uncertainty of its time, in nanoseconds.
@@ -28,10 +28,10 @@ struct ToldEntry {
 
 /// All differences in events.
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
-    let (first, second) = (told(a), told(b));
+    let (first, second) = (named_entries(a), named_entries(b));
     let mut all = only(&first, &second, a, Where::First);
     all.extend(only(&second, &first, b, Where::Second));
-    let places: BTreeMap<&Key, &ToldEntry> = second.iter().map(|t| (&t.key, t)).collect();
+    let places: BTreeMap<&Key, &NamedEntry> = second.iter().map(|t| (&t.key, t)).collect();
     let mut shift = 0;
     for one in &first {
         if let Some(other) = places.get(&one.key) {
@@ -42,7 +42,7 @@ pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
 }
 
 /// The headlines that two runs can have in common.
-fn told(facts: &Facts<'_>) -> Vec<ToldEntry> {
+fn named_entries(facts: &Facts<'_>) -> Vec<NamedEntry> {
     let mission = facts.mission;
     let mut many: BTreeMap<(Kind, String), usize> = BTreeMap::new();
     let mut all = Vec::new();
@@ -52,7 +52,7 @@ fn told(facts: &Facts<'_>) -> Vec<ToldEntry> {
         };
         let count = many.entry((entry.kind, name.clone())).or_default();
         *count += 1;
-        all.push(ToldEntry {
+        all.push(NamedEntry {
             key: (entry.kind, name, *count),
             time: entry.time,
             doubt: entry.latest.since(entry.earliest),
@@ -64,7 +64,7 @@ fn told(facts: &Facts<'_>) -> Vec<ToldEntry> {
 /// The node or topic that an entry is about; rates, and connections, are compared elsewhere.
 fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
     match (entry.kind, entry.what) {
-        // How often something restarts is compared; nobody plans when.
+        // The number of restarts is compared, not their times.
         (Kind::Rate | Kind::Type | Kind::Qos | Kind::Restarted, _) => None,
         (_, Element::Node(id)) => Some(facts.role(id).to_owned()),
         (_, Element::Topic(id)) => Some(facts.topic(id).to_owned()),
@@ -72,17 +72,21 @@ fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
     }
 }
 
-/// The events that one mission tells and the other does not, about elements of both. Starts and stops are reported of the
-/// elements.
-fn only(own: &[ToldEntry], other: &[ToldEntry], facts: &Facts<'_>, side: Where) -> Vec<Difference> {
+/// The events in only one mission about elements of both. Starts and stops are reported for the elements.
+fn only(
+    own: &[NamedEntry],
+    other: &[NamedEntry],
+    facts: &Facts<'_>,
+    side: Where,
+) -> Vec<Difference> {
     let known: BTreeSet<&Key> = other.iter().map(|t| &t.key).collect();
     let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
     let alone = own
         .iter()
         .filter(|t| wanted.contains(&t.key.0) && !known.contains(&t.key))
-        // What falls silent last does so because the robot is switched off, if the other recording lasts that long.
+        // Silence at the very end is due to the robot's shutdown, if the other recording lasts that long.
         .filter(|t| facts.mission.span.end.since(t.time) > CLOSING_NS);
-    let told = alone.map(|t| {
+    let differences = alone.map(|t| {
         Difference::only(
             "event",
             name(&t.key),
@@ -90,7 +94,7 @@ fn only(own: &[ToldEntry], other: &[ToldEntry], facts: &Facts<'_>, side: Where) 
             &format!("at {}", facts.clock(t.time)),
         )
     });
-    told.collect()
+    differences.collect()
 }
 
 fn name((kind, name, count): &Key) -> String {
@@ -101,11 +105,11 @@ fn name((kind, name, count): &Key) -> String {
     }
 }
 
-/// The difference of an entry that stands at another time of the other mission, if it does. Where `shift`, by which the
-/// entry before stood later, is also this one's, all that follows is later, and that was reported of the first.
+/// The difference for an entry at another time in the other mission, if any. If it has the same `shift` as the previous
+/// entry, everything is delayed, which was reported for the first one.
 fn moved(
-    (a, one): (&Facts<'_>, &ToldEntry),
-    (b, other): (&Facts<'_>, &ToldEntry),
+    (a, one): (&Facts<'_>, &NamedEntry),
+    (b, other): (&Facts<'_>, &NamedEntry),
     shift: &mut i64,
 ) -> Option<Difference> {
     let (first, second) = (a.mission.offset(one.time), b.mission.offset(other.time));

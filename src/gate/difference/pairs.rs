@@ -1,4 +1,4 @@
-//! The life lines of two missions over one another: of everything that differs, each from its mission's first message on.
+//! The lifelines of two missions, one above the other, for everything that differs, aligned at the first messages.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,14 +11,14 @@ use crate::graph::Element;
 use crate::mission::Mission;
 use crate::view::NameFilter;
 
-/// More nodes and topics than this are not compared at a glance.
+/// The most nodes and topics that are drawn.
 const MOST: usize = 200;
 
 /// The tracks of one name in both missions, and the node or topic that is drawn for it.
 type Pair = ([Option<Track>; 2], Element);
 
-/// A title for each node and topic that differs, and below it a row for each mission; times count from 0. `drawn` is the
-/// mission of both.
+/// A title for each node and topic that differs, and below it a row for each mission; times count from 0. `drawn` is
+/// the mission of both.
 pub(crate) fn pairs(
     missions: [&Mission; 2],
     subject: &DiffSubject,

@@ -8,14 +8,14 @@ use super::{Difference, Where};
 use crate::base::words::{self, visible};
 use crate::export::report::escape::{code, plain};
 
-/// The two missions as the user called them.
+/// The two missions as given.
 #[derive(Clone, Debug)]
 pub(crate) struct DiffSubject {
     pub(crate) first: String,
     pub(crate) second: String,
 }
 
-/// A format that differences can be written in.
+/// A format of differences.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DiffFormat {
     pub(crate) word: &'static str,
@@ -42,7 +42,7 @@ pub(crate) const DIFF_FORMATS: &[DiffFormat] = &[
     },
 ];
 
-/// The most bytes of a table, half of what we allow for a summary.
+/// The most bytes of a table, half of the limit of a summary.
 const MOST: usize = 128 << 10;
 
 fn sign(difference: &Difference) -> char {
@@ -54,7 +54,7 @@ fn sign(difference: &Difference) -> char {
     }
 }
 
-/// A difference in words: `only in a.bag`, or `15 Hz → 7.4 Hz`.
+/// A difference as text: `only in a.bag`, or `15 Hz → 7.4 Hz`.
 fn how(subject: &DiffSubject, difference: &Difference) -> String {
     let told = |text: &str| {
         if text == "present" {
@@ -90,7 +90,7 @@ fn summary(subject: &DiffSubject, all: &[Difference]) -> String {
     format!("{} and {}: {many}{unknown}", subject.first, subject.second)
 }
 
-/// The differences that both missions can tell, then the others.
+/// The differences observable in both missions, then the others.
 fn known_first(all: &[Difference]) -> impl Iterator<Item = &Difference> {
     let (known, unknown): (Vec<_>, Vec<_>) = all.iter().partition(|d| d.is_known);
     known.into_iter().chain(unknown)
@@ -107,7 +107,7 @@ fn text(subject: &DiffSubject, all: &[Difference]) -> String {
         let _ = writeln!(out, "{sign} {kind:<10} {name:<width$}  {}", visible(&how));
     }
     let out = out + &visible(&summary(subject, all)) + "\n";
-    // GitHub's runners take this for a command wherever it stands in a line.
+    // GitHub's runners interpret this as a command anywhere in a line.
     out.replace("##[", "#\\#[")
 }
 
@@ -176,7 +176,7 @@ fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
     out
 }
 
-/// Writes a table of differences, as far as there is room.
+/// Writes a table of differences, up to the size limit.
 fn table(subject: &DiffSubject, rows: &[&Difference], out: &mut String) {
     if rows.is_empty() {
         return;

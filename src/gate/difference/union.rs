@@ -24,7 +24,7 @@ pub(crate) enum Side {
     Each,
 }
 
-/// The length of a window of the picture in nanoseconds; its time means nothing.
+/// The length of a window of the picture in nanoseconds, without meaning.
 const SECOND: i64 = 1_000_000_000;
 
 /// The elements of one mission, by role and topic.
@@ -209,7 +209,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
     }
 }
 
-/// The keys of both maps with their evidence together.
+/// The keys of both maps with their combined evidence.
 fn both<'a, K: Ord>(
     a: &'a BTreeMap<K, (Degree, Evidence)>,
     b: &'a BTreeMap<K, (Degree, Evidence)>,
@@ -264,7 +264,7 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     }
 }
 
-/// The ledger being made.
+/// The ledger under construction.
 struct UnionLedger<'a> {
     a: &'a MissionSide,
     b: &'a MissionSide,
@@ -275,10 +275,10 @@ struct UnionLedger<'a> {
     entries: Vec<Entry>,
 }
 
-/// Whether something came (true) or went (false), by kind and name.
+/// Whether an element appeared (true) or vanished (false), by kind and name.
 type Turned<'a> = BTreeMap<(&'static str, &'a str), bool>;
 
-/// The elements in one mission only, as far as the other would tell of them.
+/// The elements in only one mission that would be observable in the other.
 fn turned(differing: &[Difference]) -> Turned<'_> {
     let known = differing
         .iter()
@@ -314,12 +314,12 @@ impl UnionLedger<'_> {
         self.entries
     }
 
-    /// Whether a difference says that something came (true) or went.
+    /// Whether an element appeared (true) or vanished, according to a difference.
     fn turned(&self, kind: &'static str, name: &str) -> Option<bool> {
         self.turned.get(&(kind, name)).copied()
     }
 
-    /// Adds the entries of edges, which come and go with their nodes, or by themselves.
+    /// Adds the entries of edges, which appear and vanish with their nodes or alone.
     fn edges(&mut self, wholes: &BTreeMap<u32, EntryId>) {
         let elements = self.elements;
         for (what, edge) in elements.edges() {
@@ -341,7 +341,7 @@ impl UnionLedger<'_> {
         }
     }
 
-    /// Adds the entry of something that both have with different values.
+    /// Adds the entry of an element with different values.
     fn change(&mut self, difference: &Difference) {
         if difference.side != Where::Both {
             return;
@@ -404,7 +404,7 @@ impl UnionLedger<'_> {
     }
 }
 
-/// The kind of entry for an edge or topic that came, or went.
+/// The kind of entry for an edge or topic that appeared or vanished.
 fn appeared(came: bool) -> Kind {
     if came { Kind::Appeared } else { Kind::Vanished }
 }

@@ -1,4 +1,4 @@
-//! The keys of a mapping: each known, each of the right kind, or an error with the place and the nearest known key.
+//! The keys of a mapping: unknown keys and wrong types are errors with the position and the nearest known key.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ use crate::base::nearest::nearest;
 use crate::base::time::parse_nanos;
 use crate::base::yaml::{YamlData, YamlPart};
 
-/// The document being read.
+/// The document.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
 }
 
 impl<'a> Document<'a> {
-    /// The error at a place, with a hint.
+    /// The error at a position, with a hint.
     pub(super) fn bad(
         self,
         at: YamlPlace,
@@ -33,7 +33,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The error for a word that is not one of those known.
+    /// The error for an unknown word.
     pub(super) fn unknown<'w>(
         self,
         at: YamlPlace,
@@ -89,7 +89,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The mapping `part` with the keys that it may hold, blanks between them.
+    /// The mapping `part` with its allowed keys, separated by spaces.
     pub(super) fn fields(
         self,
         part: &'a YamlPart,
@@ -118,12 +118,12 @@ pub(super) struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// The value of a key, if it is there.
+    /// The value of a key, if present.
     pub(super) fn get(&self, key: &str) -> Option<&'a YamlPart> {
         self.pairs.iter().find(|(k, ..)| k == key).map(|(.., v)| v)
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(super) fn need(&self, key: &str, hint: &str) -> Result<&'a YamlPart> {
         let missing = || {
             self.document
@@ -140,7 +140,7 @@ impl<'a> Fields<'a> {
         other.map(|(key, at, _)| (key.as_str(), *at))
     }
 
-    /// The value of a key, read by `parse`; `hint` tells how to write it.
+    /// The value of a key, read by `parse`; `hint` explains the syntax.
     pub(super) fn read<T>(
         &self,
         key: &str,
@@ -171,7 +171,7 @@ impl<'a> Fields<'a> {
         self.read(key, "write `true` or `false`", |text| text.parse().ok())
     }
 
-    /// A flag that is `false` where it is not there.
+    /// A flag, `false` by default.
     pub(super) fn is_set(&self, key: &str) -> Result<bool> {
         Ok(self.flag(key)?.is_some_and(|flag| flag.value))
     }
@@ -188,7 +188,7 @@ impl<'a> Fields<'a> {
         self.read(key, "write a duration: `20s`, `500ms`, `1m`", parse_nanos)
     }
 
-    /// The stretch in which something may end: all of the mission if it is `true`.
+    /// The time range in which an element may end: the whole mission if `true`.
     pub(super) fn may_end(&self) -> Result<Option<At<During>>> {
         let parse = |text: &str| match text {
             "true" => Some(Some(During::WHOLE)),
@@ -200,7 +200,7 @@ impl<'a> Fields<'a> {
         Ok(found.and_then(|At { at, value }| Some(At { at, value: value? })))
     }
 
-    /// The stretch in which something must begin: `within`, or a length from the start, `present_within`.
+    /// The time range in which an element must start: `within`, or a length from the start, `present_within`.
     pub(super) fn within(&self) -> Result<Option<At<During>>> {
         if let Some(length) = self.length("present_within")? {
             if self.get("within").is_some() {

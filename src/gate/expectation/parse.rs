@@ -21,7 +21,7 @@ const NODE: &str = "forbidden optional may_end known_by restarts lifecycle prese
 const TOPIC: &str = "forbidden optional may_end type by to hz mean_hz percent max_gap within age bytes drops latched qos";
 const EVENT: &str = "added removed restarted silent handed_over rate lifecycle from to";
 const ALLOW: &str = "finding name until why";
-/// The keys that give the form of a rule, each with those that go with it.
+/// The keys that determine the form of a rule, each with the other allowed keys.
 const FORMS: [(&str, &str); 6] = [
     ("node", NODE),
     ("nodes", NODE),
@@ -39,7 +39,7 @@ const RULE: &str = "id node nodes topic appear_in_order when changes expect with
 /// Reads an expectation.
 ///
 /// # Errors
-/// [`crate::Error::BadExpectation`] for a text that is not YAML, unfolds without end, or holds an unknown key or word.
+/// [`crate::Error::BadExpectation`] for a text that is not YAML, expands too far, or contains an unknown key or word.
 pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
     let document = Document { path };
     let whole = parse_placed(text).map_err(|bad| {
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_can_be_expected_is_read() {
+    fn all_expectations_are_parsed() {
         let all = parsed(
             "from: nav.mcap # for the reader\nperiod: 10s\n\
              policy: {unexpected_nodes: warn, unexpected_publishers: allow}\n\
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_has_a_line_a_column_and_the_nearest_name() {
+    fn mistakes_have_line_column_and_nearest_name() {
         let table = [
             (
                 "topics:\n  /s: {hx: 5..}",

@@ -1,4 +1,4 @@
-//! The causes of findings, as far as the ledger tells.
+//! The causes of findings in the ledger.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,7 @@ impl Facts<'_> {
             .or_else(|| self.cause(&feeders, around))
     }
 
-    /// The first thing that the ledger tells of one of these nodes in a stretch of time.
+    /// The first event of one of these nodes in a time range.
     pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
         let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
         let entries = self.mission.ledger.inside(around).map(|(_, entry)| entry);

@@ -9,7 +9,7 @@ use crate::mission::Window;
 /// The rate of a topic in a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
-    /// The window's place.
+    /// The window's index.
     pub(crate) window: usize,
     /// The part of it that counts.
     pub(crate) span: Span,
@@ -28,17 +28,17 @@ impl Rate {
         self.count as f64 / self.seconds()
     }
 
-    /// Messages per second with a message more, which may have come a moment too late for this window.
+    /// Messages per second with one more message, which may have just missed this window.
     pub(crate) fn at_most(&self) -> f64 {
         (self.count + 1) as f64 / self.seconds()
     }
 
-    /// Messages per second with a message less.
+    /// Messages per second with one message less.
     pub(crate) fn at_least(&self) -> f64 {
         self.count.saturating_sub(1) as f64 / self.seconds()
     }
 
-    /// Whether messages come at even times, by the median in each of these windows.
+    /// Whether messages are evenly spaced, by the median in each of these windows.
     pub(crate) fn are_even(rates: &[Self]) -> bool {
         let share = |rate: &Self| Some(rate.median_s? * rate.hz());
         let mut shares = rates.iter().filter_map(share).peekable();
@@ -56,7 +56,7 @@ impl<'a> Facts<'a> {
         Some(Span::new(first, last.plus(1)))
     }
 
-    /// The windows in which a topic is, each with its row of the graph.
+    /// The windows that contain a topic, each with its row of the graph.
     pub(crate) fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
         let windows = &self.mission.windows;
         let rows = self.mission.graphs.rows(Element::Topic(topic));
@@ -74,8 +74,8 @@ impl<'a> Facts<'a> {
         all
     }
 
-    /// The rates by which a topic is judged: of every window, whole or more than half of one, from its first message to the mission's end, or to
-    /// its last message if it `may_end`.
+    /// The rates by which a topic is checked: of every window, or more than half of one, from its first message to the
+    /// mission's end, or to its last message if it `may_end`.
     pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
         let Some(heard) = self.heard(topic) else {
             return Vec::new();
@@ -85,7 +85,7 @@ impl<'a> Facts<'a> {
         for window in &self.mission.windows {
             let row = rows.next_if(|(own, _)| own.index == window.index);
             let inside = during.start <= window.span.start && window.span.end <= during.end;
-            // The rest of a window that the mission's end cuts shows a rate where it is long enough.
+            // A window cut by the mission's end has a rate if it is long enough.
             let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
             if window.partial && is_short || !inside {
                 continue;
@@ -102,7 +102,7 @@ impl<'a> Facts<'a> {
                 first = begun(window.span, heard.start).map(rate);
             }
         }
-        // A topic that lives for little more than a window seldom fills one: better a part than nothing.
+        // A topic that exists for little more than a window rarely fills one, so a part is used.
         if all.is_empty() {
             first.into_iter().collect()
         } else {
@@ -110,7 +110,8 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than two.
+    /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than
+    /// two.
     pub(crate) fn mean(&self, topic: TopicId) -> Option<Rate> {
         let heard = self.heard(topic)?;
         let count = self.messages(topic).checked_sub(1)?;
@@ -122,12 +123,12 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The part of a window in which a topic that was heard from one time to another counts; `None` if it is too short.
+    /// The part of a window in which a topic with messages in `heard` counts; `None` if it is too short.
     fn counted(&self, window: Span, heard: Span, may_end: bool) -> Option<Span> {
         let whole = self.mission.span;
         let mut span = window;
         if heard.start > span.start {
-            // What is there when the recorder starts is heard a moment later; all else is not whole.
+            // A topic that exists when the recorder starts is received a moment later; others have a partial window.
             let found = span.start == whole.start && heard.start.since(whole.start) <= DISCOVERY_NS;
             span.start = found.then_some(heard.start)?;
         }
@@ -142,9 +143,8 @@ impl<'a> Facts<'a> {
         (span.nanos() >= window.nanos() / 2).then_some(span)
     }
 
-    /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond where the times of
-    /// messages are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's
-    /// end.
+    /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond if message times
+    /// are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's end.
     pub(crate) fn silences(
         &self,
         topic: TopicId,
@@ -165,7 +165,7 @@ impl<'a> Facts<'a> {
         let whole = self.mission.span;
         if let (Some(heard), false) = (self.heard(topic), may_end) {
             let span = Span::new(heard.end.plus(-1), whole.end);
-            // Where it does not end with the robot.
+            // Unless it ends with the robot's shutdown.
             if span.nanos() > CLOSING_NS {
                 all.extend(clipped(span, during));
             }
@@ -173,7 +173,7 @@ impl<'a> Facts<'a> {
         all
     }
 
-    /// The longest times between two messages, where single messages are known.
+    /// The longest times between two messages, if single messages are known.
     fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
         let pauses = self.mission.sending.pauses.get(topic as usize);
         pauses.into_iter().flatten().copied()
@@ -195,7 +195,7 @@ pub(crate) struct TopicSilence {
     pub(crate) nanos: i64,
 }
 
-/// The part of a silence that lies in a stretch of time.
+/// The part of a silence within a time range.
 fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
     let span = Span::new(gap.start.max(during.start), gap.end.min(during.end));
     let nanos = span.end.since(span.start);
@@ -206,7 +206,7 @@ fn count(row: &Row) -> u64 {
     row.count.unwrap_or(0)
 }
 
-/// Seconds in nanoseconds, held within an `i64`.
+/// Seconds in nanoseconds, saturating.
 fn nanos(seconds: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let nanos = libm::round(seconds * 1e9) as i64;

@@ -1,4 +1,4 @@
-//! Findings that are known and forgiven, until a date of the bag's own time.
+//! Accepted known findings, which expire on a date compared with the bag's time.
 
 use super::{Checked, Judge};
 use crate::base::time::Stamp;
@@ -7,7 +7,7 @@ use crate::gate::expectation::AllowedFinding;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 
 impl Judge<'_> {
-    /// Forgives findings that are allowed, and adds findings for allowances that forgave nothing.
+    /// Accepts allowed findings, and adds findings for unused allowances.
     pub(super) fn allow(&mut self) {
         let start = self.facts.mission.span.start;
         let mut unused = Vec::new();
@@ -29,7 +29,7 @@ impl Judge<'_> {
     }
 }
 
-/// Forgives the findings that an allowance means; returns whether there were any.
+/// Accepts the findings that an allowance matches; returns whether there were any.
 fn forgive(checks: &mut [Checked], allowance: &AllowedFinding, start: Stamp) -> bool {
     let mut is_used = false;
     let all = checks.iter_mut().flat_map(|c| &mut c.findings);

@@ -1,4 +1,4 @@
-//! The entries of the ledger that an event of a rule means.
+//! The entries of the ledger that match an event of a rule.
 
 use super::Judge;
 use crate::gate::expectation::{Event, EventKind};
@@ -7,7 +7,7 @@ use crate::graph::{Element, NodeId};
 use crate::mission::ledger::{Detail, Entry, Kind};
 
 impl Judge<'_> {
-    /// The entries that an event means, in order.
+    /// The entries that match an event, in order.
     pub(super) fn entries(&self, event: &Event) -> Vec<&Entry> {
         let all = self.facts.mission.ledger.entries.iter();
         all.filter(|entry| self.is_event(event, entry)).collect()

@@ -1,4 +1,4 @@
-//! The judgement of numbers of topics that a bag may know: age, bytes and losses of messages, in each window.
+//! Checks of optional measures of topics: age, bytes and losses of messages, in each window.
 
 use super::Judge;
 use crate::base::time::Span;
@@ -10,7 +10,7 @@ use crate::gate::range::Range;
 use crate::graph::TopicId;
 
 impl Judge<'_> {
-    /// The finding on whether a number of a topic lies in its range, in as many windows as it must.
+    /// The finding on whether a measure of a topic is in its range in the required share of windows.
     pub(super) fn measured(
         &self,
         topic: TopicId,

@@ -1,4 +1,4 @@
-//! The judgement of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
+//! Checks of nodes: presence, start and end times, restarts, final lifecycle state.
 
 use super::topic::NAMED;
 use super::{Judge, absence};
@@ -12,16 +12,16 @@ use crate::gate::range::During;
 use crate::graph::NodeId;
 use crate::mission::ledger;
 
-/// The roles that a name stands for.
+/// The roles that a name matches.
 type Roles<'a> = [(&'a str, &'a [NodeId])];
 
-/// The place of a stretch in which something may end, unless that is all of the mission, which asks for nothing.
+/// The position of a `may_end` time range, unless it is the whole mission, which is no restriction.
 pub(super) fn limited(may_end: &At<During>) -> Option<YamlPlace> {
     (may_end.value != During::WHOLE).then_some(may_end.at)
 }
 
 impl Judge<'_> {
-    /// Judges a node of the file.
+    /// Checks a node of the file.
     pub(super) fn node(&mut self, named: &Named<NodeFacts>) {
         let facts = &named.facts;
         let name = named.name.as_str();
@@ -43,7 +43,7 @@ impl Judge<'_> {
         }
     }
 
-    /// Judges the facts of a node other than its presence. `title` begins the titles of the facts.
+    /// Checks the facts of a node other than its presence. `title` begins the titles of the facts.
     pub(super) fn node_facts(&mut self, title: &str, pattern: &Pattern, facts: &NodeFacts) {
         let roles = self.facts.nodes(pattern);
         let wanted = [
@@ -94,7 +94,7 @@ impl Judge<'_> {
         found.collect()
     }
 
-    /// The findings on whether a node is there, and stays.
+    /// The findings on whether a node is present and stays.
     pub(super) fn presence(
         &self,
         pattern: &Pattern,
@@ -127,7 +127,7 @@ impl Judge<'_> {
             .collect()
     }
 
-    /// The finding that the bag does not tell whether a node is there.
+    /// The finding that a node's presence is not observable.
     fn unnamed(&self, kind: FindingKind, name: &str, at: YamlPlace) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (
@@ -158,7 +158,7 @@ impl Judge<'_> {
         Finding::unknown(kind, name, at, says).hint(hint)
     }
 
-    /// The finding that a node is named, and none of the topics that only it publishes has a message.
+    /// The finding that a node is named, but none of the topics that only it publishes has messages.
     fn mute(&self, pattern: &Pattern, at: YamlPlace) -> Option<Finding> {
         let own = self.expectation.topics.iter().filter(|topic| {
             let by = topic.facts.by.iter().flat_map(|by| &by.value);
@@ -239,7 +239,7 @@ impl Judge<'_> {
         let expected = format!("within {}", self.facts.stretch(allowed));
         let late = roles.iter().filter_map(|(role, nodes)| {
             let began = self.facts.began(nodes)?;
-            // What is there when the recording starts began who knows when.
+            // A node present at the start of the recording has an unknown start time.
             let is_late = began.time > allowed.end;
             let is_early = began.time < allowed.start && began.earliest > whole.start;
             if !is_late && !is_early {

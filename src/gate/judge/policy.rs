@@ -1,4 +1,4 @@
-//! The judgement of elements that the file does not name: allowed, or findings where its policy forbids them.
+//! Checks of elements that are not in the file: allowed, or findings if the policy forbids them.
 
 use super::Judge;
 use crate::base::time::Span;
@@ -10,7 +10,7 @@ use crate::mission::events::sentence;
 use crate::mission::ledger::Kind;
 
 impl Judge<'_> {
-    /// Judges the elements that are not named.
+    /// Checks the elements that are not in the file.
     pub(super) fn policy(&mut self) {
         let policy = self.expectation.policy;
         if policy.nodes.severity().is_some() {
@@ -77,7 +77,7 @@ impl Judge<'_> {
         found
     }
 
-    /// Every name of a node that stands anywhere in the file.
+    /// Every node name in the file.
     fn named_nodes(&self) -> NamePatterns<'_> {
         let mut all: Vec<&Pattern> = self.expectation.nodes.iter().map(|n| &n.name).collect();
         for topic in &self.expectation.topics {

@@ -1,4 +1,4 @@
-//! The judgement of rates and gaps of topics: in every whole window, or in those that a rule means.
+//! Checks of rates and gaps of topics: in every whole window, or in those that a rule selects.
 
 use super::Judge;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
@@ -11,7 +11,7 @@ use crate::gate::range::Range;
 use crate::graph::TopicId;
 
 impl Judge<'_> {
-    /// The findings on whether a topic's rate lies in its range, in as many windows as it must.
+    /// The findings on whether a topic's rate is in its range in the required share of windows.
     pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(range) = facts.hz.as_ref().map(|hz| hz.value) else {
             return Vec::new();
@@ -43,12 +43,12 @@ impl Judge<'_> {
             .collect()
     }
 
-    /// The findings on whether a topic's rate from its first to its last message lies in its range.
+    /// The findings on whether a topic's rate from its first to its last message is in its range.
     pub(super) fn mean(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(range) = facts.mean_hz.as_ref().map(|hz| hz.value) else {
             return Vec::new();
         };
-        // What is reported of windows is reported.
+        // Already reported for windows.
         if !self.rate(topic, facts, at).is_empty() {
             return Vec::new();
         }
@@ -82,7 +82,7 @@ impl Judge<'_> {
         vec![finding]
     }
 
-    /// The findings on whether a topic's first message came in its time.
+    /// The findings on whether a topic's first message was in time.
     pub(super) fn first(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let whole = self.facts.mission.span;
         let heard = self.facts.heard(topic);
@@ -90,7 +90,7 @@ impl Judge<'_> {
             return Vec::new();
         };
         let allowed = within.value.on(whole);
-        // What is there when the recorder starts began who knows when.
+        // A topic present when the recorder starts has an unknown start time.
         let is_early = heard.start < allowed.start && heard.start.since(whole.start) > DISCOVERY_NS;
         if heard.start <= allowed.end && !is_early {
             return Vec::new();
@@ -130,7 +130,7 @@ impl Judge<'_> {
         vec![finding]
     }
 
-    /// The findings where no window is judged: none for a condition that never held, else that it cannot be reported.
+    /// The findings if no window is checked: none for a condition that was never met, else that it is undecidable.
     fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         if facts.whilst.is_some() {
             return Vec::new();
@@ -141,7 +141,7 @@ impl Judge<'_> {
         vec![finding.hint("take a shorter period: `period: 5s`, or `--period 5`")]
     }
 
-    /// The windows in which a topic is judged.
+    /// The windows in which a topic is checked.
     pub(super) fn judged(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Rate> {
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));

@@ -1,4 +1,4 @@
-//! Rules with names of their own: about several nodes, about order, about reactions, about quiet.
+//! Named rules: about several nodes, order, reactions, and times without changes.
 
 use super::{Judge, absence};
 use crate::base::time::Span;
@@ -13,14 +13,14 @@ use crate::graph::history::Bound;
 use crate::mission::events::sentence;
 use crate::mission::ledger::Entry;
 
-/// The time in nanoseconds by which a reaction may be reported before its cause: the last sign of a node that is gone comes
-/// a period before its end.
+/// The time in nanoseconds by which a reaction may precede its cause: the last sign of a node that ended is a period
+/// before its end.
 const BEFORE_NS: i64 = 1_000_000_000;
 /// The number of entries that are written out.
-const TOLD: usize = 6;
+const MOST_LISTED: usize = 6;
 
 impl Judge<'_> {
-    /// Judges a rule.
+    /// Checks a rule.
     pub(super) fn rule(&mut self, rule: &Rule) {
         let before = self.checks.len();
         match &rule.demand {
@@ -61,7 +61,7 @@ impl Judge<'_> {
                 self.note(title, name.at, found);
                 continue;
             }
-            // To come in time is to come.
+            // A deadline implies presence.
             if let Some(within) = &facts.within
                 && self.facts.nodes(&name.value).is_empty()
             {
@@ -85,7 +85,7 @@ impl Judge<'_> {
         }
     }
 
-    /// The finding that the mission ended before a node had to be there.
+    /// The finding that the mission ended before a node had to be present.
     fn too_short(&self, name: &At<Pattern>) -> Finding {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
@@ -170,7 +170,7 @@ impl Judge<'_> {
             if answers.iter().any(|e| from <= e.time && e.time <= to) {
                 continue;
             }
-            // A hand-over is over when the new sender sends, whatever is known of its beginning.
+            // A hand-over is complete when the new sender publishes, even if its start is uncertain.
             let may = |e: &&&Entry| {
                 expect.kind != EventKind::HandedOver && e.earliest <= to && from <= e.latest
             };
@@ -195,7 +195,11 @@ impl Judge<'_> {
         doubt: Option<&str>,
     ) -> Finding {
         let name = expect.name.as_str();
-        let expected = format!("{} within {}", told(expect), words::duration(within));
+        let expected = format!(
+            "{} within {}",
+            expected_text(expect),
+            words::duration(within)
+        );
         let what = format!("{} {}", when.name, past(when));
         let clock = self.facts.clock(cause.time);
         if let Some(doubt) = doubt {
@@ -241,12 +245,12 @@ impl Judge<'_> {
         let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
             .saw(entries.len(), words::count_range(many.from, many.to))
             .at(span);
-        for (id, entry) in entries.iter().take(TOLD) {
+        for (id, entry) in entries.iter().take(MOST_LISTED) {
             let text = sentence(self.facts.mission, *id, entry);
             finding = finding.detail(format!("{}  {text}", self.facts.clock(entry.time)));
         }
-        if entries.len() > TOLD {
-            finding = finding.detail(format!("and {} more", entries.len() - TOLD));
+        if entries.len() > MOST_LISTED {
+            finding = finding.detail(format!("and {} more", entries.len() - MOST_LISTED));
         }
         vec![finding]
     }
@@ -257,7 +261,7 @@ fn order_of(names: &[At<Pattern>]) -> String {
     names.join(", ")
 }
 
-/// The words for an event that happened, to follow a name: `was removed`.
+/// The predicate for an event that happened: `was removed`.
 fn past(event: &Event) -> String {
     match event.kind {
         EventKind::Added => "appeared".to_owned(),
@@ -270,8 +274,8 @@ fn past(event: &Event) -> String {
     }
 }
 
-/// The words for an event that should happen: `/cmd_vel handed over to /teleop`.
-fn told(event: &Event) -> String {
+/// The text for an expected event: `/cmd_vel handed over to /teleop`.
+fn expected_text(event: &Event) -> String {
     let name = &event.name;
     match (event.kind, &event.to) {
         (EventKind::HandedOver, Some(to)) => format!("{name} handed over to {to}"),

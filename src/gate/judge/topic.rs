@@ -1,4 +1,4 @@
-//! The judgement of topics: to be there, with their type, publishers, subscribers and quality of service.
+//! Checks of topics: presence, type, publishers, subscribers and quality of service.
 
 use super::node::limited;
 use super::{Judge, absence};
@@ -14,7 +14,7 @@ use crate::graph::TopicId;
 pub(super) const NAMED: usize = 6;
 
 impl Judge<'_> {
-    /// Judges a topic of the file.
+    /// Checks a topic of the file.
     pub(super) fn topic(&mut self, named: &Named<TopicFacts>) {
         let facts = &named.facts;
         let name = named.name.as_str();
@@ -36,7 +36,7 @@ impl Judge<'_> {
         }
     }
 
-    /// Judges the facts of a topic other than its presence.
+    /// Checks the facts of a topic other than its presence.
     pub(super) fn topic_facts(&mut self, title: &str, pattern: &Pattern, facts: &TopicFacts) {
         let topics = self.facts.topics(pattern);
         let wanted = [
@@ -137,7 +137,7 @@ impl Judge<'_> {
         };
         let mut finding =
             Finding::new(FindingKind::TopicMissing, name, at, says).saw(seen, expected);
-        // Where its publisher is missing too, that is why.
+        // A missing publisher is the cause.
         let by = facts.by.iter().flat_map(|by| &by.value);
         let mut lost = by.filter(|by| self.facts.nodes(&by.value).is_empty());
         finding.cause = lost.next().map(|by| absence(by.value.as_str()));
@@ -148,12 +148,12 @@ impl Judge<'_> {
         }]
     }
 
-    /// Whether a topic must have messages: something is asked of them, and the time in which they came is judged.
+    /// Whether a topic must have messages: facts require them, and their time is checked.
     pub(super) fn is_owed(&self, facts: &TopicFacts) -> bool {
         facts.wants_messages() && !facts.optional && !self.is_part
     }
 
-    /// The nodes that the file says publish a topic, as a remark.
+    /// The publishers of a topic according to the file, as a remark.
     pub(super) fn senders(facts: &TopicFacts) -> Option<String> {
         let by: Vec<&str> = facts
             .by
@@ -294,7 +294,7 @@ impl Judge<'_> {
             .flat_map(|(_, nodes)| *nodes)
             .copied()
             .collect();
-        // A node that is not there reads nothing.
+        // An absent node has no subscriptions.
         let is_absent = roles.is_empty() && self.names_nodes;
         if !is_absent && !self.facts.tells_subscribers(&nodes) {
             let says = format!(

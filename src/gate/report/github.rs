@@ -7,7 +7,7 @@ use super::{Subject, text};
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::Verdict;
 
-/// The number of annotations of one kind that a step shows; GitHub drops more without a word.
+/// The number of annotations of one kind per step; GitHub silently drops more.
 const MOST: usize = 10;
 
 /// The report; ends in a new line.
@@ -17,7 +17,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     for (severity, command) in [(Severity::Error, "error"), (Severity::Warning, "warning")] {
         let own = findings.iter().filter(|f| f.severity == severity);
         let own: Vec<&&Finding> = own.collect();
-        // The last one that is shown says how many are not.
+        // The last one shown states how many are not.
         let told = if own.len() > MOST {
             MOST - 1
         } else {
@@ -36,7 +36,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     for line in text.lines() {
         let _ = writeln!(out, "{}", inert(line));
     }
-    // Runners take this for a command wherever it stands in a line.
+    // Runners interpret this as a command anywhere in a line.
     out.replace("##[", "#\\#[")
 }
 
@@ -59,7 +59,7 @@ fn annotation(
     );
 }
 
-/// Text behind a command, escaped.
+/// Text after a command, escaped.
 fn data(text: &str) -> String {
     text.replace('%', "%25")
         .replace('\r', "%0D")
@@ -71,7 +71,7 @@ fn property(text: &str) -> String {
     data(text).replace(':', "%3A").replace(',', "%2C")
 }
 
-/// A line of the log that no runner takes for a command, which begin with `::` behind blanks.
+/// A line of the log, escaped so that it is not a command (`::` after spaces).
 fn inert(line: &str) -> String {
     if line.trim_start().starts_with("::") {
         format!("\\{line}")

@@ -1,4 +1,4 @@
-//! GitLab's code quality: a list of findings, each with a fingerprint that does not move with lines.
+//! GitLab's code quality: a list of findings, each with a fingerprint that is independent of lines.
 
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ struct Lines {
     begin: usize,
 }
 
-/// The report; ends in a new line. Forgiven findings are left out.
+/// The report; ends in a new line. Accepted findings are left out.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings().into_iter();
     let told = findings.filter(|f| f.severity != Severity::Allowed);

@@ -1,4 +1,4 @@
-//! XML as `JUnit` has it: a test case for every fact of the file, kept ones too; undecidable ones are skipped.
+//! `JUnit` XML: a test case for every fact of the file, including met ones; undecidable ones are skipped.
 
 use super::Subject;
 use crate::draw::paint::xml::Xml;

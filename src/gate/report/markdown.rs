@@ -1,5 +1,5 @@
-//! A summary in Markdown for a pull request or a job: its first line tells the outcome, its table the findings with
-//! their times.
+//! A summary in Markdown for a pull request or a job: its first line is the outcome, its table lists the findings
+//! with their times.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -12,10 +12,10 @@ use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
 
-/// The most bytes of each part; together with a chart they stay below 256 KiB, a quarter of what a job's summary may hold.
+/// The most bytes of each part; with a chart they stay below 256 KiB, a quarter of the limit of a job's summary.
 const MOST_ROWS: usize = 96 << 10;
 const MOST_LISTED: usize = 24 << 10;
-/// The number of findings that are open; the rest is folded.
+/// The number of findings that are expanded; the rest is collapsed.
 const SHOWN: usize = 12;
 /// The largest number of causes that are reported.
 const CAUSES: usize = 3;
@@ -30,7 +30,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     };
     let broken = told(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
-    // The worst first, and of those what most follows from.
+    // The worst first, then those with most consequences.
     let mut groups = grouped(&broken);
     groups.sort_by_key(|(_, group)| (group.first().map(|f| f.severity), Reverse(group.len())));
     causes(&groups, &mut out);
@@ -160,7 +160,7 @@ fn row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
             value(text)
         }
     };
-    // A pull request is read in seconds: the kind's own words, not its whole sentence.
+    // Pull requests are skimmed: the kind instead of the whole sentence.
     let word = finding.kind.word();
     let short = word.strip_prefix("node-").or(word.strip_prefix("topic-"));
     let what = short.unwrap_or(word).replace('-', " ");
@@ -172,7 +172,7 @@ fn row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
     )
 }
 
-/// A value: names as code, words as they are.
+/// A value: names as code, other words unchanged.
 fn value(text: &str) -> String {
     if text.starts_with('/') {
         code(text)
@@ -210,7 +210,7 @@ fn list(findings: &[&Finding], title: &str, out: &mut String) {
             .why
             .as_ref()
             .map_or_else(String::new, |why| format!(": {}", plain(why)));
-        // What helps with one helps with all of its kind.
+        // Hints apply to all findings of a kind.
         let mut help = String::new();
         for fresh in finding.help.iter().filter(|help| hinted.insert(*help)) {
             let _ = write!(help, ": {}", plain(fresh));
@@ -237,8 +237,7 @@ fn command(text: &str) -> String {
     format!("{fence}sh\n{text}\n{fence}")
 }
 
-/// A word inside a comment, by which an action finds the text that it wrote before, without characters that end the
-/// comment.
+/// A marker comment by which an action finds its earlier text, without characters that end the comment.
 fn mark(name: &str) -> String {
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
     let mark: String = name

@@ -1,4 +1,4 @@
-//! The graph around findings, as a Mermaid flow chart: elements that are gone, new or changed, and their neighbours.
+//! The graph around findings, as a Mermaid flow chart: missing, new or changed elements, and their neighbours.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -28,7 +28,7 @@ enum BoxFate {
     Changed,
 }
 
-/// The chart; `None` where no finding has a place in the graph. Ends in a new line.
+/// The chart; `None` if no finding is about the graph. Ends with a newline.
 pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
     let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, String)> = BTreeMap::new();
     for finding in findings {
@@ -75,7 +75,7 @@ fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxFate)> {
     Some(((!is_node, &finding.name), class))
 }
 
-/// The text behind the name in its box: the expected and the observed value.
+/// The text after the name in its box: the expected and the observed value.
 fn label(finding: &Finding) -> String {
     match finding.kind {
         FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
@@ -148,7 +148,7 @@ fn written(
 ) -> String {
     let mut place: BTreeMap<&MermaidBox<'_>, usize> = BTreeMap::new();
     let mut out = String::from("flowchart LR\n");
-    // What is marked before what it touches.
+    // Marked boxes before their neighbours.
     let (mut order, rest): (Vec<&MermaidBox<'_>>, Vec<&MermaidBox<'_>>) =
         items.iter().partition(|i| marked.contains_key(i));
     order.extend(rest);
@@ -179,7 +179,7 @@ fn written(
             let _ = writeln!(out, "  i{from} {line} i{to}");
         }
     }
-    // Colours that hold on a light and on a dark page.
+    // Colours that work on light and dark pages.
     out.push_str("  classDef gone stroke:#d1242f,stroke-width:3px,stroke-dasharray:6 4\n");
     out.push_str("  classDef new stroke:#1a7f37,stroke-width:3px\n");
     out.push_str("  classDef changed stroke:#bf8700,stroke-width:3px\n");

@@ -1,4 +1,4 @@
-//! SARIF 2.1.0: every result at a line of the expectation, without which GitHub rejects the whole file.
+//! SARIF 2.1.0: every result has a line of the expectation, otherwise GitHub rejects the whole file.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use crate::gate::judge::Verdict;
 /// The number of results of a run that GitHub shows; it rejects a file with more than five times as many.
 const MOST: usize = 5000;
 
-/// The report; ends in a new line. Undecidable findings are notes; forgiven ones are suppressed.
+/// The report; ends in a new line. Undecidable findings are notes; accepted ones are suppressed.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
     let found = kinds(&findings);

@@ -1,4 +1,4 @@
-//! Findings for people, as compilers tell them: the finding, its place in the file, the observed value, and hints.
+//! Findings for people, in the style of compilers: the finding, its position, the observed value, and hints.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -23,7 +23,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         }
     }
     out.push_str(&last_line(subject, verdict));
-    // GitHub's runners take this for a command wherever it stands in a line.
+    // GitHub's runners interpret this as a command anywhere in a line.
     out.replace("##[", "#\\#[")
 }
 
@@ -61,7 +61,7 @@ fn finding(
     if let Some(why) = &finding.why {
         let _ = writeln!(out, "   =  allowed: {why}");
     }
-    // What helps with one helps with all of its kind.
+    // Hints apply to all findings of a kind.
     for hint in finding.help.iter().filter(|h| hinted.insert((*h).clone())) {
         let _ = writeln!(out, "   =  {hint}");
     }
