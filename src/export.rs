@@ -182,7 +182,7 @@ pub const FORMATS: &[OutputFormat] = &[
     },
 ];
 
-/// A single image of the first window, beside an animation.
+/// A single image of the first window, in addition to an animation.
 const POSTER: &OutputFormat = &OutputFormat {
     word: "png",
     what: "the first window as an image",
@@ -190,7 +190,7 @@ const POSTER: &OutputFormat = &OutputFormat {
     ..PICTURE
 };
 
-/// Begins SVG: drawings where these are asked for, else one animation.
+/// Begins SVG: single drawings if requested, otherwise an animation.
 fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
     let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
     if is_sequence && !target.is_numbered() {
@@ -218,7 +218,7 @@ impl Output {
         }
     }
 
-    /// Reads an output as the user writes it: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
+    /// Parses an output: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
     /// name's extension.
     ///
     /// # Errors
@@ -227,7 +227,7 @@ impl Output {
         Self::named(text.as_ref(), word)
     }
 
-    /// As [`Output::parse`], for any name that a file may have.
+    /// As [`Output::parse`], for any file name.
     ///
     /// # Errors
     /// As [`Output::parse`].
@@ -257,7 +257,7 @@ impl Output {
 /// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
-/// As [`check::check`], and [`Error::Output`] where a format lacks something.
+/// As [`check::check`], and [`Error::Output`] if a format's requirements are not met.
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
     check::check(&targets, kept)?;
@@ -266,7 +266,7 @@ pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
 }
 
-/// The files that an output makes: of most formats the one of its name.
+/// The files of an output: for most formats the one of its name.
 fn files(output: &Output) -> Vec<Target> {
     match output.format.word {
         word @ ("csv" | "parquet") => tables::files(&output.target, word),
@@ -274,7 +274,7 @@ fn files(output: &Output) -> Vec<Target> {
     }
 }
 
-/// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
+/// Whether a sequence of this many windows needs a strip for these outputs even if none was requested.
 pub(crate) fn needs_strip(outputs: &[Output], windows: usize) -> bool {
     let strip = |o: &Output| o.format.whole == OneDrawing::Always && !o.target.is_numbered();
     windows > 1 && outputs.iter().any(strip)
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn the_name_or_the_user_says_the_format() {
+    fn the_extension_or_the_option_selects_the_format() {
         assert_eq!(word_of("out/a.gif", None), Some("gif"));
         assert_eq!(word_of("A.GIF", None), Some("gif"));
         assert_eq!(word_of("-", Some("json")), Some("json"));
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_format_is_told_with_the_known_ones() {
+    fn an_unknown_format_lists_the_known_ones() {
         let error = Output::parse("a.gfi", None).unwrap_err();
         assert_eq!(error.to_string(), "unknown format `gfi`");
         assert!(error.hint().contains("gif, apng, svg, png"));

@@ -1,4 +1,4 @@
-//! The mission: every window with its graph and changes; written as JSON and read back as an input.
+//! The mission: all windows with their graphs and changes; written as JSON, which can be read as an input.
 
 pub mod events;
 pub mod info;
@@ -29,9 +29,9 @@ pub use ledger::Ledger;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Window {
-    /// The place, counted from 0.
+    /// The index, counted from 0.
     pub index: usize,
-    /// The time; the last window may be shorter than the period.
+    /// The time span; the last window may be shorter than the period.
     pub span: Span,
     /// Whether it is shorter than the period.
     pub partial: bool,
@@ -39,7 +39,7 @@ pub struct Window {
     pub messages: u64,
     /// The changes since the window before; empty in the first.
     pub changes: Vec<Change>,
-    /// The places in the ledger of the entries that the changes belong to, one for each change.
+    /// The ledger entries that the changes belong to, one per change.
     pub entries: Vec<EntryId>,
 }
 
@@ -47,7 +47,7 @@ pub struct Window {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Mission {
-    /// The bags it was read from, in order.
+    /// The bags from which it was read, in order.
     pub bags: Vec<Report>,
     /// The time from the first message to the last, plus 1 ns.
     pub span: Span,
@@ -59,24 +59,24 @@ pub struct Mission {
     pub step: Period,
     /// All nodes, topics and edges, with names, types and evidence.
     pub elements: Elements,
-    /// The windows in order; those without a message are there too.
+    /// The windows in order, including empty ones.
     pub windows: Vec<Window>,
     /// The graph of each window.
     pub graphs: Graphs,
     /// The events, in continuous time.
     pub ledger: Ledger,
-    /// The messages of every sender, in continuous time.
+    /// The activity of every sender, in continuous time.
     pub sending: Sending,
-    /// The places of the drawing, if one was made.
+    /// The positions of the drawing, if one was made.
     pub layout: Option<Places>,
     /// Problems that did not stop the reading.
     pub notices: Notices,
-    /// Edges that source code offers and that were not drawn, a line each; made when bags are read, not part of a
-    /// mission's file.
+    /// Edges from source code that were not drawn, one per line; created when bags are read, not part of a mission's
+    /// file.
     pub undrawn: Vec<String>,
 }
 
-/// The places of a drawing, in pixels at scale 1, y down.
+/// The positions in a drawing, in pixels at scale 1, y down.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[serde(default)]
 pub struct Places {
@@ -90,7 +90,7 @@ pub struct Places {
     pub boxes: Vec<Place>,
 }
 
-/// The place of one node or topic.
+/// The position of a node or topic.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Place {
     /// The kind of element, `node` or `topic`.
@@ -103,12 +103,12 @@ pub struct Place {
 }
 
 impl Mission {
-    /// The windows in order, each with its graph, which is built when it is needed.
+    /// The windows in order, each with its graph, which is built on demand.
     pub fn each(&self) -> impl Iterator<Item = (&Window, Graph)> {
         self.windows.iter().zip(&self.graphs)
     }
 
-    /// Finds the changes from each window to the next, by the ledger.
+    /// Determines the changes from each window to the next, by the ledger.
     pub(crate) fn explain(&mut self) {
         let spans = self.windows.iter().map(|w| w.span);
         let windows = spans.zip(&self.graphs);
@@ -118,9 +118,9 @@ impl Mission {
         }
     }
 
-    /// Finds the changes from each window to the next, and makes lives, sending and ledger from them: for missions of which
-    /// only the windows are known. A rate must change by more than the share `threshold`; `restarts` are nodes that restarted
-    /// under the same name, with the times, sorted by time.
+    /// Determines the changes from each window to the next, and derives lifetimes, sending and ledger from them: for
+    /// missions of which only the windows are known. A rate must change by more than the fraction `threshold`;
+    /// `restarts` are nodes that restarted under the same name, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);
         for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
@@ -147,7 +147,7 @@ impl Mission {
         }
     }
 
-    /// Whether the times of lives are known, not only the windows.
+    /// Whether exact lifetimes are known, not only windows.
     pub(crate) fn knows_lives(&self) -> bool {
         let all = &self.elements;
         all.topics.iter().any(|t| !t.runs.is_empty())

@@ -8,8 +8,7 @@ use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::target::Target;
 use crate::view::View;
 
-/// The number of elements above which browsers take a third of a processor core and more to show it, whether or not
-/// their user asked for less motion.
+/// The number of elements above which browsers need a third of a core or more to show it, even with reduced motion.
 const MANY: usize = 100;
 
 /// Begins the animation.

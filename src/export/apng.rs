@@ -17,7 +17,7 @@ struct Apng {
     animation: Option<Animation<Shared>>,
 }
 
-/// The file, shared with the writer, which does not give it back.
+/// The file, shared with the writer, which does not return it.
 #[derive(Clone)]
 struct Shared(Arc<Mutex<OutputSink>>);
 
@@ -97,7 +97,7 @@ impl Encoder for Apng {
     }
 }
 
-/// The packet of the area that differs from the frame before; one pixel where nothing does, as every frame needs some.
+/// The packet of the area that differs from the previous frame; one pixel if nothing does, as a frame cannot be empty.
 #[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
 fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     if frame.before.is_empty() {
@@ -116,7 +116,7 @@ fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     Ok(Packet::Patch(area, pixels))
 }
 
-/// An APNG being written. It states the number of frames in front, so equal frames are not joined.
+/// An APNG in progress. The number of frames is stated first, so equal frames are not joined.
 struct Animation<W: Write> {
     writer: png::Writer<W>,
 }
@@ -133,8 +133,8 @@ impl<W: Write> Animation<W> {
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_palette(colours);
         encoder.set_trns(opacity);
-        // Indexed pixels gain nothing from filters, and `Fast` writes 27 times the bytes. The last level is slow, but
-        // few pixels change, and only it comes close to GIF.
+        // Filters do not help indexed pixels, and `Fast` writes 27 times the bytes. The highest level is slow, but few
+        // pixels change, and only it comes close to GIF.
         encoder.set_filter(png::Filter::NoFilter);
         encoder.set_deflate_compression(png::DeflateCompression::Level(9));
         encoder.set_animated(frames, 0).map_err(to_io)?;
@@ -159,9 +159,9 @@ impl<W: Write> Animation<W> {
         self.writer.write_image_data(&pixels).map_err(to_io)
     }
 
-    /// Sets the place of the next pixels.
+    /// Sets the area of the next pixels.
     fn place(&mut self, area: Area) -> Result<(), png::EncodingError> {
-        // Places inside an image whose sides are u32.
+        // Positions inside an image whose sides are u32.
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         self.writer.set_frame_position(0, 0)?;
         self.writer
@@ -176,7 +176,7 @@ impl<W: Write> Animation<W> {
     }
 }
 
-/// A delay as a fraction of a second: in milliseconds, or in seconds where those are too many.
+/// A delay as a fraction of a second: in milliseconds, or in seconds if those do not fit.
 fn delay(ms: u32) -> (u16, u16) {
     match u16::try_from(ms) {
         Ok(ms) => (ms, 1000),
@@ -220,7 +220,7 @@ mod tests {
         bytes
     }
 
-    /// The frames as a decoder reads them: delays in milliseconds and the place of the dot.
+    /// The frames as a decoder reads them: delays in milliseconds and the position of the dot.
     fn played(bytes: &[u8]) -> Vec<(u16, usize)> {
         let mut reader = png::Decoder::new(io::Cursor::new(bytes))
             .read_info()
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_comes_back_as_it_was() {
+    fn frames_round_trip() {
         let bytes = written(&[(dot(3), 500), (dot(700), 250), (dot(700), 40), (dot(9), 7)]);
         assert_eq!(played(&bytes), [(500, 3), (250, 700), (40, 700), (7, 9)]);
     }

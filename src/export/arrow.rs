@@ -1,4 +1,4 @@
-//! Tables as Arrow record batches, for programs that share our memory; and rows of one taken back.
+//! Tables as Arrow record batches for zero-copy exchange, and rows read from one.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ pub(crate) fn to_arrow(batch: &Batch) -> Result<RecordBatch> {
     record_batch(batch).map_err(|e| Error::usage(format!("no Arrow table can be made: {e}"), ""))
 }
 
-/// The rows of `from`, whose columns of these names hold texts and whole numbers.
+/// The rows of `from`, whose columns of these names contain texts and integers.
 ///
 /// # Errors
 /// [`Error::Usage`] for a column that is missing or of another type.
@@ -147,7 +147,7 @@ fn held(texts: &TextColumn) -> Buffer {
     Buffer::from_slice_ref(&texts.bytes)
 }
 
-/// The ends as Arrow has them: with the 0 at which the first begins.
+/// The ends as Arrow offsets, which begin with 0.
 fn offsets(ends: &[i32]) -> OffsetBuffer<i32> {
     let all: Vec<i32> = std::iter::once(0).chain(ends.iter().copied()).collect();
     OffsetBuffer::new(ScalarBuffer::from(all))

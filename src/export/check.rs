@@ -1,4 +1,4 @@
-//! The check, before anything is read, that outputs may be written to their targets.
+//! Checks, before anything is read, that outputs can be written to their targets.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,14 +9,13 @@ use super::target::{NUMBER, Target, folder_of, is_special, same_file};
 use crate::bag;
 use crate::base::error::{Error, Result};
 
-/// Checks every file to be written before the inputs are read: no two the same, none that the user keeps, every folder
-/// there or to be made, and writable. Leaves nothing behind.
+/// Checks every output file before the inputs are read: no duplicates, no kept files, and every folder can be created
+/// and written. Leaves no files.
 ///
-/// Kept are files with the files that `SQLite` puts beside them, and in a folder all files in it that do not end like
-/// an output of ours.
+/// Kept are files with their `SQLite` companions, and in a folder all files without the extension of an output.
 ///
 /// # Errors
-/// [`Error::Usage`] where targets meet each other or a kept file, [`Error::Output`] or [`Error::Io`] where a folder
+/// [`Error::Usage`] if targets collide with each other or a kept file, [`Error::Output`] or [`Error::Io`] if a folder
 /// cannot be written.
 pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
@@ -43,11 +42,11 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Checks a folder whose tables are named after what is read, with this ending, before anything is made in it: no input
-/// in it is named like a table.
+/// Checks a folder for tables named after the input, with this extension, before anything is created in it: no input in
+/// it may have a table's name.
 ///
 /// # Errors
-/// [`Error::Usage`] where a table might replace an input.
+/// [`Error::Usage`] if a table might replace an input.
 pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Result<()> {
     let is_like_a_table = |path: &Path| {
         path.extension()
@@ -63,10 +62,10 @@ pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Res
     Err(Error::usage(what, "name another folder"))
 }
 
-/// The endings of a database and of the files that `SQLite` puts beside it, which are part of it.
+/// The suffixes of a database and of its `SQLite` companion files.
 const BESIDE: [&str; 4] = ["", "-wal", "-shm", "-journal"];
 
-/// Whether writing `target` would change what the user keeps at `path`.
+/// Whether writing `target` would modify the kept file or folder at `path`.
 fn would_harm(target: &Target, path: &Path) -> bool {
     if path.is_dir() {
         return existing(target).iter().any(|file| is_kept_in(path, file));
@@ -78,7 +77,7 @@ fn would_harm(target: &Target, path: &Path) -> bool {
     })
 }
 
-/// The files that are there already and would be replaced.
+/// The existing files that would be replaced.
 fn existing(target: &Target) -> Vec<PathBuf> {
     let Target::Path(path) = target else {
         return Vec::new();
@@ -91,7 +90,7 @@ fn existing(target: &Target) -> Vec<PathBuf> {
     files.filter(|file| target.may_be(file)).collect()
 }
 
-/// Whether `file` is there, inside `folder`, and ends like a bag or not like an output of ours.
+/// Whether `file` exists inside `folder` and has a bag's extension or none of an output.
 fn is_kept_in(folder: &Path, file: &Path) -> bool {
     let (Ok(folder), Ok(file)) = (folder.canonicalize(), file.canonicalize()) else {
         return false;
@@ -150,10 +149,10 @@ fn check_place(target: &Target) -> Result<()> {
     probe(there).map_err(Error::io("write into", there))
 }
 
-/// Makes the folder of `target` if it is not there.
+/// Creates the folder of `target` if necessary.
 ///
 /// # Errors
-/// The error of the system where it refuses.
+/// A system error.
 pub(crate) fn make_folder(target: &Target) -> Result<()> {
     match target {
         Target::Stdout => Ok(()),
@@ -185,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_belongs_to_an_input_is_never_overwritten() {
+    fn companion_files_of_an_input_are_never_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let bag = folder.path().join("bag");
         fs::create_dir(&bag).unwrap();
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_need_not_exist_yet_and_a_check_leaves_no_trace() {
+    fn a_missing_folder_is_accepted_and_a_check_leaves_no_files() {
         let folder = tempfile::tempdir().unwrap();
         let deep = Target::Path(folder.path().join("a/b/{n}.svg"));
         check(std::slice::from_ref(&deep), &[]).unwrap();
@@ -226,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_and_files_are_not_taken_for_each_other() {
+    fn folders_and_files_are_distinguished() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("file"), "").unwrap();
         let refused = |name: &str| check(&[Target::Path(folder.path().join(name))], &[]).is_err();

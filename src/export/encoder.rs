@@ -1,4 +1,4 @@
-//! The parts of an output format: an encoder that takes frames and writes bytes, and the row that names it.
+//! The interface of output formats: an encoder that takes frames and writes bytes, and its row in the table.
 
 use std::io::{self, Write as _};
 use std::path::PathBuf;
@@ -13,20 +13,20 @@ use crate::draw::scene::Scene;
 use crate::view::union::union;
 use crate::view::{SeenWindow, View};
 
-/// The data that an encoder needs of every frame; each includes those before it.
+/// The data that an encoder needs for every frame; each includes the previous ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
-    /// None: it writes from the sequence when that is over.
+    /// None: it writes from the sequence at the end.
     Nothing,
     /// The drawing.
     Scene,
     /// The drawing as pixels.
     Pixels,
-    /// The pixels as places in the sequence's one palette.
+    /// The pixels as indices into the sequence's palette.
     Indices,
 }
 
-/// One frame that all encoders of its size share, on the core that drew it.
+/// A frame, shared by all encoders of its size, on the core that drew it.
 #[derive(Clone, Copy)]
 pub struct DrawnFrame<'a> {
     /// The window it shows, and the time for which it is shown.
@@ -37,43 +37,43 @@ pub struct DrawnFrame<'a> {
     pub pixels: &'a Pixels,
     /// The palette of the whole sequence, 255 colours at most; only black unless an encoder needs indices.
     pub palette: &'a Palette,
-    /// The place in the palette of every pixel; empty unless an encoder needs them.
+    /// The palette index of every pixel; empty unless an encoder needs them.
     pub indices: &'a [u8],
-    /// The places in the palette of the pixels of the frame before; empty for the first.
+    /// The palette indices of the previous frame; empty for the first.
     pub before: &'a [u8],
 }
 
-/// The packet that an encoder makes of a frame: far smaller than its pixels, so that many may wait to be written.
+/// An encoded frame: far smaller than its pixels, so that many can be queued.
 #[derive(Debug)]
 pub enum Packet {
-    /// Nothing, or nothing new.
+    /// No data, or no change.
     Nothing,
-    /// Bytes as they are written, or a file of its own.
+    /// Bytes to write, or a separate file.
     Bytes(Vec<u8>),
-    /// The bytes of pixels that replace an area of the frame before.
+    /// The bytes of pixels that replace an area of the previous frame.
     Patch(Area, Vec<u8>),
     /// The drawing itself.
     Drawing(Box<Scene>),
 }
 
-/// A function that makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
+/// A function that encodes a frame. It runs on any core, concurrently and in any order.
 pub(crate) type Pack = fn(&DrawnFrame<'_>) -> Result<Packet>;
 
 /// The files that an output wrote.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// The file as it was asked for; `-` for standard output, `{n}` for a file per window.
+    /// The file as given; `-` for standard output, `{n}` for a file per window.
     pub path: PathBuf,
     /// The number of files.
     pub files: usize,
-    /// The number of their bytes in all.
+    /// Their total number of bytes.
     pub bytes: u64,
-    /// Remarks for the user, such as the windows given up to stay small; lower case, no period.
+    /// Remarks for the user, such as windows dropped to meet a size limit; lower case, no period.
     pub remarks: Vec<String>,
 }
 
 impl Written {
-    /// An output of which nothing is written yet.
+    /// An empty record for an output.
     pub(crate) fn to(target: &Target) -> Self {
         Self {
             path: target.path().to_owned(),
@@ -121,19 +121,19 @@ pub(crate) fn single<'a>(
     }
 }
 
-/// The writer of one output in a format. An unfinished output leaves no trace when it is dropped.
+/// The writer of one output in a format. An unfinished output leaves no files when dropped.
 pub trait Encoder: Send {
-    /// The data that it needs of every frame; nothing where it writes from the sequence when that is over.
+    /// The data that it needs for every frame; nothing if it writes from the sequence at the end.
     fn needs(&self) -> Needs {
         Needs::Nothing
     }
 
-    /// Whether it is an animation, which is given the staged frames too, not only the windows.
+    /// Whether it is an animation, which receives staged frames in addition to the windows.
     fn plays(&self) -> bool {
         false
     }
 
-    /// The function that makes its packets, which [`Encoder::take`] is given in order.
+    /// The function that makes its packets, which [`Encoder::take`] receives in order.
     fn pack(&self) -> Pack {
         |_| Ok(Packet::Nothing)
     }
@@ -146,7 +146,7 @@ pub trait Encoder: Send {
     /// Begins, before the first packet, with the size of all frames and their palette.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path where it cannot be written; [`Error::Output`] where the format cannot hold
+    /// [`Error::Io`] with the output's path if it cannot be written; [`Error::Output`] if the format cannot represent
     /// it.
     fn begin(&mut self, _size: (u32, u32), _palette: &Palette) -> Result<()> {
         Ok(())
@@ -155,7 +155,7 @@ pub trait Encoder: Send {
     /// Takes the packet of the next frame. `index` is the number of its window in the mission.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path where it cannot be written.
+    /// [`Error::Io`] with the output's path if it cannot be written.
     fn take(&mut self, _index: usize, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
         Ok(())
     }
@@ -170,7 +170,7 @@ pub trait Encoder: Send {
 /// The beginning of an output.
 pub(crate) type Started<'a> = Result<Box<dyn Encoder + 'a>>;
 
-/// An output that is written when the sequence is over.
+/// An output that is written at the end.
 struct AtEnd<W>(W);
 
 impl<W: FnOnce() -> Result<Written> + Send> Encoder for AtEnd<W> {
@@ -217,8 +217,8 @@ pub(crate) fn one_text<'a>(
     })
 }
 
-/// Writes a text per window, where the name has `{n}`; otherwise one of the only window, or of the union of all. `text`
-/// takes the number of the window where there are several.
+/// Writes a text per window if the name contains `{n}`; otherwise one of the only window, or of the union of all.
+/// `text` takes the index of the window if there are several.
 pub(crate) fn text_per_window(
     view: &View,
     target: &Target,
@@ -249,14 +249,14 @@ pub(crate) fn text_per_window(
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
 pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Started<'a>;
 
-/// Whether a format holds one drawing of the whole mission: a film strip or a figure.
+/// Whether a format can contain one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OneDrawing {
-    /// No: it holds the sequence, or the graph itself.
+    /// No: it contains the sequence, or the graph itself.
     Never,
-    /// Yes, where one was asked for.
+    /// Yes, on request.
     Asked,
-    /// Yes: without `{n}` several windows become a film strip even unasked.
+    /// Yes: without `{n}` several windows become a film strip by default.
     Always,
 }
 
@@ -267,21 +267,21 @@ pub enum OneDrawing {
     reason = "a row of a table: each answers a question of its own"
 )]
 pub struct OutputFormat {
-    /// Its extension and its word for `--format`.
+    /// Its extension and its name for `--format`.
     pub word: &'static str,
     /// Its description, for `--help` and the README.
     pub what: &'static str,
-    /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
+    /// Whether it shows the picture; the others write the graph itself, independent of a page.
     pub is_drawn: bool,
     /// Whether it shows the view; the others write the whole mission.
     pub is_viewed: bool,
-    /// Whether it holds all elements of the view one by one, even those that the picture draws as one.
+    /// Whether it contains all elements of the view separately, even those that the picture groups.
     pub is_unfolded: bool,
     /// Whether `--max-bytes` applies to it.
     pub is_limited: bool,
-    /// Whether it may hold one drawing of the whole.
+    /// Whether it can contain one drawing of the whole.
     pub whole: OneDrawing,
-    /// The check of anything else that it needs, done before anything is read.
+    /// A check of other requirements before anything is read.
     pub check: Option<fn(&Target) -> Result<()>>,
     /// The function that begins an output.
     pub start: Start,
@@ -319,7 +319,7 @@ pub(crate) const DATA: OutputFormat = OutputFormat {
     ..PICTURE
 };
 
-/// The start that each row replaces by its own.
+/// The default start, which each row overrides.
 fn nothing<'a>(_: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     one_text(target, String::new)
 }
@@ -330,7 +330,7 @@ pub(crate) mod testing {
     use crate::base::geometry::Size;
     use crate::draw::style::Color;
 
-    /// The packet of a frame of these places in the palette.
+    /// The packet of a frame with these palette indices.
     pub(crate) fn packed(
         palette: &Palette,
         before: &[u8],

@@ -1,7 +1,7 @@
-//! The mission as one dynamic graph in GEXF 1.2 (<https://gexf.net>), with the times at which each element is there.
+//! The mission as one dynamic graph in GEXF 1.2 (<https://gexf.net>), with the times at which each element exists.
 //!
-//! Nodes of the mission and its topics are nodes, publications and subscriptions edges; each has a spell for every life
-//! of its, in seconds from the mission's start, and its rate over time.
+//! Nodes of the mission and its topics are nodes, publications and subscriptions edges; each has a spell per
+//! lifetime, in seconds from the mission's start, and its rate over time.
 
 use super::spells::{SpellOf, parts};
 use super::{Sequence, Started, one_text};

@@ -9,14 +9,14 @@ use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
-/// The shortest time a frame is shown, in units of 10 ms as GIF counts: browsers slow down anything faster.
+/// The shortest time a frame is shown, in GIF's units of 10 ms: browsers slow down anything faster.
 const SHORTEST: u64 = 2;
 /// The longest time a frame is shown, in the same units.
 const LONGEST: u64 = 65_535;
 
 struct Gif {
     target: Target,
-    /// The file, until the first frame comes.
+    /// The file, until the first frame.
     sink: Option<OutputSink>,
     animation: Option<Animation<OutputSink>>,
 }
@@ -87,7 +87,7 @@ impl Encoder for Gif {
     }
 }
 
-/// The frame as GIF compresses it: all of it, or the area that differs from the frame before.
+/// The frame compressed for GIF: all of it, or the area that differs from the previous frame.
 #[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
 fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     let width = frame.pixels.width as usize;
@@ -112,7 +112,7 @@ fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     Ok(Packet::Patch(area, compressed(pixels)))
 }
 
-/// The place after the last colour: pixels that stay as they are.
+/// The index after the last colour, for unchanged pixels.
 fn clear(palette: &Palette) -> u8 {
     u8::try_from(palette.colours().len()).unwrap_or(u8::MAX)
 }
@@ -126,7 +126,7 @@ fn compressed(pixels: Vec<u8>) -> Vec<u8> {
     frame.buffer.into_owned()
 }
 
-/// A GIF being written. A frame is held back until the next one differs, since its time is known only then.
+/// A GIF in progress. A frame is held back until the next one differs, as its duration is only known then.
 struct Animation<W: Write> {
     encoder: gif::Encoder<W>,
     clear: u8,
@@ -152,7 +152,7 @@ impl<W: Write> Animation<W> {
         })
     }
 
-    /// Shows a frame for `ms` milliseconds; one that brings nothing new prolongs the frame before.
+    /// Shows a frame for `ms` milliseconds; an unchanged one prolongs the previous frame.
     fn add(&mut self, packet: Packet, ms: u32) -> io::Result<()> {
         if let Packet::Patch(area, bytes) = packet {
             let is_first = self.waiting.is_none();
@@ -200,7 +200,7 @@ impl<W: Write> Animation<W> {
     }
 }
 
-/// A frame of compressed pixels, `clear` ones among them, on top of the one before.
+/// A frame of compressed pixels, including `clear` ones, on top of the previous one.
 fn patch(area: Area, bytes: Vec<u8>, clear: Option<u8>) -> io::Result<gif::Frame<'static>> {
     let number = |n: usize| u16::try_from(n).map_err(io::Error::other);
     Ok(gif::Frame {
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_comes_back_as_it_was() {
+    fn frames_round_trip() {
         let frames = [(dot(3), 500), (dot(700), 500), (dot(3), 1000)];
         let expected = frames
             .clone()
@@ -278,13 +278,13 @@ mod tests {
     }
 
     #[test]
-    fn an_unchanged_frame_prolongs_the_one_before() {
+    fn an_unchanged_frame_prolongs_the_previous_one() {
         let shown = played(&[(dot(3), 500), (dot(3), 500), (dot(4), 250)]);
         assert_eq!(shown, [(100, dot(3)), (25, dot(4))]);
     }
 
     #[test]
-    fn no_frame_is_faster_than_browsers_show_and_none_is_lost_for_being_long() {
+    fn delays_are_within_the_limits_of_browsers_and_gif() {
         let shown = played(&[(dot(3), 1), (dot(4), 700_000)]);
         let delays: Vec<u16> = shown.iter().map(|s| s.0).collect();
         assert_eq!(delays, [2, 65_535, 4465]);
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_does_not_add_up() {
+    fn rounding_errors_do_not_add_up() {
         let frames: Vec<_> = (0..300).map(|i| (dot(i), 33)).collect();
         let total: u32 = played(&frames).iter().map(|f| u32::from(f.0)).sum();
         assert_eq!(total, 990);

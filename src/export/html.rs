@@ -1,7 +1,7 @@
-//! The mission as one self-contained page: the graph drawn once, its history as runs, and the player that shows them.
+//! The mission as one self-contained page: the graph drawn once, its history as runs, and a player.
 //!
 //! `player/` holds the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
-//! joined in order. [`data`] defines the data that the script is given.
+//! joined in order. [`data`] defines the data for the script.
 
 mod data;
 pub(crate) mod encoder;
@@ -28,7 +28,7 @@ use crate::view::runs::{ElementRuns, Runs, at};
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");
-/// The script, in the order in which its parts build on each other.
+/// The parts of the script, in order of dependency.
 const SCRIPT: [&str; 9] = [
     include_str!("html/player/data.js"),
     include_str!("html/player/picture.js"),
@@ -41,24 +41,24 @@ const SCRIPT: [&str; 9] = [
     include_str!("html/player/keys.js"),
 ];
 
-/// The part of the script that only a page has that is served while its recording grows.
+/// The part of the script for a page that is served while its recording grows.
 const LIVE: &str = include_str!("html/player/live.js");
 
 /// The parts of a page.
 pub(crate) struct HtmlPage<'a> {
     /// The whole sequence.
     pub sequence: &'a Sequence<'a>,
-    /// The graph with every element one by one.
+    /// The graph with all elements separately.
     pub whole: PageGraph<'a>,
-    /// The graph of the picture, where that draws several elements as one.
+    /// The graph of the picture, if it groups elements.
     pub folded: Option<PageGraph<'a>>,
     /// The style.
     pub style: &'a Style,
-    /// The style where the reader prefers dark pages; `None` for always the same.
+    /// The style for readers who prefer dark pages; `None` for always the same.
     pub dark: Option<&'a Style>,
     /// The title, such as the bag's name.
     pub title: &'a str,
-    /// The drawing in place of a graph, if there is none.
+    /// The drawing used if there is no graph.
     pub overview: Option<&'a Overview>,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct PageGraph<'a> {
     pub view: &'a View,
     pub union: Union,
     pub runs: Runs,
-    /// The arrows in the order in which they are painted: places in the view.
+    /// The indices of the arrows in the view, in painting order.
     pub order: Vec<usize>,
 }
 
@@ -89,7 +89,7 @@ impl<'a> PageGraph<'a> {
 }
 
 impl HtmlPage<'_> {
-    /// The page: UTF-8, without a single request unless it is served, its scripts and styles named by digest in its policy.
+    /// The page: UTF-8, without any requests unless it is served; its policy allows its scripts and styles by digest.
     pub(crate) fn write(&self) -> String {
         let still = self.whole.view.busiest_change();
         let fonts = fonts();
@@ -153,7 +153,7 @@ impl HtmlPage<'_> {
     fn look(&self) -> String {
         let mut words: std::collections::BTreeSet<&str> =
             self.drawn().flat_map(|d| d.runs.words()).collect();
-        // For what is compared, and for the legend.
+        // For comparisons and for the legend.
         words.extend([
             "added", "removed", "changed", "faster", "slower", "silent", "w2", "w5",
         ]);
@@ -187,11 +187,11 @@ impl HtmlPage<'_> {
         signs::legend(&views, change) + &signs::timeline(lives)
     }
 
-    /// The notices of what the picture leaves out and what went wrong, a line each.
+    /// The notices about hidden elements and problems, one per line.
     fn notes(&self) -> String {
         let mut xml = Xml::default();
         for notice in self.sequence.notices.iter() {
-            // The page has a font for everything, and all that is folded.
+            // The page has fonts for all characters, and all collapsed elements.
             if notice.kind != NoticeKind::Glyph {
                 let times = match notice.count {
                     0 | 1 => String::new(),
@@ -217,7 +217,7 @@ impl HtmlPage<'_> {
         xml.finish()
     }
 
-    /// Writes a graph as it is in the window at place `still`, which a reader without scripts sees.
+    /// Writes a graph in the state of window `still`, which is shown without scripts.
     fn graph(
         &self,
         xml: &mut Xml,
@@ -228,7 +228,7 @@ impl HtmlPage<'_> {
         let graph = Classes::new(drawn.view, &drawn.union);
         let runs = &drawn.runs;
         let window = u32::try_from(still).unwrap_or(0);
-        // A margin, and room around a small graph: three boxes as large as the screen are hard to read.
+        // A margin, and space around a small graph: three boxes that fill the screen are hard to read.
         let size = drawn.union.size;
         let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
         let (x, y) = ((size.w - w) / 2.0, (size.h - h) / 2.0);
@@ -241,7 +241,7 @@ impl HtmlPage<'_> {
         xml.attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
             .attribute("role", "img")
             .attribute("aria-label", "Graph; the search finds every element");
-        // Where a host refuses styles, outlines stay.
+        // If a host blocks styles, outlines remain.
         let stroke = self.style.edge.stroke.to_string();
         let layer = |xml: &mut Xml, class: &str| {
             xml.open("g")
@@ -298,7 +298,7 @@ fn board(overview: &Overview) -> String {
     let still = svg::write(&overview.scene);
     let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
     let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);
-    // The page has ids of its own.
+    // The page has its own ids.
     let inside = inside.replace(" id=\"", " data-part=\"");
     let size = overview.scene.size;
     format!(
@@ -339,7 +339,7 @@ fn fonts() -> String {
     css
 }
 
-/// A text without indentation, empty lines and lines of comments, which readers of the files need and browsers do not.
+/// A text without indentation, empty lines and comment lines, which browsers do not need.
 fn squeezed(text: &str) -> String {
     let lines = text.lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
@@ -364,7 +364,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_filled_in_is_not_a_template() {
+    fn replacements_are_not_expanded() {
         let page = fill("<{{a}}|{{b}}>", |key| {
             if key == "a" {
                 "{{b}}".to_owned()

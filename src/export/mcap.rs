@@ -1,8 +1,8 @@
-//! The graph over time as other tools read it: an MCAP file with `/rosgraph` (`rosgraph_msgs/msg/Graph`, a message per
+//! The graph over time for other tools: an MCAP file with `/rosgraph` (`rosgraph_msgs/msg/Graph`, a message per
 //! change) and the event log on `/bagreel/events` (`foxglove_msgs/msg/Log`), both CDR with their definitions.
 //!
-//! Reading it gives the same elements in every window. Topics of which no publisher is known stand under the node
-//! [`UNKNOWN_NODE`]; the reader takes them for topics.
+//! Reading it yields the same elements in every window. Topics of unknown publishers belong to the node
+//! [`UNKNOWN_NODE`]; the reader treats them as topics only.
 
 mod cdr;
 mod definitions;
@@ -56,7 +56,7 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
     Ok(to.finish()?.into_inner())
 }
 
-/// The ends of every node: the elements that are written.
+/// The written elements: the ends of every node.
 struct Ends<'a> {
     /// By node: publications and subscriptions.
     of: BTreeMap<u32, [Vec<(Element, &'a Edge)>; 2]>,
@@ -65,7 +65,7 @@ struct Ends<'a> {
 }
 
 impl<'a> Ends<'a> {
-    /// Without what source code guesses, and stand-ins for nodes without a name.
+    /// Excludes inferences from source code and placeholders for unnamed nodes.
     fn new(mission: &'a Mission) -> Self {
         let all = &mission.elements;
         let is_known = |what| !all.evidence(what).is_guess();

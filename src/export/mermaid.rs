@@ -86,7 +86,7 @@ fn colour(style: &Style, class: &str) -> String {
     }
 }
 
-/// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
+/// The namespaces and items directly in a namespace. Namespaces nest at most 16 deep.
 fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
     for (at, space) in view
@@ -135,7 +135,7 @@ fn mark(shown: &Shown) -> Option<&'static str> {
     shown.mark.map(Mark::class)
 }
 
-/// A name inside quotes: Mermaid's own entities for all that could end the text or begin markup.
+/// A name inside quotes, with Mermaid's entities for all characters that could end the text or begin markup.
 pub(crate) fn escaped(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {

@@ -16,16 +16,16 @@ pub struct SequenceOptions {
     pub frame_ms: u32,
     /// The number of staged frames that lead into a window with a change, ≥ 0.
     pub tween: u32,
-    /// The factor by which such a window is shown longer, ≥ 1.
+    /// The factor by which the display time of such a window is multiplied, ≥ 1.
     pub hold_changes: u32,
     /// The step from one window that is shown to the next, in windows, ≥ 1; windows with a change are shown in any
     /// case.
     pub every: usize,
-    /// Whether windows without a change are left out altogether.
+    /// Whether windows without a change are left out.
     pub changes_only: bool,
     /// Pixels of an image per pixel of the picture, above 0.
     pub scale: f64,
-    /// The most bytes that an animation may have.
+    /// The size limit of an animation in bytes.
     pub max_bytes: Option<u64>,
     /// The profile in which DOT is written.
     pub dot_profile: Profile,
@@ -33,17 +33,17 @@ pub struct SequenceOptions {
     pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
-    /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
+    /// The windows of a film strip, if requested; it also replaces a sequence of drawings.
     pub strip: Option<Choice>,
-    /// The figure, if one was asked for: it stands where a strip would.
+    /// The figure, if requested; it replaces a strip.
     pub figure: Option<FigureOptions>,
-    /// The life lines of two missions that are compared, in place of the mission's own.
+    /// The lifelines of two compared missions, which replace the mission's own.
     pub pairs: Option<LifeLines>,
     /// Links for the report: name and address.
     pub links: Vec<(String, String)>,
-    /// Whether a page asks its server for newer ones, and takes their place.
+    /// Whether a page polls its server for newer ones and replaces itself.
     pub is_live: bool,
-    /// A file that reports are appended to, where all others are written anew.
+    /// A file to which reports are appended; all others are overwritten.
     pub append_to: Option<PathBuf>,
 }
 
@@ -71,7 +71,7 @@ impl Default for SequenceOptions {
 }
 
 impl SequenceOptions {
-    /// Whether one drawing of the whole was asked for, which takes the place of a sequence.
+    /// Whether one drawing of the whole was requested, which replaces a sequence.
     pub fn is_one_drawing(&self) -> bool {
         self.strip.is_some() || self.figure.is_some()
     }
@@ -81,10 +81,10 @@ worded! {
     /// The profile of a DOT file.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Profile {
-        /// As `rqt_graph` saves it: every place is in the file.
+        /// As `rqt_graph` saves it, with positions.
         #[default]
         Rqt = "rqt",
-        /// Without places, with a title and colours, for `dot -Tpdf`.
+        /// Without positions, with a title and colours, for `dot -Tpdf`.
         Plain = "plain",
     }
 }

@@ -6,26 +6,26 @@ use std::sync::OnceLock;
 /// A colour: red, green, blue.
 pub(crate) type Rgb = [u8; 3];
 
-/// The number of the most frequent colours that are always in: more than a style has.
+/// The number of most frequent colours that are always included: more than a style has.
 const THEME: usize = 40;
 /// The number of further colours that are considered.
 const CANDIDATES: usize = 6000;
 /// Bits per channel of the cells in which nearest colours are looked up.
 const BITS: u32 = 4;
 
-/// A count of the colours of the frames that a palette is made from. Frames may come in any order.
+/// A histogram of colours for a palette, independent of the order of frames.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Census(HashMap<Rgb, u64>);
 
 impl Census {
-    /// Counts the pixels of one frame as RGBA bytes; transparency is not looked at.
+    /// Counts the pixels of one frame as RGBA bytes; transparency is ignored.
     pub(crate) fn count(&mut self, rgba: &[u8]) {
         for (colour, length) in runs(rgba) {
             *self.0.entry(colour).or_default() += u64::from(length);
         }
     }
 
-    /// Both counts together.
+    /// The sum of both histograms.
     #[must_use]
     pub(crate) fn and(mut self, other: Self) -> Self {
         // Sums do not depend on the order of what is added.
@@ -63,7 +63,7 @@ fn fill(colours: &mut Vec<Rgb>, candidates: &[(Rgb, u64)], most: usize) {
         })
         .collect();
     while colours.len() < most {
-        // The first of equals wins, so that the choice is the same everywhere.
+        // The first of equals wins, so that the choice is deterministic.
         let mut best: Option<(f64, Rgb)> = None;
         for &(colour, weight, near) in &left {
             let score = f64::from(near) * weight;
@@ -102,7 +102,7 @@ fn runs(rgba: &[u8]) -> impl Iterator<Item = (Rgb, u32)> + '_ {
 #[derive(Clone, Debug)]
 pub struct Palette {
     colours: Vec<Rgb>,
-    /// For every cell of the colour cube, once it is asked for, the places of all colours that can be nearest to a
+    /// For every cell of the colour cube, computed on demand, the indices of all colours that can be nearest to a
     /// colour in it.
     cells: Vec<OnceLock<Vec<u8>>>,
 }
@@ -118,7 +118,7 @@ impl Palette {
         Self { colours, cells }
     }
 
-    /// The colours by their place.
+    /// The colours by index.
     pub fn colours(&self) -> &[Rgb] {
         &self.colours
     }
@@ -137,10 +137,10 @@ impl Palette {
     }
 }
 
-/// The number of colours that a [`Matcher`] remembers: four times those of a frame.
+/// The size of a [`Matcher`]'s cache: four times the colours of a frame.
 const MET: u32 = 4096;
 
-/// A finder of the places of colours, which remembers those that it met.
+/// Finds the palette indices of colours, with a cache.
 #[derive(Clone, Debug)]
 pub(crate) struct Matcher<'a> {
     palette: &'a Palette,
@@ -148,13 +148,13 @@ pub(crate) struct Matcher<'a> {
 }
 
 impl<'a> Matcher<'a> {
-    /// A matcher that has met no colour.
+    /// A matcher with an empty cache.
     pub(crate) fn new(palette: &'a Palette) -> Self {
         let met = vec![None; MET as usize];
         Self { palette, met }
     }
 
-    /// Writes the place of the nearest colour of every pixel of RGBA bytes, the first of equals, into `places`.
+    /// Writes the index of the nearest colour of every pixel of RGBA bytes, the first of equals, into `places`.
     pub(crate) fn map(&mut self, rgba: &[u8], places: &mut [u8]) {
         let mut left = places;
         for (colour, length) in runs(rgba) {
@@ -166,7 +166,7 @@ impl<'a> Matcher<'a> {
 
     fn place(&mut self, colour: Rgb) -> u8 {
         let [r, g, b] = colour.map(u32::from);
-        // Mixed by a large odd number, so that colours that look alike do not meet in one slot.
+        // Mixed with a large odd number, so that similar colours do not share a slot.
         let slot = ((r << 16 | g << 8 | b).wrapping_mul(0x9e37_79b1) >> 16) % MET;
         match self.met[slot as usize] {
             Some((met, place)) if met == colour => place,
@@ -179,8 +179,8 @@ impl<'a> Matcher<'a> {
     }
 }
 
-/// The places of the colours that can be nearest to a point of the cell: those that begin closer than the colour
-/// that is surely closest ends.
+/// The indices of the colours that can be nearest to a point of the cell: those whose nearest distance is below the
+/// smallest farthest distance.
 fn candidates(colours: &[Rgb], cell: usize) -> Vec<u8> {
     let side = 1_i32 << (8 - BITS);
     #[expect(
@@ -221,7 +221,7 @@ pub struct Area {
     pub height: usize,
 }
 
-/// The smallest area that holds every difference between two frames of `width` columns; `None` if they are equal.
+/// The bounding box of the differences between two frames of `width` columns; `None` if they are equal.
 pub(crate) fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
     let rows = || before.chunks_exact(width).zip(after.chunks_exact(width));
     let top = rows().position(|(a, b)| a != b)?;
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colours_stay_exactly_as_they_are() {
+    fn few_colours_are_kept_exactly() {
         let rgba = frame([[1, 2, 3], [1, 2, 3], [200, 0, 9]]);
         let palette = palette_of(&rgba, 255);
         assert_eq!(palette.colours(), [[1, 2, 3], [200, 0, 9]]);
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_colour_is_found_as_if_all_were_tried() {
+    fn the_nearest_colour_equals_that_of_a_full_search() {
         let rgba = ramp();
         let palette = palette_of(&rgba, 255);
         assert_eq!(palette.colours().len(), 255);
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_is_as_small_as_it_can_be() {
+    fn the_difference_area_is_minimal() {
         let before = vec![0; 12];
         let mut after = before.clone();
         assert_eq!(difference(&before, &after, 4), None);

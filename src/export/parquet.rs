@@ -21,19 +21,18 @@ use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn, TextColumn, span};
 
-/// The largest number of rows in a group, as other writers have it.
+/// The most rows in a group, as in other writers.
 const MOST_ROWS: usize = 1 << 20;
 /// The number of bytes of values held in memory before their group is written: a million rows of the message table.
 const MOST_HELD: usize = 32 << 20;
-/// The number of values that are handed to the writer at once, so that what is made for it stays in the cache.
+/// The number of values passed to the writer at once, so that temporary data stays in the cache.
 const AT_ONCE: usize = 1 << 14;
 
-/// A table of fewer rows than this is not compressed, and is written in one page per column, of which nothing is said
-/// beyond what is said of the column: to set up zstd for every column takes longer than to count a bag, and saves an
-/// eighth of the bytes.
+/// A table of fewer rows is not compressed, and has one page per column without page statistics: setting up zstd for
+/// every column takes longer than counting a bag, and saves an eighth of the bytes.
 const FEW_ROWS: usize = 1024;
 
-/// A table being written.
+/// A table in progress.
 pub(crate) struct Rows<W: Write + Send> {
     writer: SerializedFileWriter<W>,
     /// The rows of the group that has not been written yet.
@@ -41,7 +40,7 @@ pub(crate) struct Rows<W: Write + Send> {
 }
 
 impl<W: Write + Send> Rows<W> {
-    /// Begins a table with the columns of `batch`, which holds all rows or none yet; `facts` are kept in the file's
+    /// Begins a table with the columns of `batch`, which contains all rows or none yet; `facts` go into the file's
     /// metadata.
     pub(crate) fn new(to: W, batch: &Batch, facts: &[(&str, &str)]) -> io::Result<Self> {
         let facts = facts
@@ -117,16 +116,16 @@ impl<W: Write + Send> Rows<W> {
     }
 }
 
-/// Chooses how a column is written where the usual way, a dictionary of its values, does not fit it.
+/// Chooses the encoding of a column if a dictionary of its values, the default, is unsuitable.
 fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterPropertiesBuilder {
     let path = || ColumnPath::new(path(column).into_iter().map(str::to_owned).collect());
     match &column.values {
-        // Times and counts differ little from row to row and are seldom equal; they stand as differences, which every
-        // reader of Parquet 2 knows.
+        // Times and counts differ little between rows and are rarely equal; they are delta-encoded, which all Parquet 2
+        // readers support.
         ColumnValues::I64(_) if column.lists.is_empty() => properties
             .set_column_dictionary_enabled(path(), false)
             .set_column_encoding(path(), Encoding::DELTA_BINARY_PACKED),
-        // The smallest and the largest word of a group of rows in order of time let no reader skip one.
+        // Minimum and maximum words of time-sorted row groups never allow skipping one.
         ColumnValues::Words(_) => {
             properties.set_column_statistics_enabled(path(), EnabledStatistics::None)
         }
@@ -141,7 +140,7 @@ fn schema(batch: &Batch) -> ParquetResult<TypePtr> {
     root.build().map(Arc::new)
 }
 
-/// A column behind its path: the names of the structures around it, then its own.
+/// A column with its path: the names of the enclosing structures, then its own.
 type PathOf<'a> = (Vec<&'a str>, &'a TableColumn);
 
 fn path(column: &TableColumn) -> Vec<&str> {
@@ -152,7 +151,7 @@ fn path(column: &TableColumn) -> Vec<&str> {
     }
 }
 
-/// The fields of a structure `depth` names deep, which holds all of these columns.
+/// The fields of a structure `depth` names deep that contains these columns.
 fn fields(columns: &[PathOf<'_>], depth: usize) -> ParquetResult<Vec<TypePtr>> {
     let groups = columns.chunk_by(|(a, _), (b, _)| {
         a.get(depth) == b.get(depth) && a.len() > depth + 1 && b.len() > depth + 1
@@ -196,7 +195,7 @@ fn list(name: &str, element: TypePtr) -> ParquetResult<TypePtr> {
     outer.build().map(Arc::new)
 }
 
-/// A column as the file has it, inside `levels` lists of its own.
+/// The schema of a column inside `levels` lists.
 fn field(column: &TableColumn, name: &str, levels: usize) -> ParquetResult<TypePtr> {
     let own = |levels: usize| if levels == 0 { name } else { "element" };
     let optional = column.valid.is_some() && levels == 0;
@@ -263,7 +262,7 @@ fn column(
     }
 }
 
-/// The texts by their places, which share one copy of the bytes.
+/// The texts by index, which share one copy of the bytes.
 fn texts(texts: &TextColumn) -> impl Fn(usize) -> ByteArray {
     let bytes = ByteArray::from(texts.bytes.clone());
     move |at| {
@@ -301,7 +300,7 @@ fn values<T: DataType>(
     Ok(())
 }
 
-/// The places of the values inside these rows of lists.
+/// The range of the values inside these rows of lists.
 fn places(lists: &[Vec<i32>], rows: Range<usize>) -> Range<usize> {
     lists.iter().fold(rows, |inside, ends| {
         if inside.is_empty() {
@@ -311,7 +310,7 @@ fn places(lists: &[Vec<i32>], rows: Range<usize>) -> Range<usize> {
     })
 }
 
-/// The levels of lists as Parquet (and Dremel, Melnik et al. 2010) has them: one entry per value and per empty list.
+/// Definition and repetition levels (Dremel, Melnik et al. 2010): one entry per value and per empty list.
 #[derive(Default)]
 struct ListLevels {
     /// The number of lists around the entry that are not empty.

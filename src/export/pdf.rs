@@ -12,7 +12,7 @@ use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::write_file;
 use crate::export::target::Target;
 
-/// The largest number of pages that wait to be written.
+/// The most queued pages.
 const WAITING: usize = 4;
 
 struct Book<'a> {
@@ -20,7 +20,7 @@ struct Book<'a> {
     /// The only page, if it is not a sequence.
     strip: Option<&'a Scene>,
     target: Target,
-    /// The channel for pages; a document cannot move between threads, so it has its own.
+    /// The channel for pages; a document cannot move between threads, so it has its own thread.
     sheets: SyncSender<PdfPage>,
     press: JoinHandle<std::result::Result<Vec<u8>, String>>,
 }
@@ -56,7 +56,7 @@ impl Book<'_> {
         sent.map_err(|_| self.failed("the document broke off".to_owned()))
     }
 
-    /// The time of a window and the first thing that changed in it.
+    /// The time of a window and its first change.
     fn entry(&self, place: usize) -> String {
         let frame = self.sequence.view.frames.get(place);
         frame.map_or_else(String::new, |frame| {
@@ -96,7 +96,7 @@ impl Encoder for Book<'_> {
             press,
             ..
         } = *self;
-        // Without a sender the press knows that this was all.
+        // Dropping the sender ends the thread.
         drop(sheets);
         let bytes = match press.join() {
             Ok(Ok(bytes)) => bytes,

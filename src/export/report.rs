@@ -17,16 +17,16 @@ use crate::export::sequence::Sequence;
 use crate::view::{Counts, View};
 use escape::{address, plain};
 
-/// The most bytes of each part; together they stay below 256 KiB, a quarter of what a job summary may hold.
+/// The most bytes of each part; together they stay below 256 KiB, a quarter of the limit of a job summary.
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
-/// The largest number of characters of a chart; a longer one is left out, for GitHub's Mermaid stops at 50,000.
+/// The most characters of a chart; a longer one is left out, as GitHub's Mermaid stops at 50,000.
 const MOST_CHART: usize = 45_000;
 
-/// The largest number of rows of a table that are open; the rest folds.
+/// The most expanded rows of a table; the rest is collapsed.
 const MOST_OPEN: usize = 20;
-/// The largest number of edges of an open chart; one of more is folded.
+/// The most edges of an expanded chart; larger ones are collapsed.
 const MOST_EDGES_OPEN: usize = 25;
 
 /// The report.
@@ -62,7 +62,7 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     out
 }
 
-/// The way to write a time: as a link into the player where one is known.
+/// Formats times, as links into the player if one is given.
 struct ReportTimes<'a> {
     start: Stamp,
     player: Option<&'a (String, String)>,
@@ -127,7 +127,7 @@ fn title(sequence: &Sequence<'_>) -> String {
     sequence.picture.title().map_or_else(bag, str::to_owned)
 }
 
-/// The number of headlines of all windows, in words.
+/// The number of headlines of all windows, as text.
 fn told(counts: &Counts) -> Vec<String> {
     let all = [
         (counts.nodes_added, "node", " started"),
@@ -152,7 +152,7 @@ fn chart(view: &View) -> String {
     let Some((seen, left_out)) = graph::changed(view) else {
         return String::new();
     };
-    // The picture's own style may be dark; Markdown is read on any ground.
+    // The picture's style may be dark, but Markdown has any background.
     let Ok(style) = Style::builtin(BUILTIN[0].0) else {
         return String::new();
     };

@@ -1,4 +1,4 @@
-//! Runs a sequence once through all its outputs: each frame is drawn once, by all cores, and given to every output in
+//! Runs a sequence once through all its outputs: each frame is drawn once, by all cores, and passed to every output in
 //! order.
 
 mod raster_pool;
@@ -19,18 +19,17 @@ use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::{Encoder, Needs, Output, Packet, Written};
 
-/// A function called after every batch of frames with the number of frames done and the number of all. It may break off
-/// the run.
+/// A function called after every batch of frames with the number of frames done and their total. It may cancel the run.
 pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 
-/// Writes every output, in the order given, and returns the files written. Each file appears when it is whole. `steps`
-/// counts the time of each step.
+/// Writes every output, in the order given, and returns the files written. Each file appears when it is complete.
+/// `steps` sums the time of each step.
 ///
 /// A closed pipe ends that output and is not an error.
 ///
 /// # Errors
-/// [`Error::Interrupted`] where `progress` breaks off, otherwise the error of the first failing output; outputs that
-/// were not finished leave no trace then.
+/// [`Error::Interrupted`] if `progress` cancels, otherwise the error of the first failing output; unfinished outputs
+/// leave no files.
 pub fn run(
     sequence: &Sequence<'_>,
     outputs: &[Output],
@@ -49,7 +48,7 @@ pub fn run(
     .collect()
 }
 
-/// One run of the sequence. `None` stands for an output that would exceed `max_bytes`.
+/// One run of the sequence; `None` for an output that would exceed `max_bytes`.
 pub(crate) fn pass(
     sequence: &Sequence<'_>,
     outputs: &[Output],
@@ -93,7 +92,7 @@ impl<'a> OutputJob<'a> {
         self.encoder.as_ref().is_some_and(|e| e.plays())
     }
 
-    /// The data that it needs of every frame; none once it has ended.
+    /// The data that it needs for every frame; none once it has ended.
     fn want(&self) -> FrameWant {
         let encoder = self.encoder.as_ref();
         FrameWant {
@@ -128,7 +127,7 @@ impl<'a> OutputJob<'a> {
         }
     }
 
-    /// The error that has to end the whole run, if there is one.
+    /// The error that must end the whole run, if any.
     fn failure(&mut self) -> Result<()> {
         match self.ended.take() {
             Some(error) if !self.is_harmless(&error) => Err(error),
@@ -139,7 +138,7 @@ impl<'a> OutputJob<'a> {
         }
     }
 
-    /// Whether only this output ends: its reader has left, or it grew too large and is tried again.
+    /// Whether only this output ends: its reader closed the pipe, or it is too large and will be retried.
     fn is_harmless(&self, error: &Error) -> bool {
         kind(error) == Some(io::ErrorKind::BrokenPipe) || self.is_too_large(error)
     }
@@ -181,7 +180,7 @@ pub(crate) fn cores() -> usize {
 /// A packet with the index of its window and the time of its frame.
 struct Waiting(usize, FrameTime, Packet);
 
-/// Draws all frames and hands them out, in order, while the next ones are drawn.
+/// Draws all frames and passes them on in order while the next ones are drawn.
 fn play(
     sequence: &Sequence<'_>,
     jobs: &mut [OutputJob<'_>],

@@ -1,4 +1,4 @@
-//! The sequence as it is shown: the windows in order with the time of each, and the drawings.
+//! The displayed sequence: the windows in order with their durations, and the drawings.
 
 pub use super::options::SequenceOptions;
 
@@ -17,8 +17,8 @@ use crate::view::{Frame, View};
 
 /// The drawings of the windows of a sequence.
 pub trait Drawings: Sync {
-    /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase`, above 0 to 1, is the
-    /// part of the change into it that is done: 1 is the window itself.
+    /// The drawing of a window, an index into [`View::frames`]; all drawings have the same size. `phase`, above 0 to 1,
+    /// is the progress of the transition into it: 1 is the window itself.
     fn scene(&self, window: usize, phase: f64) -> Scene;
 
     /// The title of the drawing of a graph; `None` for other drawings.
@@ -26,12 +26,12 @@ pub trait Drawings: Sync {
         None
     }
 
-    /// The graph of all windows, for outputs that draw the graph once; `None` where there is none.
+    /// The graph of all windows, for outputs that draw the graph once, if any.
     fn graph(&self) -> Option<UnionDrawings<'_>> {
         None
     }
 
-    /// All windows in one drawing over time, for the same outputs where there is no graph.
+    /// All windows in one drawing over time, for the same outputs if there is no graph.
     fn overview(&self) -> Option<Overview> {
         None
     }
@@ -73,27 +73,27 @@ impl Drawings for Board<'_> {
     }
 }
 
-/// The view with every element one by one, even those that the picture draws as one, for pages and reports.
+/// The view with all elements separately, even those that the picture groups, for pages and reports.
 #[derive(Clone, Copy)]
 pub struct Unfolded<'a> {
-    /// The view with everything opened.
+    /// The view with everything expanded.
     pub view: &'a View,
     /// The drawings of that view, if an output needs them.
     pub picture: Option<&'a dyn Drawings>,
-    /// The life lines of the mission, if an output needs them.
+    /// The lifelines of the mission, if an output needs them.
     pub lives: Option<&'a LifeLines>,
-    /// The least relative change of a rate that is reported.
+    /// The smallest relative change of a rate that is reported.
     pub rate_change: f64,
 }
 
-/// A mission ready to be shown.
+/// A mission with everything needed to show it.
 #[derive(Clone)]
 pub struct Sequence<'a> {
     /// The whole sequence.
     pub mission: &'a Mission,
-    /// The mission that data files hold: the whole sequence too, or the part that is viewed.
+    /// The mission for data files: the whole sequence, or the filtered part.
     pub data: &'a Mission,
-    /// The places of everything, if it is drawn.
+    /// The positions of everything, if it is drawn.
     pub places: Option<&'a Places>,
     /// The notices for the user.
     pub notices: &'a Notices,
@@ -101,15 +101,15 @@ pub struct Sequence<'a> {
     pub view: &'a View,
     /// The drawings of the windows.
     pub picture: &'a dyn Drawings,
-    /// The view with everything opened, where an output needs it.
+    /// The view with everything expanded, if an output needs it.
     pub unfolded: Option<Unfolded<'a>>,
     /// The painter that turns a drawing into pixels.
     pub painter: &'a Painter,
     /// The fonts for all text.
     pub fonts: &'a Fonts,
-    /// The film strip, for outputs that hold all windows in one drawing.
+    /// The film strip, for outputs with all windows in one drawing.
     pub strip: Option<&'a Scene>,
-    /// The lines that put the figure into LaTeX, if there is one.
+    /// The LaTeX code that includes the figure, if there is one.
     pub latex: Option<&'a str>,
     /// The options of the sequence.
     pub options: SequenceOptions,
@@ -118,16 +118,16 @@ pub struct Sequence<'a> {
 /// One frame of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTime {
-    /// The window: a place in [`View::frames`].
+    /// The window: an index into [`View::frames`].
     pub window: usize,
-    /// The part of the change into this window that is done, above 0 up to 1; 1 is the window itself.
+    /// The progress of the transition into this window, above 0 up to 1; 1 is the window itself.
     pub phase: f64,
     /// The time for which it is shown, in milliseconds.
     pub ms: u32,
 }
 
 impl FrameTime {
-    /// Whether it shows the window itself and not the change into it.
+    /// Whether it shows the window itself rather than the transition.
     pub fn is_settled(&self) -> bool {
         self.phase >= 1.0
     }
@@ -137,8 +137,9 @@ impl FrameTime {
 const STAGED_MS: (u32, u32) = (20, 100);
 
 impl Sequence<'_> {
-    /// The frames in order. The whole time stays the same: staged frames take theirs from their window, and a window
-    /// that is left out gives its time to the one before. A long time without a message is one frame, as long as any other.
+    /// The frames in order. The total duration is constant: staged frames are taken from their window's time, and the
+    /// time of an omitted window is added to the previous one. A long time without messages is one frame of normal
+    /// duration.
     pub fn frame_times(&self) -> Vec<FrameTime> {
         let frames = &self.view.frames;
         let changed: Vec<bool> = frames.iter().map(Frame::is_changed).collect();
@@ -210,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn staged_frames_stand_only_before_changes_and_take_no_extra_time() {
+    fn staged_frames_only_precede_changes_and_take_no_extra_time() {
         let options = SequenceOptions {
             tween: 3,
             ..SequenceOptions::default()
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_that_are_left_out_give_their_time_away_but_changes_stay() {
+    fn omitted_windows_pass_on_their_time_and_changes_stay() {
         let options = SequenceOptions {
             every: 3,
             ..SequenceOptions::default()
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hurried_film_still_shows_every_frame() {
+    fn a_fast_animation_still_shows_every_frame() {
         let options = SequenceOptions {
             frame_ms: 20,
             tween: 8,

@@ -1,4 +1,4 @@
-//! One file while it is written: hidden until it is whole, removed if it never is.
+//! A file that is written atomically: hidden until complete, removed otherwise.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -10,10 +10,10 @@ use super::target::{Target, folder_of, is_special};
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// A file (or standard output) being written. Dropped without [`OutputSink::commit`], a file leaves no trace.
+/// A file (or standard output) in progress. Dropped without [`OutputSink::commit`], a file is removed.
 #[derive(Debug)]
 pub(crate) struct OutputSink {
-    /// The path as it was asked for.
+    /// The path as given.
     path: PathBuf,
     /// The path that is replaced: for a symbolic link, the one it points to.
     place: PathBuf,
@@ -25,9 +25,9 @@ pub(crate) struct OutputSink {
 #[derive(Debug)]
 enum SinkTarget {
     Stdout(io::Stdout),
-    /// A device or pipe that is there already: nothing to rename.
+    /// An existing device or pipe: nothing to rename.
     Special(File),
-    /// A file without a name, which even a killed process leaves no trace of.
+    /// An unnamed file, which disappears even if the process is killed.
     #[cfg(target_os = "linux")]
     Nameless(File),
     /// A file with a temporary name beside the final one.
@@ -37,15 +37,15 @@ enum SinkTarget {
 }
 
 impl OutputSink {
-    /// Opens the file that will become `target`, whose folder is there. With `limit`, writing more bytes than that
+    /// Opens the file that will become `target`, whose folder exists. With `limit`, writing more bytes than that
     /// fails as [`io::ErrorKind::FileTooLarge`].
     ///
     /// # Errors
-    /// The error of the system where it refuses, with the name of the final file.
+    /// A system error, with the name of the final file.
     pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
             Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
-            // An output that the user asked for on standard output is not a message of the library's.
+            // Output requested on standard output is not a message of the library.
             Target::Stdout => Ok(SinkTarget::Stdout(io::stdout())),
             Target::Path(path) if is_special(path) => File::options()
                 .write(true)
@@ -69,19 +69,18 @@ impl OutputSink {
         })
     }
 
-    /// The path as it was asked for, for messages; `-` for standard output.
+    /// The path as given, for messages; `-` for standard output.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The function that turns an I/O error of this file into ours.
+    /// A function that converts an I/O error of this file.
     pub(crate) fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
         Error::io("write", &self.path)
     }
 
     #[cfg(feature = "video")]
-    /// A handle that a child process can write to as its standard output; `None` where this process has to write the
-    /// bytes.
+    /// A handle for the standard output of a child process; `None` if this process must write the bytes.
     ///
     /// # Errors
     /// Where the system refuses.
@@ -105,10 +104,10 @@ impl OutputSink {
         Ok(self.to.get_ref().size()? == Some(0))
     }
 
-    /// Finishes the file: it appears under its final name, replacing a file that was there. Returns its size in bytes.
+    /// Finishes the file: it appears under its final name, replacing an existing file. Returns its size in bytes.
     ///
     /// # Errors
-    /// Where the last bytes do not fit or the name cannot be taken; then nothing is left behind.
+    /// If the last bytes do not fit or the file cannot be renamed; then no file is left.
     pub(crate) fn commit(mut self) -> Result<u64> {
         self.to.flush().map_err(self.error())?;
         let Self {
@@ -119,7 +118,7 @@ impl OutputSink {
             ..
         } = self;
         let (way, _) = to.into_parts();
-        // A child process may have written more than went through our hands.
+        // A child process may have written more than we did.
         let size = way.size().ok().flatten().unwrap_or(written);
         publish(way, &place).map_err(Error::io("write", &path))?;
         Ok(size)
@@ -195,7 +194,7 @@ fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
         }
         #[cfg(target_os = "linux")]
         SinkTarget::Nameless(file) => {
-            // A name that is taken is taken over from a second one, since a link replaces nothing.
+            // An existing file is replaced by renaming a second link, as linking does not replace.
             if link(&file, path).is_ok() {
                 return Ok(());
             }
@@ -210,7 +209,7 @@ fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
     }
 }
 
-/// A hidden file in `folder`: without a name where the system can do that.
+/// A hidden file in `folder`: unnamed if the system supports it.
 fn hidden(folder: &Path) -> io::Result<SinkTarget> {
     #[cfg(target_os = "linux")]
     if let Ok(file) = nameless(folder) {
@@ -221,11 +220,11 @@ fn hidden(folder: &Path) -> io::Result<SinkTarget> {
     Ok(SinkTarget::Named(file, left))
 }
 
-/// The builder of temporary files with names that tell whose they are.
+/// The builder of temporary files with recognizable names.
 fn temporary() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".bagreel-").suffix(".part");
-    // As wide as the user's mask allows, like any new file; the default is for secrets.
+    // Permissions by the user's umask, like any new file; the default is private.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
@@ -239,7 +238,7 @@ fn nameless(folder: &Path) -> io::Result<File> {
     use rustix::fs::{Mode, OFlags, open};
     let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
     let file = File::from(open(folder, flags, Mode::from_raw_mode(0o666))?);
-    // Linking needs /proc; better to learn here that it is not there.
+    // Linking needs /proc, so its absence must be detected here.
     fs::metadata(proc_path(&file)).map(|_| file)
 }
 
@@ -261,7 +260,7 @@ fn link(file: &File, name: &Path) -> io::Result<()> {
     )?)
 }
 
-/// Whether a file can be made in `folder`; leaves nothing behind.
+/// Checks whether a file can be created in `folder`; leaves no file.
 pub(crate) fn probe(folder: &Path) -> io::Result<()> {
     hidden(folder).map(drop)
 }
@@ -270,7 +269,7 @@ pub(crate) fn probe(folder: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    /// A folder, a target in it, and what the folder holds.
+    /// A folder with a target in it.
     fn place(name: &str) -> (tempfile::TempDir, Target) {
         let folder = tempfile::tempdir().unwrap();
         let target = Target::Path(folder.path().join(name));
@@ -283,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_appears_when_it_is_whole() {
+    fn a_file_appears_when_it_is_complete() {
         let (folder, target) = place("a.gif");
         let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"whole").unwrap();
@@ -295,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_given_up_leaves_the_old_one() {
+    fn an_abandoned_file_leaves_the_old_one() {
         let (folder, target) = place("a.gif");
         fs::write(target.path(), "old").unwrap();
         let mut sink = OutputSink::create(&target, None).unwrap();
@@ -306,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_is_kept() {
+    fn a_size_limit_is_enforced() {
         let (folder, target) = place("a.gif");
         let mut sink = OutputSink::create(&target, Some(4)).unwrap();
         let error = sink.write_all(b"five!").unwrap_err();
@@ -316,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_vanishes_is_named() {
+    fn a_deleted_folder_is_reported() {
         let (folder, target) = place("a.gif");
         let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"whole").unwrap();
@@ -327,7 +326,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn a_full_disk_is_told_with_the_files_name() {
+    fn a_full_disk_is_reported_with_the_file_name() {
         let target = Target::parse("/dev/full");
         let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"no room").unwrap();
@@ -338,7 +337,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn a_link_stays_a_link() {
+    fn a_symlink_stays_a_symlink() {
         let (folder, target) = place("link.gif");
         let real = folder.path().join("real.gif");
         fs::write(&real, "old").unwrap();

@@ -1,4 +1,4 @@
-//! Every node, topic and edge of a mission with the times in which it is there, for the graph formats of other tools.
+//! Every node, topic and edge of a mission with the times at which it exists, for the graph formats of other tools.
 
 use crate::base::time::Span;
 use crate::base::words::visible;
@@ -8,7 +8,7 @@ use crate::mission::Mission;
 
 /// A node, a topic or an edge.
 pub(super) struct SpellOf {
-    /// Its name in the file, which no other one has.
+    /// Its unique name in the file.
     pub(super) id: String,
     /// The label for people.
     pub(super) label: String,
@@ -16,13 +16,13 @@ pub(super) struct SpellOf {
     pub(super) kind: &'static str,
     /// The names of both ends of an edge; empty for others.
     pub(super) ends: (String, String),
-    /// The strongest degree to which it is known.
+    /// Its best degree.
     pub(super) degree: Degree,
-    /// The words of its evidence, separated by blanks.
+    /// Its kinds of evidence, separated by spaces.
     pub(super) evidence: String,
-    /// Messages in all windows; `None` where not known.
+    /// Messages in all windows; `None` if unknown.
     pub(super) messages: Option<u64>,
-    /// Its lives, in order.
+    /// Its lifetimes, in order.
     pub(super) spells: Vec<Span>,
     /// Its rate in messages per second over each run of windows of one rate.
     pub(super) rates: Vec<(Span, f64)>,
@@ -82,7 +82,7 @@ impl SpellOf {
         for (at, row) in mission.graphs.rows(what) {
             let span = mission.graphs.spans()[at];
             all.degree = all.degree.min(row.degree);
-            // What a node counts are the messages of its topics.
+            // A node's count is that of its topics' messages.
             if let (Some(count), false) = (row.count, matches!(what, Element::Node(_))) {
                 *all.messages.get_or_insert(0) += count;
             }
@@ -96,7 +96,7 @@ impl SpellOf {
     /// Adds the rate in one more window, later than all before.
     fn sends(&mut self, span: Span, hz: f64) {
         match self.rates.last_mut() {
-            // The bits, since equal means the same number here.
+            // Compares bits, as the numbers must be identical.
             Some((last, rate)) if rate.to_bits() == hz.to_bits() && span.start <= last.end => {
                 last.end = span.end;
             }

@@ -1,6 +1,6 @@
-//! The mission as tidy tables, as CSV or Parquet: one description of their content, two ways to write it.
+//! The mission as tidy tables in CSV or Parquet, from one description of their contents.
 //!
-//! Column names are in snake case and reserved in no dialect of SQL; an empty cell is unknown.
+//! Column names are in snake case and not reserved in any SQL dialect; an empty cell is unknown.
 
 pub(crate) mod folder;
 mod mission;
@@ -20,7 +20,7 @@ use mission::{RowTaker, TABLES, Table};
 pub(crate) use writer::TableFormat;
 use writer::Writer;
 
-/// Whether several files can be made of this name.
+/// Checks whether several files can be derived from this name.
 ///
 /// # Errors
 /// [`Error::Usage`] for standard output, devices, and a name with `{n}`.
@@ -36,7 +36,7 @@ pub(crate) fn check(target: &Target) -> Result<()> {
     ))
 }
 
-/// The files of all tables in the format of this word.
+/// The files of all tables in the format of this name.
 pub(crate) fn files(target: &Target, word: &str) -> Vec<Target> {
     let file = |table: &Table| target.with_word(table.word, word);
     TABLES.iter().map(file).collect()
@@ -60,7 +60,7 @@ pub(crate) fn start<'a>(
             let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, has_runs, row);
             write(rows, (table.batch)(), &file, format)
         };
-        // All of them are whole before the first one gets its name.
+        // All of them are complete before the first one is renamed.
         let mut sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
         for sink in &mut sinks {
             sink.flush().map_err(sink.error())?;
@@ -73,7 +73,7 @@ pub(crate) fn start<'a>(
     })
 }
 
-/// Every table of a mission by its word, whole.
+/// All complete tables of a mission by name.
 #[cfg(feature = "arrow")]
 pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     let fill = |table: &Table| {
@@ -84,7 +84,7 @@ pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     TABLES.iter().map(fill).collect()
 }
 
-/// The number of rows that are gathered before they are written.
+/// The number of rows buffered before they are written.
 const MOST_ROWS: usize = 4096;
 
 fn write(

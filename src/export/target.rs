@@ -1,5 +1,4 @@
-//! The targets of outputs: names with window numbers, checked before anything is read, for files that appear whole or
-//! not at all.
+//! The targets of outputs: names with window numbers, checked before anything is read.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -15,12 +14,12 @@ pub(crate) const NUMBER: &str = "{n}";
 pub enum Target {
     /// Standard output (`-`).
     Stdout,
-    /// A file, or a file per window where the name holds `{n}`.
+    /// A file, or a file per window if the name contains `{n}`.
     Path(PathBuf),
 }
 
 impl Target {
-    /// Reads a target as the user writes it: `-`, `out/a.gif`, `frames/{n}.svg`; any name that a file may have.
+    /// Parses a target: `-`, `out/a.gif`, `frames/{n}.svg`; any file name.
     pub fn parse(text: impl AsRef<OsStr>) -> Self {
         match text.as_ref() {
             text if text == "-" => Self::Stdout,
@@ -28,7 +27,7 @@ impl Target {
         }
     }
 
-    /// The part of the name behind its last point, in lower case; `None` for standard output and names without one.
+    /// The extension in lower case; `None` for standard output and names without one.
     pub fn extension(&self) -> Option<String> {
         match self {
             Self::Stdout => None,
@@ -36,7 +35,7 @@ impl Target {
         }
     }
 
-    /// Whether its name holds `{n}`, so that every window gets a file.
+    /// Whether its name contains `{n}`, so that every window gets a file.
     pub fn is_numbered(&self) -> bool {
         self.path().to_string_lossy().contains(NUMBER)
     }
@@ -67,8 +66,8 @@ impl Target {
         }
     }
 
-    /// The same name with `word` before its extension, which is `format` where it has none: `x.csv` becomes
-    /// `x.edges.csv`, and so does `x`.
+    /// The same name with `word` before its extension, by default `format`: `x.csv` becomes `x.edges.csv`, and so does
+    /// `x`.
     #[must_use]
     pub fn with_word(&self, word: &str, format: &str) -> Self {
         match self {
@@ -107,7 +106,7 @@ impl Target {
             && same_file(folder_of(own), folder_of(path))
     }
 
-    /// Whether a file of this target may be one of the other's.
+    /// Whether files of both targets may be the same.
     pub(crate) fn may_meet(&self, other: &Self) -> bool {
         let (Self::Path(own), Self::Path(path)) = (self, other) else {
             return self == other;
@@ -130,14 +129,14 @@ impl Target {
     }
 }
 
-/// The parts of a name before its first `{n}` and behind its last.
+/// The parts of a name before its first `{n}` and after its last.
 fn around(name: &str) -> (&str, &str) {
     let before = name.split(NUMBER).next().unwrap_or_default();
     let after = name.rsplit(NUMBER).next().unwrap_or_default();
     (before, after)
 }
 
-/// The folder a path stands in: `.` for a bare name.
+/// The folder of a path: `.` for a bare name.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -145,15 +144,14 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether `path` is there and neither a file nor a folder: a device or a pipe, which is written in place.
+/// Whether `path` exists and is neither a file nor a folder: a device or a pipe, which is written in place.
 pub(crate) fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Whether two paths lead to the same place, or will once the folders in them are made.
+/// Whether two paths refer to the same file, or will once missing folders are created.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    /// The path without links and `..`: through folders that are there as the system goes, through others by their
-    /// names.
+    /// The path without links and `..`: resolved by the system for existing folders, by name for others.
     fn full(path: &Path) -> PathBuf {
         let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let mut full = PathBuf::new();
@@ -179,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_as_wide_as_the_last_one() {
+    fn numbers_are_zero_padded_to_the_last() {
         assert_eq!(numbered("f/{n}.svg", 7, 10), "f/7.svg");
         assert_eq!(numbered("f/{n}.svg", 7, 11), "f/07.svg");
         assert_eq!(numbered("a_{n}.png", 0, 1), "a_0.png");
@@ -187,14 +185,14 @@ mod tests {
     }
 
     #[test]
-    fn tables_get_a_word_before_their_extension() {
+    fn tables_get_their_name_before_the_extension() {
         let table = |name: &str| Target::parse(name).with_word("edges", "csv");
         assert_eq!(table("out/x.csv"), Target::parse("out/x.edges.csv"));
         assert_eq!(table("out/x"), Target::parse("out/x.edges.csv"));
     }
 
     #[test]
-    fn targets_with_numbers_meet_where_their_names_can() {
+    fn numbered_targets_collide_if_their_names_can() {
         let meet = |a: &str, b: &str| {
             let (a, b) = (Target::parse(a), Target::parse(b));
             assert_eq!(a.may_meet(&b), b.may_meet(&a));
@@ -213,7 +211,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn names_need_not_be_text() {
+    fn names_need_not_be_utf8() {
         use std::os::unix::ffi::OsStrExt as _;
         let name = OsStr::from_bytes(b"f\xff/{n}.svg");
         let first = Target::parse(name).numbered(3, 10);

@@ -1,11 +1,11 @@
-//! The lines that include a figure in `LaTeX`, written beside its picture.
+//! The `LaTeX` code that includes a figure, written beside its picture.
 
 use super::{Started, one_text};
 use crate::base::error::Error;
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
 
-/// Writes the lines.
+/// Writes the code.
 ///
 /// # Errors
 /// [`Error::Usage`] without a figure, and for a name with `{n}`.
@@ -16,7 +16,7 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     one_text(target, || latex.to_owned())
 }
 
-/// The error for lines without a figure.
+/// The error for `LaTeX` code without a figure.
 pub(crate) fn needs_figure(target: &Target) -> Error {
     Error::usage(
         format!("`{}` puts a figure into LaTeX", target.path().display()),

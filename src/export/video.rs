@@ -1,4 +1,4 @@
-//! The animation as video: frames through a pipe into `ffmpeg`, where that is on the path.
+//! The animation as video: frames are piped into `ffmpeg`, if it is in `PATH`.
 
 use std::io::{self, Read as _, Write as _};
 use std::path::PathBuf;
@@ -13,15 +13,15 @@ use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
-/// The finest step of time in milliseconds; frames are repeated to fill theirs.
+/// The finest time step in milliseconds; frames are repeated to fill their duration.
 const FINEST_MS: u32 = 20;
-/// The least number of frames per second; players have trouble with fewer.
+/// The lowest frame rate in frames per second; players have trouble with less.
 const FEWEST_PER_SECOND: f64 = 10.0;
 
 /// A kind of video: the container and the arguments of ffmpeg for it.
 pub(crate) struct VideoKind {
     arguments: &'static str,
-    /// Arguments of the container for a pipe, in which ffmpeg cannot go back.
+    /// Arguments of the container for a pipe, in which ffmpeg cannot seek.
     piped: &'static str,
 }
 
@@ -37,7 +37,7 @@ pub(crate) const WEBM: VideoKind = VideoKind {
 /// Whether ffmpeg can be run.
 ///
 /// # Errors
-/// [`Error::Output`] where it cannot, for the output at `target`.
+/// [`Error::Output`] if it cannot, for the output at `target`.
 pub(crate) fn check(target: &Target) -> Result<()> {
     let mut command = Command::new("ffmpeg");
     let command = command.arg("-version").stdin(Stdio::null());
@@ -62,12 +62,12 @@ struct Video<'a> {
     work: Option<FfmpegJob>,
 }
 
-/// A process that is ended when it is dropped.
+/// A process that is killed on drop.
 struct Process(Child);
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself, which is as good.
+        // It may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -78,12 +78,12 @@ struct FfmpegJob {
     child: Process,
     /// The pipe for frames.
     pipe: Option<ChildStdin>,
-    /// The thread that reads its messages meanwhile: a full pipe would stop it.
+    /// The thread that reads its messages, as a full pipe would block it.
     messages: Option<JoinHandle<Vec<u8>>>,
     sink: OutputSink,
     /// The length of one repetition in milliseconds.
     step: u32,
-    /// Milliseconds asked for and repetitions written so far.
+    /// Milliseconds requested and repetitions written so far.
     time: (u64, u64),
 }
 
@@ -124,13 +124,13 @@ impl Video<'_> {
         command.args(["-f", "rawvideo", "-pix_fmt", "rgba"]);
         command.args(["-s", &format!("{}x{}", self.size.0, self.size.1)]);
         command.args(["-framerate", &rate.to_string(), "-i", "pipe:0", "-an"]);
-        // Most players want even sides: the picture goes on in the colour of its corner.
+        // Most players require even sides: the picture is padded with the colour of its corner.
         let [r, g, b] = first.first_chunk().copied().unwrap_or([255; 3]);
         let pad = format!("pad=ceil(iw/2)*2:ceil(ih/2)*2:color=0x{r:02x}{g:02x}{b:02x}");
         // The filter, unlike `-r`, shows the last frame as long as the others.
         let fps = rate.max(FEWEST_PER_SECOND);
         command.args(["-vf", &format!("fps={fps},{pad}")]);
-        // No version and no time in the file: the same sequence gives the same bytes.
+        // No version and no time in the file, so output is deterministic.
         command.args("-fflags +bitexact -flags:v +bitexact -map_metadata -1".split(' '));
         command.args(self.kind.arguments.split(' '));
         match sink.handle()? {
@@ -142,7 +142,7 @@ impl Video<'_> {
                 command.args(piped).arg("pipe:1");
             }
         }
-        // An interrupt on the terminal is ours to handle: ffmpeg ends when its pipe does.
+        // We handle interrupts on the terminal: ffmpeg ends with its pipe.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
@@ -160,7 +160,7 @@ impl Video<'_> {
         })
     }
 
-    /// The error with the message of ffmpeg about its failure.
+    /// The error with ffmpeg's message.
     fn complaint(&self, work: &mut FfmpegJob) -> Error {
         drop(work.pipe.take());
         let _ = work.child.0.wait();
@@ -249,7 +249,7 @@ impl FfmpegJob {
 /// The end of the messages of a child process, read until it closes the pipe.
 fn last_messages(mut pipe: ChildStderr) -> Vec<u8> {
     let (mut said, mut buffer) = (Vec::new(), [0; 4096]);
-    // Whatever can be read helps; a failure to read changes nothing.
+    // Read errors are ignored, as partial messages still help.
     while let Ok(count) = pipe.read(&mut buffer)
         && count > 0
     {
@@ -260,7 +260,7 @@ fn last_messages(mut pipe: ChildStderr) -> Vec<u8> {
     said
 }
 
-/// The longest step that all times are multiples of, but not below [`FINEST_MS`].
+/// The greatest common divisor of all times, but at least [`FINEST_MS`].
 fn step(frame_times: &[FrameTime]) -> u32 {
     fn common(a: u32, b: u32) -> u32 {
         if b == 0 { a } else { common(b, a % b) }

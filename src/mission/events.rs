@@ -1,4 +1,4 @@
-//! The log of a mission: its ledger as lines for people, or as rows for programs. It does not depend on windows.
+//! The event log of a mission: its ledger as lines for people or rows for programs, independent of windows.
 
 mod sentence;
 
@@ -52,8 +52,8 @@ enum LogRow<'a> {
     Part(EntryId, &'a Entry),
 }
 
-/// The log of a mission; ends in a new line unless it is empty. Characters in names that would control a terminal or
-/// change the direction of text are written as escapes.
+/// The log of a mission; ends in a new line unless it is empty. Control and direction characters in names are
+/// escaped.
 pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String {
     if format == LogFormat::Text {
         return lines(mission, options)

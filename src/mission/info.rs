@@ -50,7 +50,7 @@ pub struct Info {
     pub topics_without_publisher: usize,
     /// The number of topics with messages and without a known subscriber, not counting the recorder.
     pub topics_without_subscriber: usize,
-    /// Each kind of evidence found, with the number of elements it proves.
+    /// Each kind of evidence found, with the number of elements that it supports.
     pub evidence: Vec<EvidenceInfo>,
     /// Topics, sorted by name.
     pub topics: Vec<TopicInfo>,
@@ -60,7 +60,7 @@ pub struct Info {
     pub advice: Vec<String>,
     /// The suitable figures for a paper, the best first.
     pub figures: Vec<FigureInfo>,
-    /// Edges that source code offers and that were not drawn, and remarks on the code; a line each.
+    /// Edges from source code that were not drawn, and remarks on the code; one per line.
     pub undrawn: Vec<String>,
     /// Problems that did not stop the reading.
     pub notices: Vec<String>,
@@ -167,11 +167,11 @@ pub struct NodeInfo {
     pub last_ns: Option<i64>,
     /// The number of topics that it publishes.
     pub publishes: usize,
-    /// The number of topics that it is known to subscribe.
+    /// The number of topics that it is known to subscribe to.
     pub subscribes: usize,
-    /// The number of messages that it sent, where publishers are known.
+    /// The number of messages that it sent, if publishers are known.
     pub sent: Option<u64>,
-    /// The number of messages on the topics that it is known to subscribe; `None` if there are none.
+    /// The number of messages on topics that it is known to subscribe to; `None` if there are none.
     pub received: Option<u64>,
 }
 
@@ -259,7 +259,7 @@ fn bags(mission: &Mission) -> Vec<BagInfo> {
     told.collect()
 }
 
-/// The word of the evidence for publishers that are counted, not named: the summary counts them with their topics.
+/// The name of the evidence for unnamed publishers, which the summary counts per topic.
 const UNNAMED: &str = "unknown";
 
 fn is_unnamed(evidence: Evidence) -> bool {
@@ -277,7 +277,7 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 
-/// The number of topics with messages to which none of these edges is known to lead.
+/// The number of topics with messages but none of these edges.
 fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
     let known = edges.filter(|edge| !edge.evidence.is_guess());
     let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();

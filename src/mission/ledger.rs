@@ -1,4 +1,5 @@
-//! The events of a mission, in continuous time: one list, made once on the full graph, before any window or view.
+//! The events of a mission, in continuous time: one list, made once from the full graph, independent of windows and
+//! views.
 //!
 //! It does not depend on windows. All outputs that show a change (chips, captions, marks, tables, pages, the log) read
 //! this.
@@ -26,10 +27,10 @@ use crate::mission::Window;
 pub(crate) use changes::{explain, places};
 pub(crate) use make::{LedgerInput, make, sorted};
 
-/// The most turns of a mission: as many as windows are chosen for it.
+/// The most reconfigurations of a mission: the limit of automatic windows.
 const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 
-/// An entry's place in [`Ledger::entries`].
+/// An entry's index in [`Ledger::entries`].
 pub type EntryId = u32;
 
 /// All events of a mission, and its phases.
@@ -50,11 +51,11 @@ pub type EntryId = u32;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Ledger {
-    /// Sorted by time, then kind, then name: the log never runs backwards.
+    /// Sorted by time, then kind, then name.
     pub entries: Vec<Entry>,
-    /// The interruptions of the recording, sorted by time: nothing that the robot did.
+    /// The interruptions of the recording, which are not actions of the robot, sorted by time.
     pub interruptions: Vec<Interruption>,
-    /// The phases, in order and without gaps; empty where they were not searched.
+    /// The phases, in order and without gaps; empty if not detected.
     pub phases: Vec<Phase>,
     /// Whether it is the comparison of a mission, B, with another, A: elements that started or appeared are only in B,
     /// elements that stopped or vanished only in A, and times have no meaning.
@@ -72,13 +73,14 @@ worded! {
         Stopped = "stopped",
         /// A node, or an anonymous role, was gone from [`Entry::time`] to [`Entry::until`] and is back.
         Restarted = "restarted",
-        /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a restart.
+        /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a
+        /// restart.
         Silent = "silent",
         /// A topic of unknown publisher, or an edge of a living node, began.
         Appeared = "appeared",
         /// A topic of unknown publisher, or an edge of a living node, ended.
         Vanished = "vanished",
-        /// A topic's messages come from other senders.
+        /// A topic's messages come from other publishers.
         HandedOver = "handed_over",
         /// A topic's or publication's rate changed.
         Rate = "rate",
@@ -88,7 +90,7 @@ worded! {
         Type = "type",
         /// A topic is offered with another quality of service.
         Qos = "qos",
-        /// A subscriber gets nothing over this edge: its quality of service asks for more than is offered.
+        /// A subscriber receives nothing over this edge: its quality of service requires more than is offered.
         Starved = "starved",
         /// Two nodes have the same name.
         Duplicate = "duplicate",
@@ -98,7 +100,7 @@ worded! {
 }
 
 impl Kind {
-    /// Whether it is a remark about the robot or the recorder, and no reconfiguration.
+    /// Whether it is a remark about the robot or the recorder, not a reconfiguration.
     pub(crate) fn is_remark(self) -> bool {
         matches!(self, Self::Starved | Self::Duplicate | Self::Lost)
     }
@@ -160,7 +162,7 @@ pub struct Entry {
     pub evidence: Evidence,
     /// The entry that this one is a part of: an edge of a node that started. Parts have no parts.
     pub part_of: Option<EntryId>,
-    /// Whether it is housekeeping or the recorder's, which is shown only when asked for.
+    /// Whether it is housekeeping or the recorder's, which is only shown on request.
     pub quiet: bool,
     /// The number of elements in it, itself and its parts, ≥ 1.
     pub weight: u32,
@@ -173,7 +175,7 @@ impl Entry {
     }
 }
 
-/// A place at which a recording does not simply go on.
+/// An interruption of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct Interruption {
@@ -190,7 +192,8 @@ worded! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     #[non_exhaustive]
     pub enum InterruptionKind {
-        /// The recorder's clock was set back, or simulated time began again: what follows is shown behind what came before.
+        /// The recorder's clock was set back, or simulated time restarted: what follows is shown after what came
+        /// before.
         ClockBack = "clock_back",
         /// Nothing was recorded: the recorder paused, or its clock was set ahead.
         Nothing = "nothing_recorded",
@@ -206,7 +209,7 @@ pub(crate) struct Switch {
     pub(crate) started: usize,
 }
 
-/// A stretch of the mission that one graph describes.
+/// A part of the mission with one configuration.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Phase {
@@ -214,19 +217,19 @@ pub struct Phase {
     pub span: Span,
     /// The name: the user's, or the elements that began in it: `+4 nodes: controller, costmap and 2 more`.
     pub name: Arc<str>,
-    /// The number of nodes (roles; topics where publishers are unknown) that are in it and were not in the phase
-    /// before; in the first phase, the number of all nodes.
+    /// The number of nodes (roles; topics if publishers are unknown) that are in it and not in the previous phase; in
+    /// the first phase, the number of all nodes.
     pub nodes_added: u32,
-    /// The number of nodes that were in the phase before and are not in this one.
+    /// The number of nodes that are in the previous phase and not in this one.
     pub nodes_removed: u32,
-    /// Whether it stands for many short phases in a row that only added or only removed.
+    /// Whether it combines many consecutive short phases that only add or only remove.
     pub is_ramp: bool,
-    /// The place of the earlier phase that has the same configuration.
+    /// The index of the earlier phase with the same configuration.
     pub same_as: Option<u32>,
 }
 
 impl Ledger {
-    /// The ledger from the changes between windows, where nothing finer is known.
+    /// The ledger from the changes between windows, if nothing more precise is known.
     pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
         from_changes::from_changes(elements, windows)
     }
@@ -240,7 +243,7 @@ impl Ledger {
         }
     }
 
-    /// Entries whose time lies in `span`, with their places, in order.
+    /// Entries with times in `span`, with their ids, in order.
     pub fn inside(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         let first = self.entries.partition_point(|e| e.time < span.start);
         let entries = self.entries.iter().enumerate().skip(first);
@@ -249,13 +252,12 @@ impl Ledger {
             .map(|(id, e)| (u32::try_from(id).unwrap_or(u32::MAX), e))
     }
 
-    /// The headlines whose time lies in `span`, in order.
+    /// The headlines with times in `span`, in order.
     pub fn headlines(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         self.inside(span).filter(|(_, e)| e.is_headline())
     }
 
-    /// The times at which the mission reconfigured inside `span`: the first headline of each run of them that are close
-    /// together.
+    /// The times of reconfigurations inside `span`: the first of each group of close headlines.
     pub fn turns(&self, span: Span) -> Vec<Stamp> {
         let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
         let mut turns = Vec::new();
@@ -269,7 +271,7 @@ impl Ledger {
         turns
     }
 
-    /// The switches of the robot to another mode: nodes that stop and others that start within a few seconds.
+    /// The robot's mode switches: nodes that stop and others that start within a few seconds.
     pub(crate) fn switches(&self) -> Vec<Switch> {
         let turns = self.entries.iter().filter(|e| e.is_headline());
         let turns = turns.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
@@ -293,7 +295,7 @@ impl Ledger {
         found
     }
 
-    /// The places of the parts of all entries, in order, by the places of those entries.
+    /// The ids of the parts of all entries, in order, by the ids of those entries.
     pub fn all_parts(&self) -> BTreeMap<EntryId, Vec<EntryId>> {
         let mut parts: BTreeMap<EntryId, Vec<EntryId>> = BTreeMap::new();
         for (id, entry) in (0..).zip(&self.entries) {

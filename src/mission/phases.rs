@@ -1,8 +1,8 @@
-//! Phases: parts of a mission that one graph describes, found by an optimal partition of its lives.
+//! Phases: parts of a mission with one configuration, detected by an optimal partition of lifetimes.
 //!
 //! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics do
-//! not cause boundaries, and the majority graph of a phase is the configuration that the mission was in. The result
-//! depends on the mission alone, never on `--period`.
+//! not cause boundaries, and the majority graph of a phase is its configuration. The result depends on the mission
+//! alone, never on `--period`.
 
 mod grid;
 mod name;
@@ -29,9 +29,9 @@ const AROUND: (i64, i64) = (6_000_000_000, 33);
 /// The configuration of a phase: its majority graph.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Configuration {
-    /// Nodes by role, topics by name where publishers are unknown: those that exist for at least half of the time.
+    /// Nodes by role, topics by name if publishers are unknown: those that exist for at least half of the time.
     pub(crate) names: BTreeSet<Arc<str>>,
-    /// Topics with a role that sends more than half of their messages.
+    /// Topics with the role that publishes more than half of their messages.
     pub(crate) senders: BTreeMap<TopicId, Arc<str>>,
 }
 
@@ -65,7 +65,7 @@ fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
     pairs.map(|(start, end)| Span::new(*start, end)).collect()
 }
 
-/// The phases for intervals chosen elsewhere, such as by the user, with the changes between them, by majority.
+/// The phases for given intervals, such as the user's, with the changes between them, by majority.
 pub(crate) fn of_spans(
     elements: &Elements,
     sending: &Sending,
@@ -125,7 +125,8 @@ fn senders(elements: &Elements, sending: &Sending, span: Span) -> BTreeMap<Topic
     main
 }
 
-/// The starts of phases: at the median of the exact starts and stops of the elements that differ, near the cell's start.
+/// The starts of phases: at the median of the exact starts and stops of the elements that differ, near the cell's
+/// start.
 fn boundaries(
     elements: &Elements,
     found: &[Configuration],

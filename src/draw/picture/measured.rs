@@ -217,7 +217,8 @@ impl Measurer<'_> {
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         if item.kind == ItemKind::Namespace {
-            let is_open = |other: &Item| other.kind == ItemKind::Node && other.cluster == item.cluster;
+            let is_open =
+                |other: &Item| other.kind == ItemKind::Node && other.cluster == item.cluster;
             name = match (&*item.name == inside, self.view.items.iter().any(is_open)) {
                 (true, true) => "all others".to_owned(),
                 (true, false) => "all nodes".to_owned(),
@@ -231,8 +232,8 @@ impl Measurer<'_> {
         }
     }
 
-    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; of one with rows, that of
-    /// the part above them.
+    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; of one with rows,
+    /// that of the part above them.
     fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
         let body = self.body(item);
         let width = self.fonts.width(&label.name, body.size, body.weight());

@@ -1,9 +1,9 @@
-//! The data for the script of a page: names, facts and runs as JSON, deflated where that is long.
+//! The data for the script of a page: names, facts and runs as JSON, deflated if long.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
-// A stream of DEFLATE, which every browser unpacks by itself.
+// A DEFLATE stream, which every browser can decompress.
 use flate2::{Compression, write::DeflateEncoder};
 use serde::Serialize;
 
@@ -30,12 +30,12 @@ const LONG: usize = 1_000_000;
 
 /// The data for the script, defined here alone; `player/data.js` reads it.
 ///
-/// Times are seconds since the start of the first window. An *element* is a number: items first, then arrows in the
-/// order in which they are painted, both of the graph with everything one by one unless said otherwise. A *run list*
-/// is `[windows since the run before, value, …]`; a value holds until the next.
+/// Times are seconds since the start of the first window. An *element* is a number: items first, then arrows in
+/// painting order, both of the fully expanded graph unless stated otherwise. A *run list* is `[windows since the
+/// previous run, value, …]`; a value applies until the next.
 #[derive(Serialize)]
 struct PageData<'a> {
-    /// The graph with every element one by one; then that of the picture, if that draws several elements as one.
+    /// The graph with all elements separately; then that of the picture, if it groups elements.
     graphs: Vec<GraphData<'a>>,
     /// The sentences that `facts` refer to.
     words: Vec<String>,
@@ -49,18 +49,18 @@ struct PageData<'a> {
     told: Vec<ToldData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
-    /// The life lines, from top to bottom.
+    /// The lifelines, from top to bottom.
     rows: Vec<RowData>,
-    /// Hand-overs: the time, the row before, the row after, and the event's place in the log.
+    /// Hand-overs: the time, the old row, the new row, and the event's index in the log.
     hands: Vec<(f64, usize, usize, EntryId)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
-    /// The titles of the two windows where two missions are compared; absent otherwise.
+    /// The titles of the two windows of a comparison; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     sides: Option<[&'static str; 2]>,
     /// The window to begin with.
     still: usize,
-    /// The least relative change of a rate that is reported.
+    /// The smallest relative change of a rate that is reported.
     change: f64,
 }
 
@@ -75,22 +75,22 @@ struct GraphData<'a> {
     boxes: Vec<[i64; 4]>,
     /// Per arrow: its ends, and the topic that it carries from node to node.
     arrows: Vec<(u32, u32, String)>,
-    /// Per element: places in `words`.
+    /// Per element: indices into `words`.
     facts: Vec<Vec<u32>>,
-    /// Class words of values of run lists.
+    /// Class names of values of run lists.
     classes: &'a [String],
-    /// Rates and lifecycle states, and changes of rates, as they are written.
+    /// Rates, lifecycle states, and rate changes as text.
     labels: &'a [String],
-    /// Per element, run lists: of classes, of rates, of lifecycle states, and of changes of rates, whose values hold
-    /// for one window. Empty lists at the end are left out.
+    /// Per element, run lists: of classes, of rates, of lifecycle states, and of rate changes, whose values apply to
+    /// one window. Empty lists at the end are left out.
     lives: Vec<&'a ElementRuns>,
-    /// Per item of the picture: the items it stands for.
+    /// Per item of the picture: its members.
     holds: Vec<Vec<u32>>,
 }
 
-/// The headlines of a window, and what is back in it: its place, the number of headlines, the words of the three chips, and for each of the
-/// first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1 for one that is not
-/// drawn), its words, its place in the log.
+/// The headlines of a window, and what is back in it: its place, the number of headlines, the words of the three chips,
+/// and for each of the first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1
+/// for one that is not drawn), its words, its place in the log.
 #[derive(Serialize)]
 struct ToldData(
     usize,
@@ -99,13 +99,13 @@ struct ToldData(
     Vec<(f64, u8, i64, String, EntryId)>,
 );
 
-/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end, 1 by
-/// inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as their
-/// times, signs and places in the log.
+/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end, 1
+/// by inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as
+/// their times, signs and places in the log.
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EntryId)>);
 
-/// The largest number of headlines of one window that are written out.
+/// The most headlines of one window that are listed.
 const MOST_TOLD: usize = 200;
 
 /// The data as JSON that is safe between the tags of a page.
@@ -151,24 +151,24 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         change: page.sequence.unfolded.map_or(0.25, |u| u.rate_change),
     };
     let json = serde_json::to_string(&data).unwrap_or_default();
-    // A number of whole seconds needs no point.
+    // Whole seconds need no decimal point.
     json.replace(".0,", ",")
         .replace(".0]", "]")
         .replace('<', "\\u003c")
 }
 
-/// A moment from which seconds are counted.
+/// The origin of times in seconds.
 #[derive(Clone, Copy)]
 struct PageClock(Stamp);
 
 impl PageClock {
-    /// The seconds from that moment to `at`, rounded down to whole milliseconds, as everywhere.
+    /// The seconds from the origin to `at`, rounded down to milliseconds, as everywhere.
     fn secs(self, at: Stamp) -> f64 {
         at.since(self.0).div_euclid(1_000_000) as f64 / 1e3
     }
 }
 
-/// The element that stands for each node, topic and edge.
+/// The element that represents each node, topic and edge.
 fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
     let mut places = BTreeMap::new();
     let items = drawn.view.items.iter().map(|item| &item.members);
@@ -352,7 +352,7 @@ fn rounded(rect: Rect) -> [i64; 4] {
     [whole(rect.x), whole(rect.y), whole(rect.w), whole(rect.h)]
 }
 
-/// A table of sentences, each once.
+/// A table of unique sentences.
 #[derive(Default)]
 struct Words {
     list: Vec<String>,
@@ -371,7 +371,7 @@ impl Words {
     }
 }
 
-/// The largest number of members that are named; more are only counted.
+/// The most members that are listed; the rest is counted.
 const MOST_MEMBERS: usize = 12;
 
 fn facts_of(

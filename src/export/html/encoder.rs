@@ -1,4 +1,4 @@
-//! The mission as one page that plays it.
+//! The encoder of the page.
 
 use crate::draw::picture::Union;
 use crate::draw::style::{BUILTIN, Style};
@@ -16,7 +16,7 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     one_text(target, move || page(sequence, &style))
 }
 
-/// The page with every element one by one, and with the picture where that folds something.
+/// The page with all elements separately, and with the picture if it groups elements.
 fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     let overview = sequence.picture.overview();
     let opened = sequence
@@ -29,13 +29,13 @@ fn page(sequence: &Sequence<'_>, style: &Style) -> String {
         Some(_) => (opened, picture),
         None => (picture, None),
     };
-    // Whoever chose a style gets it always; the default one has a dark side.
+    // A chosen style is always used; the default one has a dark variant.
     let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
     let board = overview.as_ref().map_or("", |o| &o.title);
     let title = sequence.picture.title().unwrap_or(board);
     let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
-    // The timeline of topics has a row for each, whatever a graph would draw as one.
+    // The timeline of topics has a row for each, even if a graph would group them.
     let each = sequence.unfolded.map_or(sequence.view, |u| u.view);
     let page = HtmlPage {
         sequence,

@@ -1,4 +1,4 @@
-//! The signs of a page: its badges, and the legend of all that occur.
+//! The signs of a page: its badges, and the legend of those that occur.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ const MARKS: [Mark; 9] = [
     Mark::Inside,
 ];
 
-/// Writes the definitions of all badges, for a comparison of two windows may need one that no window shows.
+/// Writes the definitions of all badges, as a comparison of two windows may need one that no window shows.
 pub(super) fn badges(xml: &mut Xml, style: &Style) {
     xml.open("defs");
     for mark in MARKS {

@@ -1,4 +1,4 @@
-//! The changes as a table of HTML, for readers without scripts, for paper, and for links into the mission.
+//! The changes as an HTML table, for readers without scripts, for printing, and for links into the mission.
 
 use crate::base::words;
 use crate::base::words::visible;
@@ -6,17 +6,17 @@ use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
 use crate::view::{Frame, View};
 
-/// The largest number of windows with changes that have a row; more are only counted.
+/// The most windows with changes that have a row; the rest is counted.
 const MOST_ROWS: usize = 200;
 
-/// The largest number of phrases that are written out in one row; the rest is counted.
+/// The most phrases in one row; the rest is counted.
 const MOST_PHRASES: usize = 5;
 
 fn is_told(frame: &Frame) -> bool {
     !frame.headlines.is_empty()
 }
 
-/// The number of windows, and of those with changes, in words.
+/// The number of windows, and of those with changes, as text.
 pub(super) fn summary(view: &View) -> String {
     let all = view.frames.len();
     if view.compares {

@@ -1,11 +1,11 @@
-//! Payloads as CDR writes them (OMG DDSI-RTPS 2.5, section 10): little-endian, each number aligned to its size.
+//! Writes payloads in CDR (OMG DDSI-RTPS 2.5, section 10): little-endian, each number aligned to its size.
 
 use crate::base::time::Stamp;
 
-/// The number of bytes before the payload, from behind which alignment counts.
+/// The number of header bytes, which do not count for alignment.
 const HEAD: usize = 4;
 
-/// A payload being written.
+/// A payload in progress.
 pub(super) struct CdrWriter(Vec<u8>);
 
 impl CdrWriter {
@@ -40,7 +40,7 @@ impl CdrWriter {
         self.u8(0);
     }
 
-    /// `builtin_interfaces/Time`; what does not fit into 32 bits is the last second.
+    /// `builtin_interfaces/Time`; seconds saturate at 32 bits.
     pub(super) fn time(&mut self, time: Stamp) {
         const SECOND: i64 = 1_000_000_000;
         self.u32(u32::try_from(time.0.div_euclid(SECOND)).unwrap_or(u32::MAX));

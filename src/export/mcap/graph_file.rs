@@ -1,4 +1,4 @@
-//! The file of graphs while it is written: `/rosgraph` with a message per graph and `/bagreel/events` with a line per event.
+//! Writes the file of graphs: `/rosgraph` with a message per graph and `/bagreel/events` with a line per event.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
@@ -24,7 +24,7 @@ pub(crate) struct GraphFile<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> GraphFile<W> {
-    /// Begins a file, whose messages are compressed in chunks, or else stand there as soon as they are flushed.
+    /// Begins a file with messages in compressed chunks, or readable as soon as they are flushed.
     ///
     /// # Errors
     /// Where it cannot be written; this holds for all that follow.
@@ -38,7 +38,7 @@ impl<W: Write + Seek> GraphFile<W> {
             channels: Vec::new(),
             sequence: 0,
         };
-        // The node tells our own reader that these topics are not the robot's.
+        // Our own reader recognizes by the node that these topics are not the robot's.
         let metadata = BTreeMap::from([("callerid".to_owned(), OWN_NODE.to_owned())]);
         for (topic, kind, definition) in CHANNELS {
             let schema = (kind, "ros2msg", definition());
@@ -76,7 +76,7 @@ impl<W: Write + Seek> GraphFile<W> {
         written.map_err(io::Error::other)
     }
 
-    /// Makes what was written visible to others.
+    /// Makes the written data visible to other processes.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.to.flush().map_err(io::Error::other)
     }
@@ -109,7 +109,7 @@ pub(crate) struct GraphEnd<'a> {
     pub(crate) name: &'a str,
     /// Its type; empty if unknown.
     pub(crate) kind: &'a str,
-    /// The quality of service that is offered, in words.
+    /// The offered quality of service, as text.
     pub(crate) qos: Option<&'a str>,
 }
 
@@ -158,7 +158,7 @@ fn interface(cdr: &mut CdrWriter, kind: &str) {
     cdr.bytes(&[0; 32]);
 }
 
-/// A quality of service as far as its words say; the rest is unknown.
+/// A quality of service from its text; the rest is unknown.
 fn quality(cdr: &mut CdrWriter, words: Option<&str>) {
     let words: Vec<&str> = words.unwrap_or_default().split([' ', ',']).collect();
     let place = |known: [&str; 2]| {

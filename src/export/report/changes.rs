@@ -1,4 +1,4 @@
-//! The changes with their times, in full names: a row per window, and a row per phase.
+//! The changes with their times, with full names: a row per window, and a row per phase.
 
 use super::escape::plain;
 use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, tables};
@@ -9,19 +9,19 @@ use crate::mission::events::sentence_with;
 use crate::mission::ledger::Kind;
 use crate::view::{Frame, Headline, View};
 
-/// The largest number of names given of things of one kind.
+/// The most names listed per kind.
 const MOST_NAMES: usize = 12;
-/// The largest number of things of a window that are reported one by one.
-const MOST_TOLD: usize = 12;
+/// The most events of a window that are listed separately.
+const MOST_LISTED: usize = 12;
 
-/// The phases, folded; nothing where there is only one.
+/// The phases, collapsed; nothing if there is only one.
 pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
     let phases = &mission.ledger.phases;
     if phases.len() < 2 {
         return String::new();
     }
     let rows = phases.iter().zip(1..).map(|(phase, n)| {
-        let from = times.told(phase.span.start);
+        let from = times.changes_of(phase.span.start);
         let long = words::duration(phase.span.nanos());
         format!("| {n} | {from} | {long} | {} |\n", plain(&phase.name))
     });
@@ -30,12 +30,12 @@ pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
     table.map_or(String::new(), |table| tables::folded(&summary, &table))
 }
 
-/// The windows with changes; those beyond the first are folded.
+/// The windows with changes; those beyond the first ones are collapsed.
 pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> String {
     let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
-        let what = told(mission, frame);
-        format!("| {} | {what} |\n", times.told(frame.span.start))
+        let what = changes_of(mission, frame);
+        format!("| {} | {what} |\n", times.changes_of(frame.span.start))
     });
     let rows: Vec<String> = rows.collect();
     let (open, rest) = rows.split_at(rows.len().min(MOST_OPEN));
@@ -51,7 +51,7 @@ pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> 
     out
 }
 
-/// The kinds of headlines of which several are reported together, with their words.
+/// The kinds of headlines that are grouped, with their labels.
 const TOGETHER: [(Kind, &str, &str); 5] = [
     (Kind::Started, "node", "started"),
     (Kind::Stopped, "node", "stopped"),
@@ -61,7 +61,7 @@ const TOGETHER: [(Kind, &str, &str); 5] = [
 ];
 
 /// The changes of a window as Markdown: `2 nodes started: /a, /b; /t handed over: /a → /b`.
-fn told(mission: &Mission, frame: &Frame) -> String {
+fn changes_of(mission: &Mission, frame: &Frame) -> String {
     let elements = &mission.elements;
     let mut parts = Vec::new();
     for (kind, word, what) in TOGETHER {
@@ -75,17 +75,17 @@ fn told(mission: &Mission, frame: &Frame) -> String {
         }
     }
     let rest: Vec<&Headline> = frame.headlines.iter().filter(|h| !is_together(h)).collect();
-    for headline in rest.iter().take(MOST_TOLD) {
+    for headline in rest.iter().take(MOST_LISTED) {
         let entry = mission.ledger.entries.get(headline.entry as usize);
         parts.extend(entry.map(|entry| plain(&sentence_with(mission, &[], entry))));
     }
-    if rest.len() > MOST_TOLD {
-        parts.push(format!("and {} more", rest.len() - MOST_TOLD));
+    if rest.len() > MOST_LISTED {
+        parts.push(format!("and {} more", rest.len() - MOST_LISTED));
     }
     parts.join("; ")
 }
 
-/// Whether headlines of this kind are reported together; topics of unknown publishers come and go by themselves.
+/// Whether headlines of this kind are grouped; topics of unknown publishers appear and vanish separately.
 fn is_together(headline: &Headline) -> bool {
     let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
     kinds && !matches!(headline.what, Element::Topic(_))

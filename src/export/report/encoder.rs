@@ -1,4 +1,4 @@
-//! The report in Markdown: a file of its own, or at the end of one that a job collects.
+//! The report in Markdown: a separate file, or appended to a job's summary.
 
 use crate::base::{budget, file};
 use crate::export::report::report;

@@ -1,13 +1,13 @@
-//! Words from a bag escaped for Markdown, so that they make no markup, no HTML, no mention and no link.
+//! Escapes texts from a bag for Markdown, so that they create no markup, HTML, mentions or links.
 
 use std::fmt::Write as _;
 
 use crate::base::words::visible;
 
-/// The largest number of characters of a text; a longer one is cut, so that one hostile name cannot fill a report.
+/// The most characters of a text; a longer one is cut, so that one hostile name cannot fill a report.
 const LONGEST: usize = 600;
 
-/// `text` as it is, in one line of Markdown or a cell of a table.
+/// `text` verbatim, in one line of Markdown or a cell of a table.
 pub(crate) fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     let shown = visible(text);
@@ -17,11 +17,11 @@ pub(crate) fn plain(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '&' => out.push_str("&amp;"),
-            // A blank of no width keeps these from becoming a mention or a reference.
+            // A zero-width space prevents a mention or a reference.
             '@' | '#' => {
                 let _ = write!(out, "&#{};&#8203;", u32::from(c));
             }
-            // What would become a link by itself.
+            // Prevents automatic links.
             ':' if chars.peek() == Some(&'/') => out.push_str("&#58;"),
             '.' if out.to_ascii_lowercase().ends_with("www") => out.push_str("&#46;"),
             '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '~' | '$' | '!' => {
@@ -37,7 +37,7 @@ pub(crate) fn plain(text: &str) -> String {
     out
 }
 
-/// A name in a cell of a table: as code where it is made of harmless characters.
+/// A name in a cell of a table: as code if it only has harmless characters.
 pub(crate) fn code(name: &str) -> String {
     let harmless = |c: char| c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | '~' | ':');
     let is_name = !name.is_empty() && name.len() <= LONGEST && name.chars().all(harmless);
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_bring_no_markup() {
+    fn names_create_no_markup() {
         let text = plain("<img src=x onerror=alert(1)> **@you** #12 [a](http://b) |x| www.c.d\n");
         assert_eq!(
             text,

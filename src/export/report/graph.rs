@@ -9,9 +9,9 @@ const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
 
-/// Every element that changed during the mission with those it is connected to, as one window, and the number of edges
-/// left out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or only
-/// at the start, else changed if it ever was.
+/// Every element that changed during the mission with its neighbours, as one window, and the number of edges left out;
+/// `None` without changes. An element is marked as added or removed if it exists only at the end or only at the start,
+/// else as changed if it ever was.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
     let items = fates(&view.items_shown, last);
@@ -45,7 +45,7 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
         .iter()
         .filter(|(_, s)| s.mark.is_some())
         .map(|(id, _)| *id);
-    // A box whose edges found no room would look like one that has none.
+    // A box whose edges are left out would look unconnected.
     let linked: BTreeSet<u32> = view.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
     for id in changed_items.filter(|id| !linked.contains(id)) {
         if boxes.len() < MOST_ITEMS {
@@ -65,7 +65,7 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     Some((seen, left_out))
 }
 
-/// The outcome of each element up to the window at place `last`: its last state, with a mark for the whole mission.
+/// The outcome of each element up to window `last`: its last state, with a mark for the whole mission.
 fn fates(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
     let fates = all.iter().filter_map(|showing| fate(showing, last));
     fates.map(|shown| (shown.id, shown)).collect()

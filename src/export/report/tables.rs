@@ -1,4 +1,4 @@
-//! The tables of a report, each cut where it would become too long.
+//! The tables of a report, cut at a maximum length.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::mission::Mission;
 use crate::mission::info::{how_many, info};
 use crate::view::View;
 
-/// A table of these rows, of at most `most` bytes; a last line tells how many rows were cut. `None` without rows.
+/// A table of these rows, of at most `most` bytes; a last line states how many rows were cut. `None` without rows.
 pub(super) fn table(
     heads: &[&str],
     rows: impl Iterator<Item = String>,
@@ -39,7 +39,7 @@ pub(super) fn table(
     (out.len() > empty).then_some(out)
 }
 
-/// Text that opens on a click.
+/// Collapsible text.
 pub(super) fn folded(summary: &str, inside: &str) -> String {
     format!(
         "<details><summary>{summary}</summary>\n\n{}\n\n</details>\n\n",
@@ -80,7 +80,7 @@ fn seen(mission: &Mission, first: Option<Stamp>, last: Option<Stamp>) -> String 
     }
 }
 
-/// The words of its evidence, without those that hold of every element.
+/// The kinds of its evidence, without those common to all elements.
 fn words(evidence: Evidence) -> String {
     let words = evidence.words().filter(|word| *word != "rosout_rule");
     words.collect::<Vec<_>>().join(", ")

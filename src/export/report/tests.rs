@@ -3,7 +3,7 @@ use crate::view::testing::mission;
 use crate::view::{ViewOptions, view};
 
 #[test]
-fn the_first_line_says_it_all() {
+fn the_first_line_is_a_summary() {
     let (view, _) = view(
         &mission(&["/a>/t@2", "/a>/t@2 /b</t", "/a>/t@2"]),
         &ViewOptions::default(),
@@ -40,7 +40,7 @@ fn only_what_changed_and_its_neighbours_are_drawn() {
 }
 
 #[test]
-fn long_tables_say_what_they_leave_out() {
+fn long_tables_state_what_is_left_out() {
     let rows = (0..100).map(|n| format!("| {n} |\n"));
     let text = tables::table(&["N"], rows, 60).unwrap();
     assert!(

@@ -1,5 +1,5 @@
-//! The cores that draw: each draws rows of frames that follow each other and makes packets of them at once, so that
-//! only frames in flight take memory, however many windows there are.
+//! The drawing threads: each draws runs of consecutive frames and encodes them immediately, so that only frames in
+//! flight take memory, independent of the number of windows.
 
 use std::ops::{ControlFlow, Range};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -15,21 +15,21 @@ use crate::export::palette::{Census, Matcher, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::{DrawnFrame, Needs, Pack, Packet};
 
-/// The largest number of bytes of packets that wait to be written.
+/// The most bytes of queued packets.
 const MOST_BYTES: f64 = 48e6;
-/// The largest number of frames drawn in a row: enough that little is drawn twice where rows meet, few enough that
-/// progress is seen.
+/// The most frames in a row: enough that little is drawn twice at the ends of rows, few enough that progress is
+/// visible.
 const MOST_IN_A_ROW: usize = 8;
-/// Rows per core that are not written yet: one being drawn, one that waits.
+/// Unwritten rows per core: one in progress, one queued.
 const ROWS_AHEAD: usize = 2;
-/// The largest number of frames that a palette is made from: some of those with a change, some of all.
+/// The most frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
 
-/// The data that an output needs of every frame.
+/// The data that an output needs for every frame.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameWant {
     pub(crate) needs: Needs,
-    /// Whether it is given staged frames too.
+    /// Whether it receives staged frames too.
     pub(crate) plays: bool,
     pub(crate) pack: Pack,
     /// Bytes of a packet per pixel, at most.
@@ -39,7 +39,7 @@ pub(crate) struct FrameWant {
 /// A frame, drawn and packed.
 pub(crate) struct Packed {
     pub(crate) frame_time: FrameTime,
-    /// Its size in pixels; 0 where no output needs pixels.
+    /// Its size in pixels; 0 if no output needs pixels.
     pub(crate) size: (u32, u32),
     /// A packet per output.
     pub(crate) packets: Vec<Packet>,
@@ -82,10 +82,10 @@ impl<'a> RasterPool<'a> {
         &self.palette
     }
 
-    /// Draws all frames and gives them to `take`, row by row in order, until it breaks off.
+    /// Draws all frames and passes them to `take`, row by row in order, until it cancels.
     ///
     /// # Errors
-    /// Where a frame cannot be drawn or packed, and the errors of `take`.
+    /// If a frame cannot be drawn or encoded, and the errors of `take`.
     pub(crate) fn run(
         &self,
         mut take: impl FnMut(Vec<Packed>) -> Result<ControlFlow<()>>,
@@ -93,13 +93,13 @@ impl<'a> RasterPool<'a> {
         let rows = self.rows();
         let cores = rayon::current_num_threads().min(rows.len());
         thread::scope(|scope| {
-            // Dropping the receivers, however this ends, ends those who draw.
+            // Dropping the receivers, in any case, ends the drawing threads.
             let drawn: Vec<Receiver<Result<Vec<Packed>>>> = (0..cores)
                 .map(|core| {
                     let (send, receive) = sync_channel(ROWS_AHEAD - 1);
                     let own = rows.iter().skip(core).step_by(cores);
                     scope.spawn(move || {
-                        let mut artist = Artist::new(self);
+                        let mut artist = Drawer::new(self);
                         for row in own {
                             if send.send(artist.row(row.clone())).is_err() {
                                 return;
@@ -110,7 +110,7 @@ impl<'a> RasterPool<'a> {
                 })
                 .collect();
             for at in 0..rows.len() {
-                // A core that gave up has told why before.
+                // A thread that ended has reported its error before.
                 let Ok(row) = drawn[at % cores].recv() else {
                     break;
                 };
@@ -133,7 +133,7 @@ impl<'a> RasterPool<'a> {
         let fits =
             |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * density <= MOST_BYTES;
         let most = (1..=MOST_IN_A_ROW).rev().find(fits).unwrap_or(1);
-        // As many rows for each core, so that none waits for the last.
+        // Equally many rows per core, so that none waits for the last.
         let rows = count.div_ceil(most * cores).max(1) * cores;
         let each = count.div_ceil(rows).max(1);
         let starts = (0..count).step_by(each);
@@ -175,18 +175,18 @@ impl<'a> RasterPool<'a> {
     }
 }
 
-/// One core that draws.
-struct Artist<'a> {
+/// A drawing thread.
+struct Drawer<'a> {
     pool: &'a RasterPool<'a>,
     canvas: Canvas<'a>,
     matcher: Matcher<'a>,
-    /// The place of the frame on the canvas.
+    /// The index of the frame on the canvas.
     at: Option<usize>,
     indices: Vec<u8>,
     before: Vec<u8>,
 }
 
-impl<'a> Artist<'a> {
+impl<'a> Drawer<'a> {
     fn new(pool: &'a RasterPool<'a>) -> Self {
         Self {
             pool,
@@ -198,7 +198,7 @@ impl<'a> Artist<'a> {
         }
     }
 
-    /// Draws frames that follow each other, and the one before them where another core did and it is needed.
+    /// Draws consecutive frames, and the one before them if it is needed and another thread drew it.
     fn row(&mut self, row: Range<usize>) -> Result<Vec<Packed>> {
         if let Some(before) = row.start.checked_sub(1)
             && self.at != Some(before)
@@ -279,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_holds_both_ends() {
+    fn a_spread_includes_both_ends() {
         let all: Vec<usize> = (0..100).collect();
         assert_eq!(spread(&all, 4), [0, 33, 66, 99]);
         assert_eq!(spread(&all[..3], 4), [0, 1, 2]);

@@ -1,21 +1,21 @@
-//! `--max-bytes`: gives up staged frames, then size, then windows, until an animation is small enough.
+//! `--max-bytes`: drops staged frames, then resolution, then windows, until an animation is small enough.
 
 use super::{Progress, Steps, pass};
 use crate::base::error::{Error, Result};
 use crate::export::sequence::{Sequence, SequenceOptions};
 use crate::export::{Output, Written};
 
-/// Sizes that are tried while all windows are shown.
+/// Scales that are tried while all windows are shown.
 const SCALES: [f64; 4] = [0.85, 0.7, 0.6, 0.5];
-/// The steps from one window that is shown to the next, at the last of these sizes.
+/// Steps between shown windows that are tried, at the smallest of these scales.
 const EVERY: [usize; 4] = [2, 3, 5, 10];
-/// Sizes that are tried when only changes are shown.
+/// Scales that are tried when only changes are shown.
 const LAST_SCALES: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
 
-/// Writes `output` within `max_bytes`; a remark says what was given up.
+/// Writes `output` within `max_bytes`; a remark reports what was dropped.
 ///
 /// # Errors
-/// [`Error::Output`] where nothing is small enough; otherwise as [`super::run`].
+/// [`Error::Output`] if nothing is small enough; otherwise as [`super::run`].
 pub(crate) fn fit(
     sequence: &Sequence<'_>,
     output: &Output,
@@ -69,7 +69,7 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
     steps
 }
 
-/// The things that `now` lacks of `asked`, in words.
+/// What was dropped between `asked` and `now`, as text.
 fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
     if now.tween < asked.tween {
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_given_up_is_said() {
+    fn reductions_are_reported() {
         let asked = SequenceOptions {
             tween: 4,
             max_bytes: Some(5000),

@@ -1,4 +1,4 @@
-//! The time of drawing: the time of each step, summed over all cores.
+//! Drawing times: the time of each step, summed over all cores.
 
 use crate::base::words::worded;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,11 +8,11 @@ worded! {
     /// A step from a window to written bytes.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub(crate) enum RunStep {
-        /// The drawing of a window is put together.
+        /// The drawing of a window is composed.
         Compose = "composing",
-        /// It is turned into pixels.
+        /// It is rasterized.
         Paint = "painting",
-        /// Pixels become places in the palette.
+        /// Pixels are mapped to palette indices.
         Colours = "colours",
         /// They are compressed.
         Compress = "compressing",
@@ -26,7 +26,7 @@ worded! {
 pub struct Steps([AtomicU64; RunStep::ALL.len()]);
 
 impl Steps {
-    /// Does the work and counts its time.
+    /// Runs the work and adds its time.
     pub(crate) fn time<T>(&self, step: RunStep, work: impl FnOnce() -> T) -> T {
         let begun = Instant::now();
         let done = work();
@@ -35,7 +35,7 @@ impl Steps {
         done
     }
 
-    /// The word of each step and its share of all of them, 0..=1, the largest first; empty if no time was spent.
+    /// The name of each step and its share of the total, 0..=1, largest first; empty if no time was spent.
     pub fn shares(&self) -> Vec<(&'static str, f64)> {
         let spent = |step: &RunStep| self.0[*step as usize].load(Ordering::Relaxed);
         let all: u64 = RunStep::ALL.iter().map(spent).sum();
@@ -54,7 +54,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn the_largest_step_comes_first_and_all_are_one() {
+    fn shares_are_sorted_and_add_up_to_one() {
         let steps = Steps::default();
         assert!(steps.shares().is_empty());
         steps.time(RunStep::Paint, || sleep(Duration::from_millis(1)));

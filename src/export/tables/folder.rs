@@ -1,4 +1,4 @@
-//! A folder of tables while they are written: hidden until all of them are whole, with few files open at a time.
+//! A folder of tables in progress: hidden until all of them are complete, with few files open at a time.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -10,33 +10,33 @@ use tempfile::TempDir;
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// Files that appear together in a folder. Dropped without [`Folder::commit`], they leave no trace.
+/// Files that appear together in a folder. Dropped without [`Folder::commit`], they are removed.
 #[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
     hidden: TempDir,
     /// The guard that removes the hidden folder when a signal ends the process.
     _left: Leftover,
-    /// Dropped after the hidden folder, which stands inside it.
+    /// Dropped after the hidden folder inside it.
     _made: Made,
     names: Vec<String>,
 }
 
-/// Folders that were made for the files, the outermost first. Those still empty when it is dropped are removed.
+/// Folders created for the files, the outermost first. Those still empty on drop are removed.
 #[derive(Debug)]
 struct Made(Vec<PathBuf>);
 
 impl Drop for Made {
     fn drop(&mut self) {
         for folder in self.0.iter().rev() {
-            // Fails where files have appeared, as it should.
+            // Fails for folders with files, as intended.
             let _ = fs::remove_dir(folder);
         }
     }
 }
 
 impl Folder {
-    /// Files that will appear in the folder `path`, which is made if it is not there.
+    /// Files that will appear in the folder `path`, which is created if missing.
     ///
     /// # Errors
     /// Where the system refuses.
@@ -62,14 +62,14 @@ impl Folder {
         })
     }
 
-    /// A new file that will have the name `name`, which no other one has.
+    /// A new file with the unique name `name`.
     pub(crate) fn file(&mut self, name: String) -> Part {
         let path = self.hidden.path().join(&name);
         self.names.push(name);
         Part(path)
     }
 
-    /// Gives all files their names, replacing those that were there.
+    /// Renames all files, replacing existing ones.
     ///
     /// # Errors
     /// Where the system refuses.
@@ -83,8 +83,8 @@ impl Folder {
     }
 }
 
-/// One of its files. It is open only while bytes are added, since a bag may have more topics than a process may have
-/// files; write much at a time.
+/// One of its files. It is only open while bytes are added, as a bag may have more topics than a process may have open
+/// files; write large blocks.
 #[derive(Debug)]
 pub(crate) struct Part(PathBuf);
 
@@ -100,11 +100,12 @@ impl Write for Part {
     }
 }
 
-/// The longest name of a file, in bytes, that every system takes, its ending left out.
+/// The longest file name without extension, in bytes, that every system supports.
 const LONGEST: usize = 200;
 
 /// The name of a topic's file: `/base/scan` is `base.scan`. A character that is neither letter, digit, `_` nor `-` is
-/// written as its bytes, `%2E`, so that no name leaves the folder; different topics differ but for the slash in front.
+/// written as its bytes, `%2E`, so that no name leaves the folder; different topics have different names, except for a
+/// leading slash.
 pub(crate) fn file_stem(topic: &str) -> String {
     let mut stem = String::new();
     for byte in topic.strip_prefix('/').unwrap_or(topic).bytes() {
@@ -118,7 +119,7 @@ pub(crate) fn file_stem(topic: &str) -> String {
         }
     }
     stem.truncate(LONGEST);
-    // Neither hidden nor without a name.
+    // Neither hidden nor empty.
     if stem.is_empty() || stem.starts_with('.') {
         stem.insert(0, '_');
     }

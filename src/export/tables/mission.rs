@@ -1,4 +1,4 @@
-//! The tables of a mission: their columns, each with its cell, and the rows they are made of.
+//! The tables of a mission: their columns, each with its cell, and their rows.
 
 use super::seen::{Seen, edges, nodes, topics};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
@@ -11,8 +11,8 @@ use crate::mission::ledger::{Detail, Entry};
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
-/// A table: its word in the file's name, an empty batch of it, and the function that fills it, by runs of equal windows
-/// where that is asked for and it is about windows.
+/// A table: its name in the file's name, an empty batch, and the function that fills it, by runs of equal windows if
+/// requested and applicable.
 pub(super) struct Table {
     pub(super) word: &'static str,
     pub(super) batch: fn() -> Batch,
@@ -73,7 +73,7 @@ fn put<R>(mission: &Mission, columns: &[Column<R>], one: &R, row: RowTaker<'_>) 
     row(&cells);
 }
 
-/// The columns of one table about elements, of those that all such tables have in common.
+/// The columns of a table of elements, including those common to all such tables.
 macro_rules! of_elements {
     ($($column:ident)*) => { &[$($column),*] };
 }

@@ -1,5 +1,5 @@
-//! An element in each window, or with `--runs` in each run of windows in which it is the same: what the tables of
-//! elements are made of.
+//! The rows of tables of elements: an element in each window, or with `--runs` in each run of windows in which it does
+//! not change.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -111,7 +111,7 @@ pub(super) fn edges(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
     }
 }
 
-/// Neighbouring windows in which an element has one state, and between which the ledger tells no change of its rate.
+/// Consecutive windows in which an element has one state, without a rate change in the ledger.
 struct StateRun {
     first: usize,
     last: usize,
@@ -125,7 +125,7 @@ impl StateRun {
         self.last + 1 == at && look(&self.row) == look(row)
     }
 
-    /// Takes in the next window, of which a median, the gap to the one before, jitter and age of both are not known.
+    /// Adds the next window; median, gap, jitter and age of both together are unknown.
     fn take(&mut self, at: usize, row: &graph::Row) {
         self.last = at;
         let own = &self.row;
@@ -138,7 +138,7 @@ impl StateRun {
         };
     }
 
-    /// The element in this run. Its numbers are unknown where windows overlap and count messages twice.
+    /// The element in this run. Its numbers are unknown if windows overlap and count messages twice.
     fn seen(&self, mission: &Mission, what: Element) -> Seen {
         let at = |place: usize| mission.windows.get(place).map(|w| w.span);
         let span = Span::new(

@@ -1,4 +1,4 @@
-//! The writer of a table's rows: CSV or Parquet, into anything that takes bytes.
+//! Writes the rows of a table as CSV or Parquet.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -27,7 +27,7 @@ impl TableFormat {
         Self::Parquet,
     ];
 
-    /// Its word on the command line and the ending of its files.
+    /// Its name on the command line and its file extension.
     pub fn word(self) -> &'static str {
         match self {
             Self::Csv => "csv",
@@ -55,7 +55,7 @@ impl TableFormat {
 /// A whole small table as bytes.
 ///
 /// # Errors
-/// [`Error::Io`] if the format cannot hold it.
+/// [`Error::Io`] if the format cannot represent it.
 pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
     let write = || {
         let mut writer = Writer::new(format, Vec::new(), table, &[])?;
@@ -65,7 +65,7 @@ pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
     write().map_err(Error::io("write", Path::new("-")))
 }
 
-/// A table being written.
+/// A table in progress.
 pub(crate) enum Writer<W: Write + Send> {
     Csv(Box<csv::CsvRows<W>>),
     #[cfg(feature = "parquet")]
@@ -73,7 +73,7 @@ pub(crate) enum Writer<W: Write + Send> {
 }
 
 impl<W: Write + Send> Writer<W> {
-    /// Begins a table with the columns of `batch`; `facts` about it are kept where the format has a place for them.
+    /// Begins a table with the columns of `batch`; `facts` about it are stored if the format supports it.
     pub(crate) fn new(
         format: TableFormat,
         to: W,
@@ -91,7 +91,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// Writes all rows of `batch`, whose columns are those that the table began with.
+    /// Writes all rows of `batch`, which must have the table's columns.
     pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
         match self {
             Self::Csv(rows) => rows.write(batch),
@@ -100,7 +100,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// The number of bytes of packed rows that it holds in memory.
+    /// The number of bytes of encoded rows that it holds in memory.
     pub(crate) fn held(&self) -> usize {
         match self {
             Self::Csv(_) => 0,

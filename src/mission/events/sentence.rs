@@ -1,4 +1,4 @@
-//! An entry as one sentence: the change, the element, and the parts that came or went with it.
+//! An entry as one sentence: the change, the element, and the parts that appeared or vanished with it.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::mission::ledger::{
     Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Switch,
 };
 
-/// The most topics that are named; the rest is counted.
+/// The most topics that are listed; the rest is counted.
 const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`.
@@ -23,7 +23,7 @@ pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String 
     sentence_with(mission, &parts.collect::<Vec<_>>(), entry)
 }
 
-/// The sentence by the parts of the entry, for callers that know them.
+/// The sentence for known parts of the entry.
 pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let name = name(&mission.elements, entry);
     format!("{name} {}", predicate(mission, parts, entry))
@@ -113,8 +113,8 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
     }
 }
 
-/// Whether the first messages of a topic or a publication come in a rhythm, so that there were none before; of a
-/// subscription, which has no messages of its own, always.
+/// Whether the first messages of a topic or publication are regular, so that there were none before; always true for a
+/// subscription, which has no messages of its own.
 fn begins_steadily(mission: &Mission, what: Element) -> bool {
     let (node, topic) = mission.elements.ends(what);
     let of = topic.map_or(&[][..], |topic| mission.sending.of_topic(topic));
@@ -122,7 +122,7 @@ fn begins_steadily(mission: &Mission, what: Element) -> bool {
     matches!(what, Element::Subscribe(_)) || own.any(|s| begins_steadily_in(&s.stretches))
 }
 
-/// The elements that an entry happened to besides its own, and those that are silent since then: `; also /odom`.
+/// The other elements of an entry, and those that are silent since then: `; also /odom`.
 fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let own = elements.ends(entry.what);
@@ -133,7 +133,7 @@ fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
         .filter_map(|id| mission.ledger.entries.get(*id as usize))
     {
         let (node, topic) = elements.ends(part.what);
-        // The topics of a node that stopped or is silent are its own affair.
+        // The topics of a node that stopped or is silent are implied.
         let sent = |topic| {
             own.0
                 .is_some_and(|node| elements.publication(node, topic).is_some())
@@ -162,7 +162,7 @@ fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     listed("also", alike) + &listed("silent since then:", silent)
 }
 
-/// Who gets nothing over an edge, and by which policy of the quality of service.
+/// The subscriber that receives nothing over an edge, and the incompatible QoS policy.
 fn starved(what: Element, policy: &str) -> String {
     let whom = match what {
         Element::Publish(_) => "a subscriber gets nothing",
@@ -209,7 +209,7 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let entries = &mission.ledger.entries;
     let node = elements.ends(entry.what).0;
     let parts = parts.iter().filter_map(|id| entries.get(*id as usize));
-    // Others may follow it, as those that subscribe what it publishes.
+    // Others may depend on it, such as its subscribers.
     for part in parts.filter(|part| elements.ends(part.what).0 == node) {
         match part.what {
             Element::Publish(edge) => sends.insert(elements.publishes[edge as usize].topic),
@@ -221,7 +221,7 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
         crate::base::name::namespace(elements.nodes[id as usize].name.as_str())
     });
     let said = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
-        let names = topics_as_said(elements, &topics, space);
+        let names = short_topics(elements, &topics, space);
         (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(&names, NAMED)))
     });
     let said: Vec<String> = said.into_iter().flatten().collect();
@@ -232,11 +232,11 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     }
 }
 
-/// The topics of an action, which are named together.
+/// The topics of an action, which are listed as one.
 const ACTION: [&str; 5] = ["goal", "cancel", "status", "feedback", "result"];
 
 /// The names of topics within a namespace, actions as one name, without housekeeping.
-fn topics_as_said(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) -> Vec<String> {
+fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) -> Vec<String> {
     let full = |id: &TopicId| elements.topics[*id as usize].name.as_str();
     let parts = |name: &str| {
         let of = |id: &TopicId| {

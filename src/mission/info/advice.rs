@@ -1,4 +1,4 @@
-//! Advice on getting more information: from this recording now, from the next one by another command.
+//! Advice on getting more information: from this recording, and from the next one by other `record` options.
 
 use super::Info;
 use crate::base::words::count;
@@ -66,7 +66,7 @@ fn ros2(info: &Info) -> Vec<String> {
     advice
 }
 
-/// Advice on files of the user's that add to the bag.
+/// Advice on files that can complement the bag.
 fn from_files(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
     let named = info.nodes_by_degree.total();

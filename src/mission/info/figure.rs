@@ -1,4 +1,4 @@
-//! The choice of figures for a paper: the first fits the mission best, the others add to it.
+//! The choice of figures for a paper: the first fits the mission best, the others complement it.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ pub struct FigureInfo {
     pub shows: String,
 }
 
-/// The figures that fit, the best first: life lines where something comes and goes, else the map where edges are known.
+/// The figures that fit, best first: lifelines if elements start or stop, else the map if edges are known.
 pub(super) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.ledger.phases.len();
     let fitting = [lives(mission), map(mission), steps(many)];

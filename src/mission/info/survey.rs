@@ -16,9 +16,9 @@ use crate::mission::Mission;
 pub struct SurveyRow {
     /// The path relative to the folder surveyed.
     pub path: String,
-    /// Its size in bytes; `None` where that is not known.
+    /// Its size in bytes; `None` if unknown.
     pub file_bytes: Option<u64>,
-    /// Whether nothing of it was lost; an empty bag may be a whole one.
+    /// Whether nothing was lost; an empty bag may be intact.
     pub is_complete: bool,
     /// The reason why there is no summary, which is then empty.
     pub error: Option<String>,
@@ -69,7 +69,7 @@ pub(crate) fn survey_table(rows: &[SurveyRow]) -> Batch {
     Batch::filled(COLUMNS, &(), rows)
 }
 
-/// A cell of what was read; unknown where nothing was.
+/// A cell of the summary; unknown if there is none.
 fn known<'a>(row: &'a SurveyRow, cell: fn(&'a Info) -> TableCell<'a>) -> TableCell<'a> {
     TableCell::known(row.info.as_ref(), cell)
 }
@@ -79,7 +79,7 @@ fn of_bag<'a>(row: &'a SurveyRow, cell: fn(&'a BagInfo) -> TableCell<'a>) -> Tab
     TableCell::known(info.and_then(|info| info.bags.first()), cell)
 }
 
-/// Whether a node is the robot's, with a name of its own.
+/// Whether a node is a named node of the robot.
 fn is_named(node: &&NodeInfo) -> bool {
     let mut evidence = node.evidence.iter();
     let is_guess = evidence.all(|word| Evidence::of(word).is_guess());
@@ -96,7 +96,7 @@ fn evidence(info: &Info) -> String {
     words.join(" ")
 }
 
-/// The survey as a table for people, fitted to `width`; a bag that cannot be read has a line that says why.
+/// The survey as a table for people, fitted to `width`; the line of an unreadable bag has the reason.
 pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
     let column = |head, is_right, least, goes| Column {
         head,

@@ -15,7 +15,7 @@ pub fn text(info: &Info, width: Option<usize>) -> String {
             let lead = line.len() - line.trim_start().len();
             hang(&line[..lead], &line[lead..], lead + 2, width)
         };
-        // A line without words stays one.
+        // Empty lines are kept.
         text.lines().map(line).collect()
     };
     let mut prose = String::new();
@@ -32,7 +32,7 @@ pub fn text(info: &Info, width: Option<usize>) -> String {
     out
 }
 
-/// Writes the edges that source code offers and that are not drawn.
+/// Writes the edges from source code that are not drawn.
 fn undrawn(out: &mut String, info: &Info) -> std::fmt::Result {
     if info.undrawn.is_empty() {
         return Ok(());

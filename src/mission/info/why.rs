@@ -1,4 +1,4 @@
-//! Explanation of an element: the evidence for it, its life, and each piece of evidence with its time and text.
+//! The explanation of an element: its evidence, its lifetime, and each piece of evidence with its time and text.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -54,7 +54,7 @@ struct Repeated<'a> {
     last: Option<Stamp>,
 }
 
-/// Pieces that differ in nothing but their time, joined to one each, in the order of their first.
+/// Merges pieces that only differ in time, in order of first occurrence.
 fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
     let mut all: Vec<Repeated<'_>> = Vec::new();
     let mut places = BTreeMap::new();
@@ -174,7 +174,7 @@ mod tests {
     use crate::evidence::Degree;
 
     #[test]
-    fn what_is_said_again_stands_once() {
+    fn repeated_evidence_is_listed_once() {
         let piece = |time, text: &str| EvidenceLine {
             time: Some(Stamp(time)),
             source: "rosout",

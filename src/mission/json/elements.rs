@@ -1,5 +1,5 @@
 //! Nodes, topics and edges in JSON: in one window, or over the whole mission with their windows as columns. Each is one
-//! struct for writing and for reading; what is read may lack all but names.
+//! struct for writing and for reading; when read, everything except names is optional.
 
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ use crate::graph::{
     Edge, EdgeState, Elements, Measures, Node, NodeState, State, Topic, TopicState,
 };
 
-/// A text that is borrowed where it is written.
+/// A text, borrowed when written.
 pub(crate) type Text<'a> = Cow<'a, str>;
 
 #[derive(Default, Deserialize, Serialize)]
@@ -273,12 +273,12 @@ pub(crate) fn spans(pairs: &[[i64; 2]]) -> Vec<Span> {
     pairs.iter().map(span).collect()
 }
 
-/// The state of this word; active for another, or none.
+/// The state of this name; active if unknown or missing.
 pub(crate) fn state_of(word: Option<&str>) -> State {
     word.and_then(State::from_word).unwrap_or(State::Active)
 }
 
-/// The degree of this word; stated for another, or none.
+/// The degree of this name; stated if unknown or missing.
 pub(crate) fn degree_of(word: Option<&str>) -> Degree {
     word.and_then(Degree::from_word).unwrap_or(Degree::Stated)
 }

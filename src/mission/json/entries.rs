@@ -53,7 +53,7 @@ impl<'a> ElementName<'a> {
     }
 }
 
-/// An entry; when it is read, all but its kind, element and time may be missing.
+/// An entry; when read, everything except kind, element and time is optional.
 #[derive(Deserialize, Serialize)]
 pub(crate) struct EntryJson<'a> {
     #[serde(default)]
@@ -180,7 +180,7 @@ pub(crate) fn rows<'a>(
     ledger: &'a Ledger,
     elements: &'a Elements,
 ) -> impl Iterator<Item = String> + 'a {
-    // Only maps with keys that are not strings fail, and there are none.
+    // Only maps with non-string keys fail, and there are none.
     entries(ledger, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
 }
 

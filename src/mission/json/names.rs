@@ -1,4 +1,4 @@
-//! The names of a mission that is read, and the graphs of its windows.
+//! The names of a mission read from JSON, and the graphs of its windows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,7 +46,7 @@ impl Names {
         }
     }
 
-    /// Takes in all elements but subscriptions.
+    /// Adds all elements except subscriptions.
     pub(crate) fn elements(
         &mut self,
         nodes: &[NodeJson<'_>],
@@ -89,7 +89,7 @@ impl Names {
         learn(edge.or_default(), raw);
     }
 
-    /// Gives everything its place.
+    /// Assigns all ids.
     pub(crate) fn placed(self) -> Elements {
         let mut all = Elements {
             nodes: self.nodes.into_values().collect(),
@@ -117,7 +117,7 @@ fn learn(edge: &mut Edge, raw: &EdgeJson<'_>) {
     widen(&mut edge.first, &mut edge.last, &mut edge.runs, &raw.life);
 }
 
-/// Widens the life of an element. The first intervals are kept: every window repeats all of them.
+/// Extends the lifetime of an element. The first intervals are kept: every window repeats all of them.
 fn widen(
     first: &mut Option<Stamp>,
     last: &mut Option<Stamp>,
@@ -173,7 +173,7 @@ struct GraphParts {
 }
 
 impl GraphParts {
-    /// Adds the ends of an edge in the edge's state, and returns their places.
+    /// Adds the ends of an edge in the edge's state, and returns their indices.
     fn ends(
         &mut self,
         all: &Elements,

@@ -1,7 +1,7 @@
-//! Reader of evolutions: our own JSON, or a graph over time that another tool wrote with our keys.
+//! Reads missions in JSON: our own, or a graph over time that another tool wrote with the same keys.
 //!
 //! Required are `schema`, the windows' times and the elements' names; other missing values are unknown, unknown keys
-//! are ignored. Changes are found by the ledger; a mission without one is left for [`Mission::find_changes`].
+//! are ignored. Changes are determined by the ledger; a mission without one is left for [`Mission::find_changes`].
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::graph::{Element, Elements, Graphs, GraphsWriter};
 use crate::mission::{Mission, Window};
 
-/// Reads the text of an evolution; `path` is only named in errors.
+/// Reads a mission in JSON; `path` is only used in errors.
 ///
 /// # Errors
 /// [`Error::BadFile`] with the line for text that is not JSON or lacks these keys, for another schema, and for windows
@@ -74,7 +74,7 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
     Ok(spans)
 }
 
-/// The mission of windows made elsewhere, each with its full graph; changes are left for [`Mission::find_changes`].
+/// The mission of given windows, each with its full graph; changes are left to [`Mission::find_changes`].
 /// There is at least one window, and they are in order of time.
 pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
     let span = |w: &RawWindow| Span::new(Stamp(w.start_ns), Stamp(w.end_ns));
@@ -203,7 +203,7 @@ fn report(raw: BagJson<'_>) -> Report {
     }
 }
 
-/// The notices of an earlier run as plain notes: data lost then is not lost now.
+/// The notices of an earlier run as plain notes: data lost then does not affect this exit code.
 fn notices(raw: Vec<NoticeJson<'_>>) -> Notices {
     let mut notices = Notices::new();
     notices.extend(raw.into_iter().map(|n| Notice {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back_equal() {
+    fn json_round_trips() {
         let mut first = Vec::new();
         let mut mission = read(SMALL).unwrap();
         mission.find_changes(0.25, &[]);
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_with_its_line() {
+    fn invalid_json_is_refused_with_its_line() {
         let said = |text| read(text).unwrap_err().to_string();
         assert!(said("{\n\"schema\": 3}").contains("line 2"));
         assert!(said(r#"{"schema": "other/9", "windows": []}"#).contains("`other/9`"));
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn sending_that_cannot_be_is_refused() {
+    fn impossible_sending_is_refused() {
         let said = |sending: &str| {
             let text = SMALL.replace("\"future\": 1", &format!("\"sending\": {sending}"));
             read(&text).map_err(|e| e.to_string())

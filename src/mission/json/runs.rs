@@ -1,4 +1,4 @@
-//! The form of an evolution with very many windows: each element once, with the windows in which it exists and its
+//! The JSON form of a mission with very many windows: each element once, with the windows in which it exists and its
 //! states in them as columns.
 //!
 //! ```text
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! `windows` are pairs of the first and the last place. A column has a value per window of these in order; `[value,
-//! times]` stands for as many equal ones; a column that is left out is `null` in all of them. The rate is the count
-//! over the window's length, unless a column `hz` says otherwise (there `"="` is that rate); of a node the count is
+//! times]` is a run of equal ones; a missing column is `null` in all of them. The rate is the count over the window's
+//! length, unless a column `hz` overrides it (there `"="` is that rate); of a node the count is
 //! `sent`.
 
 mod columns;
@@ -82,7 +82,7 @@ impl<'a> JsonColumns<'a> {
         all
     }
 
-    /// Adds the rows of an element in order; rows out of order or behind the last window are left out.
+    /// Adds the rows of an element in order; rows out of order or after the last window are ignored.
     pub(crate) fn add(&self, what: Element, many: usize, all: &mut GraphsWriter) {
         let number = |word: &Option<Text<'_>>| {
             let word = word.as_deref().map(Arc::from);

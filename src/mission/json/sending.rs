@@ -6,8 +6,8 @@
 //!   "pauses": [{"topic": "/scan", "spans": [[from_ns, to_ns], …]}, …]}
 //! ```
 //!
-//! `node` is `null` for all unknown senders together. Flags are 1 for messages at even intervals, plus 2 where the
-//! stretch begins where the one before ends. `pauses` are the longest ones between two messages.
+//! `node` is `null` for all unknown senders together. Flags are 1 for messages at even intervals, plus 2 if the
+//! stretch begins where the previous one ends. `pauses` are the longest ones between two messages.
 
 use std::collections::BTreeMap;
 
@@ -67,7 +67,7 @@ impl<'a> SendingJson<'a> {
         }
     }
 
-    /// The sending of a mission with these names. Senders and topics that no window has are left out.
+    /// The sending of a mission with these names. Senders and topics that are in no window are ignored.
     ///
     /// # Errors
     /// The mistake in the stretches.

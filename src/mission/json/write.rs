@@ -1,4 +1,4 @@
-//! Writes an evolution as JSON, schema `bagreel.evolution/2`, window by window without a second copy in memory.
+//! Writes a mission as JSON, schema `bagreel.evolution/2`, window by window without a second copy in memory.
 
 use std::io::{BufWriter, Write};
 
@@ -57,7 +57,7 @@ pub(crate) const RUNS: &str = "runs";
 pub(crate) struct Json<'a> {
     /// The mission.
     pub mission: &'a Mission,
-    /// The places of the drawing, if one was made.
+    /// The positions of the drawing, if one was made.
     pub places: Option<&'a Places>,
     /// The form of its windows.
     pub form: JsonForm,
@@ -166,7 +166,7 @@ impl<'a> BagJson<'a> {
     }
 }
 
-/// A window, with its elements unless they stand in columns.
+/// A window, with its elements unless they are in columns.
 struct WindowOf<'a> {
     window: &'a Window,
     graph: Option<Graph>,

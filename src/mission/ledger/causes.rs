@@ -1,5 +1,5 @@
-//! One cause, one headline: what follows from another event, comes and goes again and again, or happens to many at once
-//! becomes a part of one entry.
+//! One headline per cause: consequences of another event, repeated appearances, and simultaneous events of many
+//! elements become parts of one entry.
 
 use std::collections::BTreeMap;
 
@@ -9,17 +9,17 @@ use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
 use crate::base::time::Stamp;
 use crate::graph::{Element, NodeId, TopicId};
 
-/// Makes what has a known cause a part of it.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    hand_overs(told, drafts);
-    subscribers(told, drafts);
-    follow_inputs(told, drafts);
-    flaps(told, drafts);
-    crowds(told, drafts);
+/// Makes entries with a known cause parts of it.
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+    hand_overs(context, drafts);
+    subscribers(context, drafts);
+    follow_inputs(context, drafts);
+    flaps(context, drafts);
+    crowds(context, drafts);
     drafts.flatten();
 }
 
-/// The places of the headlines of some kinds, in order of time.
+/// The ids of the headlines of some kinds, sorted by time.
 fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
     let all = (0..).zip(&drafts.list);
     let wanted = all.filter(|(_, e)| e.is_headline() && kinds.contains(&e.kind));
@@ -28,9 +28,9 @@ fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
     places
 }
 
-/// A node that is known by the messages of one topic only, and that hands it over or takes it over, need not have
-/// stopped or started.
-fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// A node known only from the messages of one topic that hands it over or takes it over need not have stopped or
+/// started.
+fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
     let steps = headlines(drafts, &[Kind::Rate]);
     for hand in headlines(drafts, &[Kind::HandedOver]) {
@@ -41,7 +41,7 @@ fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
         };
         for step in &steps {
             let other = drafts.get(*step);
-            let (Some(node), of) = told.elements.ends(other.what) else {
+            let (Some(node), of) = context.elements.ends(other.what) else {
                 continue;
             };
             // A mux has the rate of the sender whose turn it is.
@@ -60,22 +60,22 @@ fn hand_overs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
                 _ => (to, entry.time),
             };
             let is_end = of.contains(&node) && is_within(other.time, at, TOGETHER_NS);
-            if is_end && is_only_sender(told, node, topic) {
+            if is_end && is_only_sender(context, node, topic) {
                 drafts.fold(*turn, hand);
             }
         }
     }
 }
 
-/// Whether the messages of this topic are all that is known of a node.
-fn is_only_sender(told: &LedgerInput<'_>, node: NodeId, topic: TopicId) -> bool {
-    let evidence = told.elements.nodes[node as usize].evidence;
-    let mut sent = told.elements.publishes.iter().filter(|e| e.node == node);
+/// Whether a node is known only from the messages of this topic.
+fn is_only_sender(context: &LedgerInput<'_>, node: NodeId, topic: TopicId) -> bool {
+    let evidence = context.elements.nodes[node as usize].evidence;
+    let mut sent = context.elements.publishes.iter().filter(|e| e.node == node);
     evidence.words().all(|word| word == "connection") && sent.all(|edge| edge.topic == topic)
 }
 
-/// Who subscribes a topic when its publisher starts, or no longer when that stops, follows the publisher.
-fn subscribers(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// Subscriptions that appear or vanish with the topic's publisher are consequences.
+fn subscribers(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut turns: BTreeMap<(NodeId, bool), Vec<EntryId>> = BTreeMap::new();
     for (id, entry) in (0..).zip(&drafts.list) {
         if let (Element::Node(node), Kind::Started | Kind::Stopped) = (entry.what, entry.kind) {
@@ -83,11 +83,11 @@ fn subscribers(told: &LedgerInput<'_>, drafts: &mut Drafts) {
             of.or_default().push(id);
         }
     }
-    let wiring = Wiring::of(told);
+    let wiring = Wiring::of(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let entry = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
-            (entry.what, told.elements.ends(entry.what))
+            (entry.what, context.elements.ends(entry.what))
         else {
             continue;
         };
@@ -104,24 +104,25 @@ fn subscribers(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// Who publishes and who subscribes what, without housekeeping.
+/// The publishers and subscribers of each topic, without housekeeping.
 struct Wiring {
     publishers: BTreeMap<TopicId, Vec<NodeId>>,
     inputs: BTreeMap<NodeId, Vec<TopicId>>,
 }
 
 impl Wiring {
-    fn of(told: &LedgerInput<'_>) -> Self {
+    fn of(context: &LedgerInput<'_>) -> Self {
         let (mut publishers, mut inputs) = (BTreeMap::new(), BTreeMap::new());
-        let is_meant =
-            |node: NodeId, topic| !told.is_by_the_way(topic) && !told.is_quiet(Element::Node(node));
-        for edge in &told.elements.publishes {
+        let is_meant = |node: NodeId, topic| {
+            !context.is_by_the_way(topic) && !context.is_quiet(Element::Node(node))
+        };
+        for edge in &context.elements.publishes {
             if is_meant(edge.node, edge.topic) {
                 let of: &mut Vec<_> = publishers.entry(edge.topic).or_default();
                 of.push(edge.node);
             }
         }
-        for edge in &told.elements.subscribes {
+        for edge in &context.elements.subscribes {
             if is_meant(edge.node, edge.topic) {
                 let of: &mut Vec<_> = inputs.entry(edge.node).or_default();
                 of.push(edge.topic);
@@ -130,9 +131,9 @@ impl Wiring {
         Self { publishers, inputs }
     }
 
-    /// The nodes that send what an entry is about.
-    fn senders(&self, told: &LedgerInput<'_>, what: Element) -> Vec<NodeId> {
-        match (told.elements.ends(what), what) {
+    /// The publishers of an entry's element.
+    fn senders(&self, context: &LedgerInput<'_>, what: Element) -> Vec<NodeId> {
+        match (context.elements.ends(what), what) {
             ((_, Some(topic)), Element::Topic(_)) => {
                 self.publishers.get(&topic).cloned().unwrap_or_default()
             }
@@ -141,14 +142,13 @@ impl Wiring {
     }
 }
 
-/// A silence that begins within the pause of an input belongs to it, and so does a step of a rate that an input makes
-/// too.
-fn follow_inputs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let wiring = Wiring::of(told);
+/// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too.
+fn follow_inputs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let wiring = Wiring::of(context);
     let mut pauses: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
     let mut steps: BTreeMap<TopicId, Vec<EntryId>> = BTreeMap::new();
     for (id, entry) in (0..).zip(&drafts.list) {
-        match (entry.kind, told.elements.ends(entry.what).1) {
+        match (entry.kind, context.elements.ends(entry.what).1) {
             (Kind::Silent | Kind::Stopped | Kind::Restarted, _) => {
                 pauses.entry(entry.what).or_default().push(id);
             }
@@ -158,7 +158,7 @@ fn follow_inputs(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
     for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
         let entry = drafts.get(id);
-        let own = wiring.senders(told, entry.what);
+        let own = wiring.senders(context, entry.what);
         let inputs = own.iter().filter_map(|node| wiring.inputs.get(node));
         let cause = inputs.flatten().find_map(|input| {
             if entry.kind == Kind::Rate {
@@ -191,7 +191,7 @@ fn follows(silence: &Entry, pause: &Entry) -> bool {
     pause.what != silence.what && pause.time <= silence.time.plus(CROWD_NS) && silence.time <= until
 }
 
-/// Whether two steps of rates are about as large, and less than `apart` nanoseconds apart.
+/// Whether two rate changes are about equal, and less than `apart` nanoseconds apart.
 fn is_same_step(one: &Entry, other: &Entry, apart: i64) -> bool {
     let ratio = |entry: &Entry| match entry.detail {
         Detail::Rates { from_hz, to_hz } => to_hz / from_hz,
@@ -203,8 +203,8 @@ fn is_same_step(one: &Entry, other: &Entry, apart: i64) -> bool {
     one.what != other.what && is_near && (1.0 / SAME_STEP..=SAME_STEP).contains(&between)
 }
 
-/// An edge or a topic that comes and goes again and again is one entry.
-fn flaps(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// An edge or topic that appears and vanishes repeatedly is one entry.
+fn flaps(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut of: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         of.entry(drafts.get(id).what).or_default().push(id);
@@ -215,7 +215,7 @@ fn flaps(told: &LedgerInput<'_>, drafts: &mut Drafts) {
         let [first, .., last] = turns[..] else {
             continue;
         };
-        if many < FLAPS || told.is_quiet(what) {
+        if many < FLAPS || context.is_quiet(what) {
             continue;
         }
         let until = drafts.get(last).time;
@@ -228,14 +228,14 @@ fn flaps(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// What happens to many elements at once is one entry: connections of one node or topics without a known publisher that
-/// come or go, silences that begin and end together, steps of rates that are equal.
-fn crowds(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// Simultaneous events of many elements are one entry: connections of one node or topics of unknown publishers that
+/// appear or vanish, silences that begin and end together, equal rate changes.
+fn crowds(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     for kind in [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate] {
         let mut of: BTreeMap<Option<NodeId>, Vec<EntryId>> = BTreeMap::new();
         for id in headlines(drafts, &[kind]) {
-            let node = told.elements.ends(drafts.get(id).what).0;
-            // The silences of several nodes have one cause, and so have steps of one size.
+            let node = context.elements.ends(drafts.get(id).what).0;
+            // The silences of several nodes have one cause, and so have equal rate changes.
             let whose = node.filter(|_| !matches!(kind, Kind::Silent | Kind::Rate));
             of.entry(whose).or_default().push(id);
         }
@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_one_if_they_are_as_large_and_at_one_time() {
+    fn equal_simultaneous_rate_changes_are_merged() {
         let camera = step(1, 60, 30.0, 5.0);
         assert!(is_same_step(&step(2, 60, 6.0, 1.0), &camera, 0));
         assert!(!is_same_step(&step(2, 60, 6.0, 3.0), &camera, 0));
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_parts_are_parts_of_the_headline_and_nothing_is_its_own_part() {
+    fn parts_are_flattened_and_never_cyclic() {
         let mut drafts = Drafts::default();
         for topic in 0..3 {
             drafts.add(entry(Kind::Silent, topic, 1, None));

@@ -30,11 +30,11 @@ pub(crate) fn explain(
     all
 }
 
-/// The times at which entries let elements begin or end, sorted.
+/// The times at which elements begin or end according to entries, sorted.
 struct EntryTurns {
     begins: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
     ends: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
-    /// Unnamed publishers and their publications, with their topics: they come and go with the topic.
+    /// Unnamed publishers and their publications, with their topics: they appear and vanish with the topic.
     unnamed: BTreeMap<Element, Element>,
 }
 
@@ -169,8 +169,8 @@ fn change(entry: &Entry) -> Option<Change> {
     }
 }
 
-/// The places of the entries that explain the windows' changes, of a ledger that was made from them: of those of the
-/// same kind and element the one nearest in time.
+/// The ids of the entries that explain the windows' changes, in a ledger that was made from them: for each change, the
+/// nearest in time with the same kind and element.
 pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
     let mut of: BTreeMap<(Kind, Element), Vec<EntryId>> = BTreeMap::new();
     for (id, entry) in (0..).zip(&ledger.entries) {

@@ -1,4 +1,4 @@
-//! The ledger of a mission of which only the windows are known: each change belongs to the window that shows it.
+//! The ledger of a mission of which only the windows are known: each change belongs to its window.
 
 use std::collections::BTreeMap;
 
@@ -39,8 +39,7 @@ fn whole(entries: &[Entry], mut at: EntryId) -> usize {
     at as usize
 }
 
-/// The entries sorted by time, then kind, then element, which is an order of names; parts still know what they are part
-/// of.
+/// The entries sorted by time, then kind, then element, i.e. by name; references of parts are updated.
 fn sorted(entries: &[Entry]) -> Vec<Entry> {
     let mut order: Vec<usize> = (0..entries.len()).collect();
     order.sort_by_key(|at| (entries[*at].time, entries[*at].kind, entries[*at].what, *at));
@@ -68,16 +67,16 @@ fn id(place: usize) -> EntryId {
     EntryId::try_from(place).unwrap_or(EntryId::MAX)
 }
 
-/// The elements that came or went in one window, and how they belong together.
+/// The elements that appeared or vanished in one window, and their relations.
 struct WindowTurns<'a> {
     elements: &'a Elements,
     window: &'a Window,
-    /// The elements that came, with the places of their changes; `went` has those that went.
+    /// The elements that appeared, with the indices of their changes; `went` has those that vanished.
     came: BTreeMap<Element, usize>,
     went: BTreeMap<Element, usize>,
     restarted: BTreeMap<NodeId, usize>,
     handed: BTreeMap<TopicId, usize>,
-    /// The publications that came or went, per topic.
+    /// The publications that appeared or vanished, per topic.
     senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
 }
 
@@ -121,7 +120,7 @@ impl<'a> WindowTurns<'a> {
     }
 
     fn entry(&self, at: usize, change: &Change) -> Entry {
-        let (kind, what, time, detail) = told(change);
+        let (kind, what, time, detail) = described(change);
         let time = time.filter(|t| self.window.span.contains(*t));
         let whole = self.whole(change).filter(|whole| *whole != at);
         let Span { start, end } = self.window.span;
@@ -142,7 +141,7 @@ impl<'a> WindowTurns<'a> {
         }
     }
 
-    /// The place of the change that explains this one, if another does.
+    /// The index of the change that explains this one, if any.
     fn whole(&self, change: &Change) -> Option<usize> {
         match change {
             Change::Added { what, .. } => self.mover(*what, &self.came),
@@ -178,7 +177,7 @@ impl<'a> WindowTurns<'a> {
         }
     }
 
-    /// The place of the change of the node with which a topic came or went, else of the publication.
+    /// The index of the change of the node with which a topic appeared or vanished, else of the publication.
     fn topic_mover(&self, topic: TopicId, moved: &BTreeMap<Element, usize>) -> Option<usize> {
         let senders = self.senders.get(&topic).into_iter().flatten();
         let mut senders = senders.filter(|(edge, _)| moved.contains_key(edge));
@@ -194,7 +193,7 @@ impl<'a> WindowTurns<'a> {
         nodes.copied().next()
     }
 
-    /// The place of the change that explains a change of rate: a publisher that came, went or restarted, or other
+    /// The index of the change that explains a rate change: a publisher that started, stopped or restarted, or other
     /// publishers.
     fn sender(&self, what: Element) -> Option<usize> {
         let topic = match what {
@@ -223,7 +222,7 @@ impl<'a> WindowTurns<'a> {
     }
 }
 
-fn told(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
+fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
     match change {
         Change::Added { what, time } => {
             let is_node = matches!(what, Element::Node(_));

@@ -34,8 +34,8 @@ impl RoleSending {
 }
 
 /// Adds all hand-overs.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let stretches = told
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let stretches = context
         .history
         .sending
         .senders
@@ -43,26 +43,27 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
         .flat_map(|s| &s.stretches);
     let end = stretches.map(|s| s.last).max().unwrap_or(Stamp::MAX);
     let mut of: BTreeMap<TopicId, Vec<&Sender>> = BTreeMap::new();
-    for sender in &told.history.sending.senders {
+    for sender in &context.history.sending.senders {
         of.entry(sender.topic).or_default().push(sender);
     }
     for (topic, senders) in of {
-        if told.is_by_the_way(topic) || senders.iter().any(|v| v.node.is_none() || v.is_latched) {
+        if context.is_by_the_way(topic) || senders.iter().any(|v| v.node.is_none() || v.is_latched)
+        {
             continue;
         }
-        let all = sendings(told, &senders);
+        let all = sendings(context, &senders);
         let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
         if roles.len() > 1 {
             for (old, new) in replaced(&all, end) {
-                hand(told, drafts, topic, &old, &new);
+                hand(context, drafts, topic, &old, &new);
             }
-            shares(told, drafts, topic, &senders);
+            shares(context, drafts, topic, &senders);
         }
     }
 }
 
 /// The intervals of sending of each role, sorted by first message.
-fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
+fn sendings(context: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
     for sender in senders {
         let Some(node) = sender.node else { continue };
@@ -74,7 +75,7 @@ fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
                     last.period = stretch.period;
                 }
                 _ => own.push(RoleSending {
-                    role: Arc::clone(&told.elements.nodes[node as usize].role),
+                    role: Arc::clone(&context.elements.nodes[node as usize].role),
                     node,
                     first: stretch.first,
                     last: stretch.last,
@@ -89,7 +90,7 @@ fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     all
 }
 
-/// Every end of sending that the beginning of another role compensates, but for those at the end of the recording.
+/// Every end of sending that is compensated by the start of another role, except at the end of the recording.
 fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> {
     let mut found = Vec::new();
     let ends = |s: &&RoleSending| end.since(s.last) > broken_after(s.period);
@@ -116,7 +117,7 @@ fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> 
         let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
             continue;
         };
-        // A role that sent before and goes on takes nothing over, and leaves nothing to be taken.
+        // A role that sent before and continues does not take over, and leaves nothing to take over.
         let carried = others().any(|s| {
             s.role != new.role && s.last > old.last && s.first < old.last.plus(-OVERLAP_NS)
         });
@@ -133,7 +134,7 @@ fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> 
 }
 
 fn hand(
-    told: &LedgerInput<'_>,
+    context: &LedgerInput<'_>,
     drafts: &mut Drafts,
     topic: TopicId,
     old: &RoleSending,
@@ -144,7 +145,7 @@ fn hand(
         earliest: old.last.min(new.first),
         latest: old.last.max(new.first),
     };
-    let mut entry = told.entry(Kind::HandedOver, Element::Topic(topic), at);
+    let mut entry = context.entry(Kind::HandedOver, Element::Topic(topic), at);
     entry.detail = Detail::Senders {
         from: vec![old.node],
         to: vec![new.node],
@@ -160,8 +161,8 @@ struct Pace {
     hz: f64,
 }
 
-/// Adds the times at which most messages of a topic begin to come from another sender, while both go on.
-fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: &[&Sender]) {
+/// Adds the times at which another sender begins to provide most messages of a topic while both continue.
+fn shares(context: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: &[&Sender]) {
     let paces: Vec<Pace> = senders
         .iter()
         .filter_map(|v| Some((v.node?, v)))
@@ -200,7 +201,7 @@ fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: 
                 earliest: *until,
                 latest: pair[0],
             };
-            let mut entry = told.entry(Kind::HandedOver, Element::Topic(topic), at);
+            let mut entry = context.entry(Kind::HandedOver, Element::Topic(topic), at);
             entry.detail = Detail::Senders {
                 from: vec![*old],
                 to: vec![main.node],
@@ -217,7 +218,7 @@ mod tests {
 
     const SECOND: i64 = 1_000_000_000;
 
-    /// A role that sends twice a second.
+    /// A role that sends at 2 Hz.
     fn sends(role: &str, node: NodeId, first: i64, last: i64) -> RoleSending {
         RoleSending {
             role: role.into(),
@@ -235,13 +236,13 @@ mod tests {
     }
 
     #[test]
-    fn who_sends_to_the_end_of_the_recording_hands_nothing_over() {
+    fn a_sender_until_the_end_hands_nothing_over() {
         assert_eq!(found((0, 50), (51, 100)), 1);
         assert_eq!(found((0, 98), (97, 100)), 0);
     }
 
     #[test]
-    fn both_send_for_a_few_messages_at_most() {
+    fn a_hand_over_overlaps_by_a_few_messages_at_most() {
         assert_eq!(found((0, 50), (48, 90)), 1);
         assert_eq!(found((0, 50), (46, 90)), 0);
     }

@@ -1,5 +1,5 @@
-//! What is stated about elements besides their being there: subscribers that get nothing, names used twice, messages that
-//! the recorder lost, which explain silences, and the turns of a mux.
+//! Remarks about elements: subscribers that receive nothing, duplicate names, messages that the recorder lost, which
+//! explain silences, and the input switches of a mux.
 
 use super::make::{Drafts, LedgerInput, exact};
 use super::{Detail, EntryId, Kind};
@@ -11,8 +11,8 @@ use crate::evidence::proof::IncidentKind;
 use crate::graph::{Element, NodeId};
 
 /// Adds all of them.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    for incident in &told.history.incidents {
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+    for incident in &context.history.incidents {
         let (kind, detail) = match &incident.kind {
             IncidentKind::Starved(policy) => {
                 let (from, to) = ("".into(), policy.clone());
@@ -21,14 +21,14 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
             IncidentKind::Duplicate => (Kind::Duplicate, Detail::None),
             IncidentKind::Lost(many) => (Kind::Lost, Detail::Count(*many)),
             IncidentKind::Turn(from, to) => {
-                let [from, to] = [from, to].map(|topic| publishers(told, *topic));
+                let [from, to] = [from, to].map(|topic| publishers(context, *topic));
                 if from.is_empty() || to.is_empty() || from == to {
                     continue;
                 }
                 (Kind::HandedOver, Detail::Senders { from, to })
             }
         };
-        let mut entry = told.entry(kind, incident.what, exact(incident.time));
+        let mut entry = context.entry(kind, incident.what, exact(incident.time));
         entry.until = incident.until;
         entry.detail = detail;
         entry.degree = match kind {
@@ -45,15 +45,15 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// The known publishers of a topic.
-fn publishers(told: &LedgerInput<'_>, topic: Name) -> Vec<NodeId> {
-    let topic = told.history.topic_ids.get(&topic);
-    let edges = told.elements.publishes.iter();
+fn publishers(context: &LedgerInput<'_>, topic: Name) -> Vec<NodeId> {
+    let topic = context.history.topic_ids.get(&topic);
+    let edges = context.elements.publishes.iter();
     let own = edges.filter(|edge| Some(&edge.topic) == topic && !edge.evidence.is_guess());
     own.map(|edge| edge.node).collect()
 }
 
-/// Makes the silences of a topic, with those of its nodes, parts of the loss that explains them. A loss is reported
-/// after it happened.
+/// Makes the silences of a topic and of its nodes parts of the loss that explains them. A loss is reported after it
+/// happened.
 fn explain(drafts: &mut Drafts, loss: EntryId, topic: Element, (from, to): (Stamp, Stamp)) {
     let list = &mut drafts.list;
     let silences = (0..).zip(list.iter()).filter(|(_, e)| {

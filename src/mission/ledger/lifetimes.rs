@@ -23,22 +23,27 @@ struct Wholes {
     topics: BTreeMap<(TopicId, Turn, Stamp), EntryId>,
 }
 
-/// Adds the entries of all lives.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// Adds the entries of all lifetimes.
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
-    for turns in turns_by_role(told).values() {
-        tell_role(told, drafts, &mut wholes, turns);
+    for turns in turns_by_role(context).values() {
+        tell_role(context, drafts, &mut wholes, turns);
     }
-    let recorded = || told.elements.all().filter(|what| !told.is_timeless(*what));
+    let recorded = || {
+        context
+            .elements
+            .all()
+            .filter(|what| !context.is_timeless(*what))
+    };
     for what in recorded() {
-        if let (Some(node), Some(topic)) = told.elements.ends(what) {
-            tell_edge(told, drafts, &mut wholes, what, (node, topic));
+        if let (Some(node), Some(topic)) = context.elements.ends(what) {
+            tell_edge(context, drafts, &mut wholes, what, (node, topic));
         }
     }
     for what in recorded() {
         let Element::Topic(id) = what else { continue };
-        for (turn, at) in turns(told.lives(what)) {
-            let mut entry = told.entry(kind(turn), what, at);
+        for (turn, at) in turns(context.lives(what)) {
+            let mut entry = context.entry(kind(turn), what, at);
             entry.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
             drafts.add(entry);
         }
@@ -64,13 +69,15 @@ fn kind(turn: Turn) -> Kind {
 /// The turns of a role, sorted by time.
 type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
 
-/// The turns of all nodes: of each anonymous role together; any other node is its own role.
-fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
+/// The turns of all nodes by role: anonymous nodes share a role, any other node is its own.
+fn turns_by_role<'a>(context: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
-    let nodes = (0..).zip(&told.elements.nodes);
-    for (id, node) in nodes.filter(|(id, _)| !told.is_timeless(Element::Node(*id))) {
+    let nodes = (0..).zip(&context.elements.nodes);
+    for (id, node) in nodes.filter(|(id, _)| !context.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
-        of.extend(turns(told.lives(Element::Node(id))).map(|(turn, at)| (at.time, turn, id, at)));
+        of.extend(
+            turns(context.lives(Element::Node(id))).map(|(turn, at)| (at.time, turn, id, at)),
+        );
     }
     for turns in all.values_mut() {
         turns.sort_by_key(|(time, turn, node, _)| (*time, std::cmp::Reverse(*turn), *node));
@@ -79,7 +86,12 @@ fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
 }
 
 /// Adds the entries of one role: an end followed by a beginning is a restart.
-fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &RoleTurns) {
+fn tell_role(
+    context: &LedgerInput<'_>,
+    drafts: &mut Drafts,
+    wholes: &mut Wholes,
+    turns: &RoleTurns,
+) {
     let mut rest = turns.as_slice();
     while let Some((&(_, turn, node, at), after)) = rest.split_first() {
         let back = after
@@ -90,12 +102,12 @@ fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, t
                 Turn::Begins => Kind::Started,
                 Turn::Ends => Kind::Stopped,
             };
-            let id = drafts.add(told.entry(kind, Element::Node(node), at));
+            let id = drafts.add(context.entry(kind, Element::Node(node), at));
             wholes.nodes.entry((node, turn)).or_default().push((at, id));
             rest = after;
             continue;
         };
-        let mut entry = told.entry(Kind::Restarted, Element::Node(heir), at);
+        let mut entry = context.entry(Kind::Restarted, Element::Node(heir), at);
         entry.until = Some(again.time);
         let id = drafts.add(entry);
         wholes
@@ -110,7 +122,7 @@ fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, t
             .push((again, id));
         if heir != node {
             for (kind, node, at) in [(Kind::Stopped, node, at), (Kind::Started, heir, again)] {
-                let mut part = told.entry(kind, Element::Node(node), at);
+                let mut part = context.entry(kind, Element::Node(node), at);
                 part.part_of = Some(id);
                 drafts.add(part);
             }
@@ -121,15 +133,15 @@ fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, t
 
 /// Adds the entry of an edge: as a part of its node's entry at that time, or alone.
 fn tell_edge(
-    told: &LedgerInput<'_>,
+    context: &LedgerInput<'_>,
     drafts: &mut Drafts,
     wholes: &mut Wholes,
     what: Element,
     (node, topic): (NodeId, TopicId),
 ) {
-    for (turn, at) in turns(told.lives(what)) {
+    for (turn, at) in turns(context.lives(what)) {
         let of_node = wholes.nodes.get(&(node, turn)).into_iter().flatten();
-        // Near its node's turn; or it may have been, for all that is known.
+        // Near its node's turn, within the uncertainty.
         let may = |node: &Bound| {
             let since = node.time.plus(TOGETHER_NS);
             turn == Turn::Begins && at.earliest <= since && node.time <= at.time
@@ -139,7 +151,7 @@ fn tell_edge(
             .filter(|(far, node, _)| *far <= TOGETHER_NS || may(node))
             .min_by_key(|(far, _, _)| *far)
             .map(|(_, _, id)| id);
-        let mut entry = told.entry(kind(turn), what, at);
+        let mut entry = context.entry(kind(turn), what, at);
         entry.part_of = near;
         let id = drafts.add(entry);
         let whole = near.unwrap_or(id);

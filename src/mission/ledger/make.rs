@@ -1,4 +1,4 @@
-//! The making of a mission's entries from its lives: each kind in a file of its own, then sorted and joined.
+//! Makes a mission's entries from its lifetimes: each kind in its own file, then sorted and joined.
 
 use super::{Detail, Entry, EntryId, Kind, causes, hands, incidents, lifetimes, rates, silence};
 use crate::base::name::is_quiet;
@@ -12,24 +12,24 @@ use crate::graph::{Element, Elements, History};
 pub(crate) struct LedgerInput<'a> {
     pub(crate) elements: &'a Elements,
     pub(crate) history: &'a History,
-    /// The share by which a rate must change, ≥ 0.
+    /// The fraction by which a rate must change, ≥ 0.
     pub(crate) rate_change: f64,
 }
 
-/// Entries not yet sorted; a part refers to the place of its whole.
+/// Unsorted entries; a part refers to the index of its whole.
 #[derive(Default)]
 pub(crate) struct Drafts {
     pub(crate) list: Vec<Entry>,
 }
 
 impl Drafts {
-    /// Adds an entry; returns its place.
+    /// Adds an entry; returns its index.
     pub(crate) fn add(&mut self, entry: Entry) -> EntryId {
         self.list.push(entry);
         EntryId::try_from(self.list.len() - 1).unwrap_or(EntryId::MAX)
     }
 
-    /// The entry at this place.
+    /// The entry at this index.
     pub(crate) fn get(&self, id: EntryId) -> &Entry {
         &self.list[id as usize]
     }
@@ -60,20 +60,20 @@ impl Drafts {
 }
 
 /// Every entry of a mission, sorted.
-pub(crate) fn make(told: &LedgerInput<'_>) -> Vec<Entry> {
+pub(crate) fn make(context: &LedgerInput<'_>) -> Vec<Entry> {
     let mut drafts = Drafts::default();
-    lifetimes::tell(told, &mut drafts);
-    silence::tell(told, &mut drafts);
-    hands::tell(told, &mut drafts);
-    rates::tell(told, &mut drafts);
-    lifecycles(told, &mut drafts);
-    incidents::tell(told, &mut drafts);
-    causes::tell(told, &mut drafts);
-    sorted(drafts.list, told.elements).0
+    lifetimes::tell(context, &mut drafts);
+    silence::tell(context, &mut drafts);
+    hands::tell(context, &mut drafts);
+    rates::tell(context, &mut drafts);
+    lifecycles(context, &mut drafts);
+    incidents::tell(context, &mut drafts);
+    causes::tell(context, &mut drafts);
+    sorted(drafts.list, context.elements).0
 }
 
-/// Sorts by time, kind and name, gives parts the new places of their wholes and wholes their weight; returns also the
-/// new place of each.
+/// Sorts by time, kind and name, updates the references of parts and the weights of wholes; also returns the new index
+/// of each.
 pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, Vec<EntryId>) {
     let mut order: Vec<usize> = (0..list.len()).collect();
     let key = |at: &usize| {
@@ -128,7 +128,7 @@ impl<'a> LedgerInput<'a> {
         }
     }
 
-    /// The lives of an element, in order.
+    /// The lifetimes of an element, in order.
     pub(crate) fn lives(&self, what: Element) -> &'a [Life] {
         let record = self.history.records.of(what);
         record.map_or(&[], |record| &record.lives)
@@ -144,7 +144,7 @@ impl<'a> LedgerInput<'a> {
         is_housekeeping(self.elements, what)
     }
 
-    /// Whether a topic's rates and senders mean nothing by themselves: housekeeping, and topics of actions.
+    /// Whether a topic's rates and senders are irrelevant: housekeeping, and topics of actions.
     pub(crate) fn is_by_the_way(&self, topic: u32) -> bool {
         let name = self.elements.topics[topic as usize].name.as_str();
         is_quiet(name)
@@ -156,7 +156,7 @@ impl<'a> LedgerInput<'a> {
     }
 }
 
-/// Types that many nodes write to in turn, so that a new writer takes over nothing.
+/// Types of topics that many nodes publish to in turn, so that a new publisher is not a hand-over.
 const SHARED: [&str; 8] = [
     "Log",
     "ParameterEvent",
@@ -176,16 +176,16 @@ pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
 }
 
 /// Adds the changes of nodes' lifecycle states.
-fn lifecycles(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn lifecycles(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();
-    for change in &told.history.transitions {
+    for change in &context.history.transitions {
         let before = states.insert(change.node, change.state.clone());
         let from = before.unwrap_or_default();
         if from == change.state {
             continue;
         }
-        let mut entry = told.entry(
+        let mut entry = context.entry(
             Kind::Lifecycle,
             Element::Node(change.node),
             exact(change.time),
@@ -200,7 +200,7 @@ fn lifecycles(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// A moment that is known exactly.
+/// An exact time.
 pub(crate) fn exact(time: Stamp) -> Bound {
     Bound {
         time,

@@ -1,4 +1,4 @@
-//! Changes of rates: where two even stretches of one sender meet.
+//! Rate changes: between two adjacent even stretches of one sender.
 
 use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
@@ -7,15 +7,17 @@ use crate::graph::Element;
 use crate::graph::history::{Bound, Sender, Stretch};
 
 /// Adds all changes of rates.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let senders = told.history.sending.senders.iter();
-    for sender in senders.filter(|v| !v.is_latched && !told.is_by_the_way(v.topic)) {
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+    let senders = context.history.sending.senders.iter();
+    for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
         for pair in sender.stretches.windows(2) {
             let [before, after] = pair else { continue };
-            if changes(before, after, told.rate_change) && !is_away(told, sender, before, after) {
-                let what = told.publication(sender);
+            if changes(before, after, context.rate_change)
+                && !is_away(context, sender, before, after)
+            {
+                let what = context.publication(sender);
                 let width = before.period.max(after.period);
-                let mut entry = told.entry(
+                let mut entry = context.entry(
                     Kind::Rate,
                     what,
                     Bound {
@@ -34,7 +36,7 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// Whether a steady rate becomes another one.
+/// Whether a steady rate changes to another one.
 fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
     let holds = |s: &Stretch| {
         s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
@@ -45,8 +47,8 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
 }
 
 /// Whether the sender restarted between the two.
-fn is_away(told: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
-    let lives = told.lives(told.publication(sender)).iter();
+fn is_away(context: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
+    let lives = context.lives(context.publication(sender)).iter();
     !after.is_joined
         && lives
             .filter_map(|life| life.ended)
@@ -54,7 +56,7 @@ fn is_away(told: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: &St
 }
 
 impl LedgerInput<'_> {
-    /// The publication of a sender; its topic where the sender is unknown.
+    /// The publication of a sender; its topic if the sender is unknown.
     pub(super) fn publication(&self, sender: &Sender) -> Element {
         let edge = sender
             .node

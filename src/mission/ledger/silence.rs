@@ -1,4 +1,4 @@
-//! Silences without a proof of an end: of nodes, and of topics whose senders all paused.
+//! Silences without proof of an end: of nodes, and of topics whose senders all paused.
 
 use std::collections::BTreeMap;
 
@@ -13,22 +13,22 @@ use crate::graph::{Element, NodeId, Record, TopicId};
 type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
-pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
-    for (node, senders) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
+    for (node, senders) in by(context, |v| v.node.filter(|_| !v.is_latched)) {
         let what = Element::Node(node);
-        for silence in silences(told, what) {
-            let id = drafts.add(entry(told, what, *silence, &senders));
+        for silence in silences(context, what) {
+            let id = drafts.add(entry(context, what, *silence, &senders));
             of_nodes.entry(node).or_default().push((*silence, id));
         }
     }
-    for (topic, senders) in by(told, |v| Some(v.topic).filter(|_| !v.is_latched)) {
-        if told.is_by_the_way(topic) {
+    for (topic, senders) in by(context, |v| Some(v.topic).filter(|_| !v.is_latched)) {
+        if context.is_by_the_way(topic) {
             continue;
         }
-        for silence in silences(told, Element::Topic(topic)) {
-            let mut entry = entry(told, Element::Topic(topic), *silence, &senders);
+        for silence in silences(context, Element::Topic(topic)) {
+            let mut entry = entry(context, Element::Topic(topic), *silence, &senders);
             let nodes = senders.iter().filter_map(|v| of_nodes.get(&v.node?));
             let whole = nodes.flatten().find(|(of, _)| meet(*of, *silence));
             let whole = whole.map(|(_, id)| *id);
@@ -65,11 +65,11 @@ impl Gone {
 
 /// The senders of each node, or of each topic.
 fn by<'a>(
-    told: &LedgerInput<'a>,
+    context: &LedgerInput<'a>,
     key: impl Fn(&Sender) -> Option<u32>,
 ) -> BTreeMap<TopicId, Vec<&'a Sender>> {
     let mut of: BTreeMap<u32, Vec<&Sender>> = BTreeMap::new();
-    for voice in &told.history.sending.senders {
+    for voice in &context.history.sending.senders {
         if let Some(key) = key(voice) {
             of.entry(key).or_default().push(voice);
         }
@@ -78,12 +78,16 @@ fn by<'a>(
 }
 
 /// The silences of an element.
-fn silences<'a>(told: &LedgerInput<'a>, what: Element) -> &'a [Silence] {
-    told.history.records.of(what).map_or(&[], Record::silences)
+fn silences<'a>(context: &LedgerInput<'a>, what: Element) -> &'a [Silence] {
+    context
+        .history
+        .records
+        .of(what)
+        .map_or(&[], Record::silences)
 }
 
 fn entry(
-    told: &LedgerInput<'_>,
+    context: &LedgerInput<'_>,
     what: Element,
     (from, to): Silence,
     senders: &[&Sender],
@@ -93,7 +97,7 @@ fn entry(
         .flat_map(|v| &v.stretches)
         .filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
-    let mut entry = told.entry(
+    let mut entry = context.entry(
         Kind::Silent,
         what,
         Bound {
@@ -106,7 +110,7 @@ fn entry(
     entry
 }
 
-/// Whether two silences share time.
+/// Whether two silences overlap.
 fn meet(a: Silence, b: Silence) -> bool {
     let before = |a: Silence, b: Silence| a.1.is_some_and(|end| end <= b.0);
     !before(a, b) && !before(b, a)

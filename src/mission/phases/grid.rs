@@ -1,4 +1,4 @@
-//! The grid in which phases are searched: short cells that do not depend on `--period`.
+//! The grid for phase detection: short cells independent of `--period`.
 
 use crate::base::time::{Span, round_length};
 use crate::graph::window::every;
@@ -9,7 +9,7 @@ const MOST_CELLS: i64 = 200;
 /// The shortest cell.
 const SECOND: i64 = 1_000_000_000;
 
-/// The cells that divide `span`: of 1 s if possible, of longer steps where there would be more than [`MOST_CELLS`].
+/// The cells that divide `span`: 1 s if possible, longer if there would be more than [`MOST_CELLS`].
 pub(super) fn grid(span: Span) -> Vec<Span> {
     let step = round_length((span.nanos().max(1) / MOST_CELLS + 1).max(SECOND));
     every(span, step)

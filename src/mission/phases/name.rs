@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::base::name::last_part;
 use crate::base::words::{count, some_of};
 
-/// The most names that are listed.
+/// The most names listed.
 const MOST: usize = 3;
 
 /// The name by the changes: `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `+4 −1 nodes: …`,
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_phase_is_named_by_what_began() {
+    fn a_phase_is_named_after_elements_that_began() {
         let names: Vec<Arc<str>> = ["/a/x", "/b/y", "/z", "/w"].map(Arc::from).to_vec();
         let all: Vec<&Arc<str>> = names.iter().collect();
         assert_eq!(&*of_changes(true, &all, &[], "node"), "4 nodes");

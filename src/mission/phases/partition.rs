@@ -11,9 +11,8 @@ const FEWEST: i128 = 10;
 /// The shortest phase, as a part of the mission (one in so many).
 const SHORTEST: i64 = 20;
 
-/// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds, `present` says
-/// for each element in which of them it exists. On a tie the
-/// earlier cut is taken.
+/// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds, `present`
+/// states for each element in which of them it exists. On a tie the earlier cut is taken.
 pub(crate) fn partition(widths: &[i64], present: &[Vec<bool>]) -> Vec<usize> {
     let n = widths.len();
     let mut at = vec![0_i64; n + 1];
@@ -26,7 +25,7 @@ pub(crate) fn partition(widths: &[i64], present: &[Vec<bool>]) -> Vec<usize> {
         .iter()
         .map(|(sums, many)| i128::from(sums[n]) * many)
         .sum();
-    // Mean number of elements times the mission's length is what all of them are present together.
+    // The mean number of elements times the mission's length is their total presence.
     let price = total.max(FEWEST * whole) / PRICE;
     let shortest = at[n] / SHORTEST;
     let cost = |from: usize, to: usize| -> i128 {
@@ -62,8 +61,8 @@ pub(crate) fn partition(widths: &[i64], present: &[Vec<bool>]) -> Vec<usize> {
     cuts
 }
 
-/// The time each element is present before every cell, and the number of elements that share that; elements that come
-/// and go together are one row.
+/// The time each element is present before every cell, and the number of such elements; elements with the same presence
+/// are one row.
 fn rows(widths: &[i64], present: &[Vec<bool>]) -> Vec<(Vec<i64>, i128)> {
     let mut many: BTreeMap<&[bool], i128> = BTreeMap::new();
     for cells in present {
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crash_shorter_than_its_weight_cuts_nothing() {
+    fn a_short_crash_is_not_a_boundary() {
         let rows = [
             ("########################################", 8),
             ("###############.########################", 1),
@@ -129,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_at_all_is_not_cut() {
+    fn an_empty_mission_is_not_cut() {
         assert!(partition(&[], &[]).is_empty());
         assert!(partition(&[5, 5], &[]).is_empty());
     }

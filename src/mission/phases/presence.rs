@@ -8,7 +8,7 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Sending, Stretch, silences};
 use crate::graph::{Edge, Element, Elements, Node, Topic, TopicId};
 
-/// The longest absence, as a part of the mission (one in so many), that does not count inside an element's life: a slow
+/// The longest absence, as a part of the mission (one in so many), that is ignored inside an element's lifetime: a slow
 /// topic has no message in some cells.
 const FILLED: i64 = 50;
 
@@ -19,7 +19,7 @@ pub(crate) enum PresentThing {
     Node(Arc<str>),
     /// A publication: role and topic.
     Publication(Arc<str>, Arc<str>),
-    /// A topic, where publishers are unknown.
+    /// A topic, if publishers are unknown.
     Topic(Arc<str>),
 }
 
@@ -36,7 +36,7 @@ impl PresentThing {
 #[derive(Clone, Debug)]
 pub(crate) struct Presence {
     pub(crate) subject: PresentThing,
-    /// In order, none overlapping.
+    /// Sorted, without overlaps.
     spans: Vec<Span>,
 }
 
@@ -58,7 +58,7 @@ impl Presence {
         there.saturating_mul(2) >= time.nanos()
     }
 
-    /// Whether it counts for the names of phases: nodes, or topics where there are only topics.
+    /// Whether it counts for the names of phases: nodes, or topics if there are only topics.
     pub(crate) fn counts(&self, topics: bool) -> bool {
         match self.subject {
             PresentThing::Node(_) => !topics,
@@ -68,7 +68,7 @@ impl Presence {
     }
 }
 
-/// Whether phases are found in topics.
+/// Whether phases are detected from topics.
 pub(crate) fn is_topics(present: &[Presence]) -> bool {
     present
         .iter()
@@ -98,7 +98,7 @@ pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> 
         .collect()
 }
 
-/// The times in which a topic carries messages, or a publication that has sent any: while it lives, but for silences.
+/// The times in which a topic, or a publication with messages, is active: its lifetime without silences.
 fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
     let stretch = |s: &Stretch| Span::new(s.first, s.last.plus(1));
     let Element::Publish(_) = what else {
@@ -170,7 +170,7 @@ impl Subjects {
     }
 }
 
-/// Whether at least half of the messages are on topics of which some publisher is known.
+/// Whether at least half of the messages are on topics with a known publisher.
 pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
     let mut known_on: BTreeMap<TopicId, Vec<&Edge>> = BTreeMap::new();
     for edge in elements.publishes.iter().filter(|e| !e.evidence.is_guess()) {

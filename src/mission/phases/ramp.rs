@@ -1,5 +1,4 @@
-//! Ramps: many short phases in a row that only add or only remove, such as a fleet that joins one by one, made one
-//! phase.
+//! Ramps: merges many consecutive short phases that only add or only remove, such as a fleet that joins one by one.
 
 use super::Configuration;
 use crate::base::time::Span;
@@ -16,7 +15,7 @@ enum PhaseEffect {
     Down,
 }
 
-/// The phases with every ramp made one, and flags of the ramps. A ramp's configuration is its last one.
+/// The phases with ramps merged, and flags of the ramps. A ramp's configuration is its last one.
 pub(crate) fn joined(
     spans: &[Span],
     found: &[Configuration],
@@ -84,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn four_steps_or_a_long_one_among_them_are_none() {
+    fn four_steps_or_a_long_one_are_not_a_ramp() {
         assert_eq!(lengths(&[(1, 80), (2, 5), (3, 5), (4, 5), (5, 5)]).len(), 5);
         let long = [(1, 40), (2, 5), (3, 5), (4, 35), (5, 5), (6, 5), (7, 5)];
         assert_eq!(lengths(&long).len(), 7);

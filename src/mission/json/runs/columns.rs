@@ -1,4 +1,4 @@
-//! Columns of values in which equal neighbours are joined.
+//! Run-length encoded columns.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -96,8 +96,8 @@ fn read(text: &str) -> Mission {
 
 proptest! {
     #[test]
-    fn runs_hold_what_windows_hold(list in proptest::collection::vec((graph(), 1..5_000_000_000_i64), 1..12)) {
-        // What only one form can say (an element that is in no window) is gone after the first reading.
+    fn both_forms_have_the_same_content(list in proptest::collection::vec((graph(), 1..5_000_000_000_i64), 1..12)) {
+        // Elements in no window, which only one form can represent, are gone after the first reading.
         let first = read(&written(&mission(list), JsonForm::Windows));
         let second = read(&written(&first, JsonForm::Runs));
         prop_assert_eq!(&first, &second);
@@ -106,7 +106,7 @@ proptest! {
 }
 
 #[test]
-fn nonsense_in_columns_is_left_out() {
+fn invalid_columns_are_ignored() {
     let text = r#"{"schema": "bagreel.evolution/2", "form": "runs", "windows": [{"start_ns": 0, "end_ns": 5},
         {"start_ns": 5, "end_ns": 9}], "topics": [{"name": "/t", "in": {"windows": [[1, 99999999999], [0, 0]],
         "state": [["silent", 4000000000]], "count": [[3, 4000000000]], "hz": [4000000000]}}]}"#;
