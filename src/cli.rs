@@ -46,11 +46,11 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
 
 /// Silences the panics of `layout-rs`, which are caught; the graph is then laid out by another engine.
 fn hush() {
-    let tell = std::panic::take_hook();
+    let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let is_caught = |at: &std::panic::Location<'_>| at.file().contains("layout-rs-");
         if !panic.location().is_some_and(is_caught) {
-            tell(panic);
+            default_hook(panic);
         }
     }));
 }

@@ -215,7 +215,7 @@ impl Delivery {
         self.stamps.len() > 1 << 14 || self.bytes.len() > 1 << 17
     }
 
-    fn tell(&self, sink: &mut dyn Sink) {
+    fn report(&self, sink: &mut dyn Sink) {
         let (mut at, mut size_at, mut byte_at) = (0, 0, 0);
         for (id, count, sized) in &self.runs {
             let Some(id) = id else {
@@ -337,7 +337,7 @@ pub(crate) fn in_order(
         for part in 0..count {
             let line = &lines[part % threads];
             while let Ok(Sent::Some(batch)) = line.recv() {
-                batch.tell(sink);
+                batch.report(sink);
             }
             after(part, sink);
         }

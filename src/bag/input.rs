@@ -76,8 +76,8 @@ pub fn size_on_disk(input: &Input) -> Option<u64> {
         return None;
     };
     let size = |path: &Path| {
-        let told = std::fs::metadata(path).ok();
-        told.filter(std::fs::Metadata::is_file).map(|m| m.len())
+        let metadata = std::fs::metadata(path).ok();
+        metadata.filter(std::fs::Metadata::is_file).map(|m| m.len())
     };
     size(path).or_else(|| {
         let files = std::fs::read_dir(path).ok()?.flatten();

@@ -89,8 +89,8 @@ impl Refused {
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) if it does not exist, [`Error::Remote`](crate::Error::Remote) if the store fails.
 fn object(url: &str) -> Result<Opened> {
-    let told = &told_url(url);
-    let (object, first) = Object::open(url, FIRST).map_err(|why| why.error(told))?;
+    let public_url = &told_url(url);
+    let (object, first) = Object::open(url, FIRST).map_err(|why| why.error(public_url))?;
     let (len, etag) = (object.len, object.etag.clone());
     let refused: Arc<OnceLock<StoreRefusal>> = Arc::default();
     let remote = Remote {
@@ -99,7 +99,7 @@ fn object(url: &str) -> Result<Opened> {
         refused: Arc::clone(&refused),
     };
     let refused = Refused {
-        url: told.clone(),
+        url: public_url.clone(),
         why: refused,
     };
     remote.keep(0, first);
@@ -110,7 +110,7 @@ fn object(url: &str) -> Result<Opened> {
         refused.check()?;
     }
     Ok(Opened {
-        source: FileSource::of(Path::new(told), len, remote),
+        source: FileSource::of(Path::new(public_url), len, remote),
         etag,
         refused,
     })

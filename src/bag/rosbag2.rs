@@ -70,7 +70,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     match metadata::read(&path) {
         Ok(found) => folder.metadata = found.unwrap_or_default(),
-        Err(why) => folder.say(
+        Err(why) => folder.note(
             NoticeKind::Note,
             format!("`metadata.yaml` was left out: {why}"),
         ),
@@ -82,7 +82,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         match part {
             Ok(reader) => folder.parts.push(reader),
             Err(e) => {
-                folder.say(NoticeKind::Damaged, format!("a part was left out: {e}"));
+                folder.note(NoticeKind::Damaged, format!("a part was left out: {e}"));
                 failed.get_or_insert(e);
             }
         }
@@ -118,7 +118,7 @@ fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
 }
 
 impl BagFolder {
-    fn say(&mut self, kind: NoticeKind, text: String) {
+    fn note(&mut self, kind: NoticeKind, text: String) {
         self.notices.push(Notice::new(kind, text));
     }
 
@@ -138,12 +138,12 @@ impl BagFolder {
         let instead = found.is_empty() && !there.is_empty();
         for why in missing {
             if instead {
-                self.say(
+                self.note(
                     NoticeKind::Note,
                     format!("{why}; read what lies there instead"),
                 );
             } else {
-                self.say(
+                self.note(
                     NoticeKind::Damaged,
                     format!("a part of the recording: {why}"),
                 );
@@ -163,25 +163,25 @@ impl BagFolder {
         for other in beside.take(FILES) {
             let name = other.strip_prefix(path).unwrap_or(other).display();
             let text = format!("`{name}` is not named in `metadata.yaml` and was left out");
-            self.say(NoticeKind::Note, text);
+            self.note(NoticeKind::Note, text);
         }
         found
     }
 
     /// The error for a folder without any of its files.
     fn nothing(&self, path: &Path) -> Error {
-        let mut said: Vec<String> = self.notices.iter().map(|n| n.text.clone()).collect();
-        if said.is_empty() {
+        let mut reasons: Vec<String> = self.notices.iter().map(|n| n.text.clone()).collect();
+        if reasons.is_empty() {
             let (_, links) = storage_and_links(path);
             let names = links.iter().filter_map(|link| link.file_name());
-            said.extend(names.map(|name| metadata::leads_out(&name.to_string_lossy())));
+            reasons.extend(names.map(|name| metadata::leads_out(&name.to_string_lossy())));
         }
-        if said.is_empty() {
+        if reasons.is_empty() {
             return explain(path, &[], true);
         }
         Error::UnknownBag {
             path: path.to_owned(),
-            looks_like: format!("a folder without its recording ({})", said.join("; ")),
+            looks_like: format!("a folder without its recording ({})", reasons.join("; ")),
             hint: "copy the `.db3` or `.mcap` files that `metadata.yaml` names into it".to_owned(),
         }
     }

@@ -298,11 +298,11 @@ impl Sqlite3Bag {
 /// Has SQLite check the whole file for damage.
 fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA quick_check(1)", &[], |row| row.text(0));
-    let said = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
-    if said != "ok" {
+    let result = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
+    if result != "ok" {
         sink.notice(Notice::new(
             NoticeKind::Damaged,
-            format!("the database is damaged: {said}"),
+            format!("the database is damaged: {result}"),
         ));
     }
 }

@@ -276,7 +276,7 @@ mod tests {
     /// Parts of a file: for each, the connections with their seconds.
     type Parts<'a> = &'a [&'a [(u32, Vec<i64>)]];
 
-    fn tell(parts: Parts<'_>, sink: &mut dyn Sink) {
+    fn feed(parts: Parts<'_>, sink: &mut dyn Sink) {
         for part in parts {
             sink.part();
             for (id, seconds) in *part {
@@ -290,7 +290,7 @@ mod tests {
         let mut kept = Kept::default();
         let mut watched = Watched::new(&mut kept);
         watched.lines.resize(3, Line::default());
-        tell(parts, &mut watched);
+        feed(parts, &mut watched);
         watched.seams()
     }
 
@@ -302,14 +302,14 @@ mod tests {
             &[(1, vec![58]), (0, (40..90).collect()), (2, vec![45])],
         ];
         let found = seams(parts);
-        let told: Vec<_> = falls(&found, true)
+        let reported: Vec<_> = falls(&found, true)
             .map(|f| (f.time.0 / SECOND, f.length / SECOND))
             .collect();
-        assert_eq!(told, [(59, 19)]);
+        assert_eq!(reported, [(59, 19)]);
         let mut kept = Kept::default();
         let mut moved = Straightened::new(&found, &mut kept);
         moved.counts.resize(3, [0; 2]);
-        tell(parts, &mut moved);
+        feed(parts, &mut moved);
         assert_eq!(kept.0[0], (0..60).chain(59..109).collect::<Vec<_>>());
         assert_eq!(kept.0[1], [0, 30, 77]);
     }

@@ -267,12 +267,12 @@ pub fn shorten(text: &str, most: usize) -> Cow<'_, str> {
 
 /// A list of names, shortened: `a, b and c`, or `a, b, c and 4 more`. At least one and at most `most` are named.
 pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
-    let told: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
-    match (told.as_slice(), names.len() - told.len()) {
+    let listed: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
+    match (listed.as_slice(), names.len() - listed.len()) {
         ([], _) => String::new(),
         ([one], 0) => (*one).to_owned(),
         ([first @ .., last], 0) => format!("{} and {last}", first.join(", ")),
-        (told, rest) => format!("{} and {rest} more", told.join(", ")),
+        (listed, rest) => format!("{} and {rest} more", listed.join(", ")),
     }
 }
 
@@ -403,8 +403,8 @@ mod tests {
             ),
             (visible("/größe ✓").into_owned(), "/größe ✓"),
         ];
-        for (said, expected) in table {
-            assert_eq!(said, expected);
+        for (text, expected) in table {
+            assert_eq!(text, expected);
         }
     }
 }

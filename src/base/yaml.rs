@@ -123,7 +123,7 @@ const MISTAKES: [(&str, &str); 12] = [
 fn reason(error: &serde_saphyr::Error) -> String {
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
-    if let Some((_, words)) = MISTAKES.iter().find(|(said, _)| first.contains(said)) {
+    if let Some((_, words)) = MISTAKES.iter().find(|(pattern, _)| first.contains(pattern)) {
         return (*words).to_owned();
     }
     // The position is shown already: `error: line 2 column 2: …`.

@@ -129,18 +129,18 @@ fn is_own(host: &str) -> bool {
 /// Sends the number of the newest page, and that of each newer one.
 fn events(stream: &mut TcpStream, newest: &Newest) -> std::io::Result<()> {
     head(stream, "200 OK", "text/event-stream")?;
-    let mut told = None;
+    let mut sent = None;
     loop {
         let page = newest.0.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = newest
             .1
-            .wait_timeout_while(page, ALIVE, |page| told == Some(page.0));
+            .wait_timeout_while(page, ALIVE, |page| sent == Some(page.0));
         let number = waited.unwrap_or_else(PoisonError::into_inner).0.0;
-        if told == Some(number) {
+        if sent == Some(number) {
             stream.write_all(b":\n\n")?;
         } else {
             write!(stream, "data: {number}\n\n")?;
-            told = Some(number);
+            sent = Some(number);
         }
         stream.flush()?;
     }

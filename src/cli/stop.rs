@@ -71,9 +71,9 @@ impl Stop {
 /// Ends the process without leaving partial files: those are unnamed, or registered and removed.
 fn end(signal: u8, report: fn()) {
     leftovers::remove();
-    let said = thread::spawn(report);
+    let message = thread::spawn(report);
     let mut waited = Duration::ZERO;
-    while !said.is_finished() && waited < LAST_WORDS {
+    while !message.is_finished() && waited < LAST_WORDS {
         thread::sleep(LAST_WORDS / 10);
         waited += LAST_WORDS / 10;
     }

@@ -69,7 +69,7 @@ struct ReportTimes<'a> {
 }
 
 impl ReportTimes<'_> {
-    fn told(&self, at: Stamp) -> String {
+    fn link(&self, at: Stamp) -> String {
         let millis = at.since(self.start).div_euclid(1_000_000);
         let text = words::offset_seconds(millis * 1_000_000);
         match self.player {
@@ -92,11 +92,11 @@ fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
         .frames
         .iter()
         .fold(Counts::default(), |sum, f| sum + f.counts);
-    let told = told(&counts);
-    let said = if told.is_empty() {
+    let headline_counts = headline_counts(&counts);
+    let said = if headline_counts.is_empty() {
         "nothing changed".to_owned()
     } else {
-        told.join(", ")
+        headline_counts.join(", ")
     };
     let changed = (0..view.frames.len())
         .filter(|k| view.is_changed(*k))
@@ -128,7 +128,7 @@ fn title(sequence: &Sequence<'_>) -> String {
 }
 
 /// The number of headlines of all windows, as text.
-fn told(counts: &Counts) -> Vec<String> {
+fn headline_counts(counts: &Counts) -> Vec<String> {
     let all = [
         (counts.nodes_added, "node", " started"),
         (counts.nodes_removed, "node", " stopped"),

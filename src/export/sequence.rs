@@ -194,10 +194,10 @@ mod tests {
 
     /// Window, phase and milliseconds of every frame.
     fn plan(changed: &[bool], options: &SequenceOptions) -> Vec<(usize, f64, u32)> {
-        let told = |s: FrameTime| (s.window, s.phase, s.ms);
+        let numbers = |s: FrameTime| (s.window, s.phase, s.ms);
         frame_times(changed, options)
             .into_iter()
-            .map(told)
+            .map(numbers)
             .collect()
     }
 

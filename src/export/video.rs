@@ -164,9 +164,9 @@ impl Video<'_> {
     fn complaint(&self, work: &mut FfmpegJob) -> Error {
         drop(work.pipe.take());
         let _ = work.child.0.wait();
-        let said = work.messages.take().and_then(|all| all.join().ok());
-        let said = String::from_utf8_lossy(&said.unwrap_or_default()).into_owned();
-        let last = said.lines().rev().find(|l| !l.trim().is_empty());
+        let messages = work.messages.take().and_then(|all| all.join().ok());
+        let messages = String::from_utf8_lossy(&messages.unwrap_or_default()).into_owned();
+        let last = messages.lines().rev().find(|l| !l.trim().is_empty());
         self.failed(format!(
             "ffmpeg failed: {}",
             last.unwrap_or("it did not say why")
@@ -248,16 +248,16 @@ impl FfmpegJob {
 
 /// The end of the messages of a child process, read until it closes the pipe.
 fn last_messages(mut pipe: ChildStderr) -> Vec<u8> {
-    let (mut said, mut buffer) = (Vec::new(), [0; 4096]);
+    let (mut messages, mut buffer) = (Vec::new(), [0; 4096]);
     // Read errors are ignored, as partial messages still help.
     while let Ok(count) = pipe.read(&mut buffer)
         && count > 0
     {
-        said.extend_from_slice(&buffer[..count]);
-        let spare = said.len().saturating_sub(budget::MESSAGES_OF_A_CHILD);
-        said.drain(..spare);
+        messages.extend_from_slice(&buffer[..count]);
+        let spare = messages.len().saturating_sub(budget::MESSAGES_OF_A_CHILD);
+        messages.drain(..spare);
     }
-    said
+    messages
 }
 
 /// The greatest common divisor of all times, but at least [`FINEST_MS`].

@@ -106,7 +106,7 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool)
         expectation,
         is_part,
         checks: Vec::new(),
-        told: Cell::new(0),
+        searched: Cell::new(0),
     };
     for named in &expectation.nodes {
         judge.node(named);
@@ -141,7 +141,7 @@ struct Judge<'a> {
     is_part: bool,
     checks: Vec<Checked>,
     /// The number of names for which a similar one was searched.
-    told: Cell<usize>,
+    searched: Cell<usize>,
 }
 
 /// The most missing names for which the nearest one is reported; with more, the file is for another robot.
@@ -150,8 +150,8 @@ const NEAR: usize = 50;
 impl Judge<'_> {
     /// The hint for a missing name: the nearest one.
     fn near<'k>(&self, pattern: &Pattern, known: impl Iterator<Item = &'k str>) -> Option<String> {
-        self.told.set(self.told.get() + 1);
-        let near = (self.told.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
+        self.searched.set(self.searched.get() + 1);
+        let near = (self.searched.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
         Some(format!("the nearest name in the bag is `{}`", near??))
     }
 

@@ -246,7 +246,7 @@ pub fn json(value: &impl Serialize) -> String {
 }
 
 fn bags(mission: &Mission) -> Vec<BagInfo> {
-    let told = mission.bags.iter().map(|bag| BagInfo {
+    let bags = mission.bags.iter().map(|bag| BagInfo {
         name: bag.name.clone(),
         format: bag.format.clone(),
         compression: bag.compression.clone(),
@@ -256,7 +256,7 @@ fn bags(mission: &Mission) -> Vec<BagInfo> {
         file_bytes: bag.file_bytes,
         facts: bag.facts.clone(),
     });
-    told.collect()
+    bags.collect()
 }
 
 /// The name of the evidence for unnamed publishers, which the summary counts per topic.
@@ -281,8 +281,8 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
 fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
     let known = edges.filter(|edge| !edge.evidence.is_guess());
     let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();
-    let spoken = topics.iter().enumerate().filter(|(_, t)| t.count > 0);
-    spoken.filter(|(id, _)| !known.contains(id)).count()
+    let with_messages = topics.iter().enumerate().filter(|(_, t)| t.count > 0);
+    with_messages.filter(|(id, _)| !known.contains(id)).count()
 }
 
 /// The numbers of edges and messages of one node.

@@ -140,8 +140,8 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     };
     let mut pictures = show_alike(&some(false), mission, watch)?;
     let graphs = show_alike(&some(true), pictures.mission, watch)?;
-    let told: Vec<Notice> = pictures.notices.iter().collect();
-    let more = graphs.notices.iter().filter(|n| !told.contains(n));
+    let known: Vec<Notice> = pictures.notices.iter().collect();
+    let more = graphs.notices.iter().filter(|n| !known.contains(n));
     pictures.notices.extend(more);
     let (mut drawn, mut written) = (pictures.written.into_iter(), graphs.written.into_iter());
     let in_order = is_whole

@@ -14,7 +14,7 @@ pub(super) struct Behind {
 
 /// The messages found since the last chunk began.
 #[derive(Default)]
-pub(super) struct ToldMessages {
+pub(super) struct ChunkMessages {
     gather: Gather,
     /// The number of messages of the bag that have been or will be reported.
     pub(super) messages: u64,
@@ -30,7 +30,7 @@ pub(super) struct ToldMessages {
     surplus: u64,
 }
 
-impl ToldMessages {
+impl ChunkMessages {
     /// Adds one message.
     pub(super) fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
         self.messages += 1;

@@ -22,7 +22,7 @@ impl<G: Grammar> Query<'_, G> {
             return;
         };
         if let Some(index) = self.sufficient(chunk, promised) {
-            return self.tell(&index, None, sink);
+            return self.report(&index, None, sink);
         }
         let found = match self.index(chunk, promised) {
             Ok(found) => found,
@@ -36,7 +36,7 @@ impl<G: Grammar> Query<'_, G> {
             return self.unnamed(chunk, sink);
         };
         let body = found.body.or_else(|| self.moved(chunk));
-        self.tell(&found.index, body, sink);
+        self.report(&found.index, body, sink);
         let wrong = [
             (!found.index.spans(chunk.first, chunk.last)).then_some(OTHER_TIMES),
             (found.place == Place::Apart).then_some(APART),

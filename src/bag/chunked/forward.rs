@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::Grammar;
-use super::check::{Behind, ToldMessages};
+use super::check::{Behind, ChunkMessages};
 use super::index::{hand_over, nameless};
 use super::record::{Announced, ChunkHead, NoRecord, RecordHead, pass, walk};
 use super::unpack::{Visitor, records, unpack};
@@ -40,7 +40,7 @@ const MOST_EARLY: usize = 1 << 18;
 struct Forward<'s, G> {
     sink: &'s mut dyn Sink,
     announced: Announced<G>,
-    told: ToldMessages,
+    found_messages: ChunkMessages,
     early: Early,
     found: ForwardScan,
     allowance: Arc<Allowance>,
@@ -61,7 +61,7 @@ pub(super) fn read<G: Grammar>(
     let mut forward: Forward<'_, G> = Forward {
         sink,
         announced: Announced::default(),
-        told: ToldMessages::default(),
+        found_messages: ChunkMessages::default(),
         early: Early::default(),
         found: ForwardScan {
             complete: true,
@@ -126,7 +126,7 @@ impl<G: Grammar> Forward<'_, G> {
             }
             RecordHead::FileEnd { len } => self.file_end(stream, len),
             RecordHead::Unknown { len, extension } => {
-                self.told.interrupt();
+                self.found_messages.interrupt();
                 let text = "records of a kind that the format does not define were skipped";
                 if extension {
                     self.sink.notice(Notice::new(NoticeKind::Note, text));
@@ -136,7 +136,7 @@ impl<G: Grammar> Forward<'_, G> {
                 pass(stream, len)
             }
             RecordHead::Other { len } | RecordHead::Tail { len } => {
-                self.told.interrupt();
+                self.found_messages.interrupt();
                 pass(stream, len)
             }
         }
@@ -181,7 +181,7 @@ impl<G: Grammar> Forward<'_, G> {
         let allowance = Arc::clone(&self.allowance);
         let wrong = unpack(stream, head, &allowance, self)?;
         if let Some(why) = wrong {
-            self.told.doubt(head.times);
+            self.found_messages.doubt(head.times);
             self.damage(&format!("a chunk is damaged inside: {why}"));
         }
         Ok(())
@@ -210,22 +210,22 @@ impl<G: Grammar> Forward<'_, G> {
         let Some((id, _)) = self.announced.get(raw) else {
             return pass(stream, len);
         };
-        let stamps = if self.told.wants_stamps(id, count) {
+        let stamps = if self.found_messages.wants_stamps(id, count) {
             let bytes = peek_whole(stream, len)?;
             G::index_stamps(bytes)
         } else {
             Vec::new()
         };
-        if self.told.is_of_another(id, &stamps) {
+        if self.found_messages.is_of_another(id, &stamps) {
             self.settle();
         }
-        self.told.behind(Behind { id, count, stamps });
+        self.found_messages.behind(Behind { id, count, stamps });
         pass(stream, len)
     }
 
     /// Reports the messages of the last chunk, once everything after it has been read.
     fn settle(&mut self) {
-        let (mended, surplus) = self.told.settle(self.sink);
+        let (mended, surplus) = self.found_messages.settle(self.sink);
         if mended > 0 {
             self.found.complete = false;
             super::index::absent(self.sink, mended);
@@ -254,7 +254,7 @@ impl<G: Grammar> Forward<'_, G> {
             self.found.complete = false;
             nameless(self.sink, homeless);
         }
-        let found = self.told.messages + homeless;
+        let found = self.found_messages.messages + homeless;
         if let Some(total) = self.total.filter(|total| *total > found) {
             self.damage(&format!(
                 "the bag should contain {total} messages; found {found}"
@@ -296,7 +296,7 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
             return Ok(());
         };
         hand_over(stream, (id, time, size), want, self.sink)?;
-        self.told.add(id, time, size, self.sink);
+        self.found_messages.add(id, time, size, self.sink);
         Ok(())
     }
 
@@ -317,7 +317,7 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         if let Some((raw, id)) = new
             && let Some((stamps, sizes)) = self.early.runs.remove(&raw)
         {
-            self.told.messages += stamps.len() as u64;
+            self.found_messages.messages += stamps.len() as u64;
             self.sink.stamps(id, &stamps, Some(&sizes));
         }
         pass(stream, len)

@@ -151,7 +151,7 @@ pub(super) struct Query<'a, G> {
 
 impl<G: Grammar> Query<'_, G> {
     /// Reports the stamps of `index` to `sink`, and the wanted messages from `body`.
-    pub(super) fn tell(&self, index: &Index, body: Option<ChunkBody>, sink: &mut dyn Sink) {
+    pub(super) fn report(&self, index: &Index, body: Option<ChunkBody>, sink: &mut dyn Sink) {
         let wanted = self.wanted(index);
         let sizes = if wanted.is_empty() {
             None

@@ -75,15 +75,15 @@ fn summed<G: Grammar>(
         Err(e) => return Some(e.to_string()),
     };
     let mut sum = None;
-    let (told, len) = if head.crc.is_some() {
+    let (result, len) = if head.crc.is_some() {
         let mut from = CrcReader::new(from);
-        let told = all_records(&mut from, visitor);
+        let result = all_records(&mut from, visitor);
         sum = from.sum();
-        told
+        result
     } else {
         all_records(&mut from, visitor)
     };
-    match told {
+    match result {
         Err(stop) => Some(stop.to_string()),
         Ok(()) if sum != head.crc => Some("its checksum is wrong".to_owned()),
         Ok(()) if len != head.plain => Some(NOT_AS_LONG.to_owned()),
@@ -97,8 +97,8 @@ fn all_records<G: Grammar>(
     visitor: &mut dyn Visitor<G>,
 ) -> (Result<(), NoRecord>, u64) {
     let mut plain = ByteStream::of_reader(from);
-    let told = records(&mut plain, u64::MAX, visitor);
-    (told, plain.position())
+    let result = records(&mut plain, u64::MAX, visitor);
+    (result, plain.position())
 }
 
 /// Visits the records of a chunk up to position `end` of `stream`, or to its end.

@@ -30,9 +30,9 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
     let mut found = SecondFinds::new(sink);
-    let told = records_of(&mut reader, &mut from, &mut found);
+    let result = records_of(&mut reader, &mut from, &mut found);
     found.flush();
-    told
+    result
 }
 
 /// Walks the plain chunks as the crate will, and rejects a file that would make it underflow: it subtracts a record's

@@ -110,13 +110,13 @@ impl StoreRefusal {
 
 /// Whether the cloud's instance metadata service, the last source of credentials tried, did not answer.
 fn is_instance(error: &StoreError) -> bool {
-    let said = error.to_string();
+    let text = error.to_string();
     let places = [
         "169.254.169.254",
         "169.254.170.2",
         "metadata.google.internal",
     ];
-    places.iter().any(|place| said.contains(place))
+    places.iter().any(|place| text.contains(place))
 }
 
 /// The most characters of a server's answer that are reported.

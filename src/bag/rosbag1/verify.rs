@@ -27,8 +27,8 @@ pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -
         bad.map_or(Ok(bag), |e| Err(e.to_string()))
     });
     verified.refused = bag.is_err();
-    let told = bag.and_then(|bag| records_of(&bag, &mut SecondFinds::new(sink)));
-    verified.stopped = told.err();
+    let result = bag.and_then(|bag| records_of(&bag, &mut SecondFinds::new(sink)));
+    verified.stopped = result.err();
     verified
 }
 

@@ -73,8 +73,8 @@ impl RowReading<'_, '_> {
         };
         let db = Db::open(&self.rows.bag.ready).map_err(|e| e.to_string())?;
         loop {
-            let told = self.some(&db, &format!("{}{order}", self.rows.sql), way);
-            let refusal = match told {
+            let result = self.some(&db, &format!("{}{order}", self.rows.sql), way);
+            let refusal = match result {
                 Ok(()) if self.repeated => return Err("they come again and again".to_owned()),
                 Ok(()) => return Ok(()),
                 Err(refusal) => refusal,
@@ -150,13 +150,13 @@ impl<'a> RowReader<'a> {
             gather,
             sink,
         };
-        let mut told = reading.on(Direction::Up);
-        if told.is_err() && reading.left.0 <= reading.left.1 {
-            told = told.and(reading.on(Direction::Down));
+        let mut result = reading.on(Direction::Up);
+        if result.is_err() && reading.left.0 <= reading.left.1 {
+            result = result.and(reading.on(Direction::Down));
         }
         reading.gather.flush(reading.sink);
-        reading.lost.tell(reading.sink);
-        if let Err(e) = told {
+        reading.lost.report(reading.sink);
+        if let Err(e) = result {
             let text = format!("rows could not be read: {e}");
             sink.notice(Notice::new(NoticeKind::Damaged, text));
         }
@@ -270,7 +270,7 @@ fn report_payload(
 }
 
 impl LostRows {
-    fn tell(&self, sink: &mut dyn Sink) {
+    fn report(&self, sink: &mut dyn Sink) {
         let kinds = [
             (
                 self.orphans,

@@ -39,9 +39,9 @@ const LINE: &str = "<path d=\"M3 10h24\"/><path d=\"M34 10l-8-4v8z\"/>";
 /// The meaning of the signs that occur in these views, as HTML.
 pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
     let mut out = String::new();
-    let mut told: Vec<String> = Vec::new();
+    let mut shown: Vec<String> = Vec::new();
     for (sign, words) in views.iter().flat_map(|view| signs(view, rate_change)) {
-        if !told.contains(&words) {
+        if !shown.contains(&words) {
             let mut text = Xml::default();
             text.text(&words);
             let _ = write!(
@@ -50,7 +50,7 @@ pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
                 picture(&sign),
                 text.finish()
             );
-            told.push(words);
+            shown.push(words);
         }
     }
     out

@@ -12,7 +12,7 @@ const MOST_ROWS: usize = 200;
 /// The most phrases in one row; the rest is counted.
 const MOST_PHRASES: usize = 5;
 
-fn is_told(frame: &Frame) -> bool {
+fn has_headlines(frame: &Frame) -> bool {
     !frame.headlines.is_empty()
 }
 
@@ -22,7 +22,7 @@ pub(super) fn summary(view: &View) -> String {
     if view.compares {
         return "What is not the same:".to_owned();
     }
-    match view.frames.iter().filter(|f| is_told(f)).count() {
+    match view.frames.iter().filter(|f| has_headlines(f)).count() {
         0 => format!("None in {all} windows."),
         n if n > MOST_ROWS => format!("In {n} of {all} windows; the first {MOST_ROWS}:"),
         n => format!("In {n} of {all} windows:"),
@@ -35,7 +35,12 @@ pub(super) fn rows(view: &View) -> String {
     let Some(start) = view.frames.first().map(|f| f.span.start) else {
         return String::new();
     };
-    for frame in view.frames.iter().filter(|f| is_told(f)).take(MOST_ROWS) {
+    for frame in view
+        .frames
+        .iter()
+        .filter(|f| has_headlines(f))
+        .take(MOST_ROWS)
+    {
         let millis = frame.span.start.since(start) / 1_000_000;
         let secs = millis as f64 / 1e3;
         let entries: Vec<String> = frame

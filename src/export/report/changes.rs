@@ -21,7 +21,7 @@ pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
         return String::new();
     }
     let rows = phases.iter().zip(1..).map(|(phase, n)| {
-        let from = times.changes_of(phase.span.start);
+        let from = times.link(phase.span.start);
         let long = words::duration(phase.span.nanos());
         format!("| {n} | {from} | {long} | {} |\n", plain(&phase.name))
     });
@@ -35,7 +35,7 @@ pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> 
     let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
         let what = changes_of(mission, frame);
-        format!("| {} | {what} |\n", times.changes_of(frame.span.start))
+        format!("| {} | {what} |\n", times.link(frame.span.start))
     });
     let rows: Vec<String> = rows.collect();
     let (open, rest) = rows.split_at(rows.len().min(MOST_OPEN));

@@ -8,15 +8,16 @@ fn the_first_line_is_a_summary() {
         &mission(&["/a>/t@2", "/a>/t@2 /b</t", "/a>/t@2"]),
         &ViewOptions::default(),
     );
-    let told = told(
+    let counts = headline_counts(
         &view
             .frames
             .iter()
             .fold(Counts::default(), |sum, f| sum + f.counts),
     );
     assert!(
-        told.contains(&"1 node started".to_owned()) && told.contains(&"1 node stopped".to_owned()),
-        "{told:?}"
+        counts.contains(&"1 node started".to_owned())
+            && counts.contains(&"1 node stopped".to_owned()),
+        "{counts:?}"
     );
 }
 

@@ -28,15 +28,15 @@ pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec
     for one in &mut all {
         one.is_known = if one.side == Where::First { in_b } else { in_a };
     }
-    let (sent, heard) = (topics(a), topics(b));
-    all.extend(presence("topic", &keys(&sent), &keys(&heard)));
+    let (topics_a, topics_b) = (topics(a), topics(b));
+    all.extend(presence("topic", &keys(&topics_a), &keys(&topics_b)));
     for (name, first) in &ours {
         if let Some(second) = theirs.get(name) {
             node(name, (a, first), (b, second), &mut all);
         }
     }
-    for (name, first) in &sent {
-        if let Some(second) = heard.get(name) {
+    for (name, first) in &topics_a {
+        if let Some(second) = topics_b.get(name) {
             let both = |role: &str| ours.contains_key(role) && theirs.contains_key(role);
             topic(
                 name,
@@ -81,8 +81,8 @@ fn nodes<'a, 'f>(facts: &'f Facts<'a>) -> BTreeMap<&'a str, &'f [NodeId]> {
 /// The topics with messages, without housekeeping.
 fn topics<'a>(facts: &Facts<'a>) -> BTreeMap<&'a str, TopicId> {
     let all = facts.topics(&Pattern::new("**")).into_iter();
-    let told = all.filter(|id| !facts.is_housekeeping(*id) && facts.messages(*id) > 0);
-    told.map(|id| (facts.topic(id), id)).collect()
+    let with_messages = all.filter(|id| !facts.is_housekeeping(*id) && facts.messages(*id) > 0);
+    with_messages.map(|id| (facts.topic(id), id)).collect()
 }
 
 fn node(
@@ -124,15 +124,15 @@ fn node(
         _ => false,
     };
     if ended {
-        let told = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
+        let fate = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
             Some((end, _)) => format!("ends at {}", facts.clock(end)),
             None => "stays".to_owned(),
         };
         all.push(Difference::changed(
             "end",
             name,
-            told(a, one),
-            told(b, other),
+            fate(a, one),
+            fate(b, other),
         ));
     }
 }

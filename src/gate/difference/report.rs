@@ -56,7 +56,7 @@ fn sign(difference: &Difference) -> char {
 
 /// A difference as text: `only in a.bag`, or `15 Hz → 7.4 Hz`.
 fn how(subject: &DiffSubject, difference: &Difference) -> String {
-    let told = |text: &str| {
+    let value = |text: &str| {
         if text == "present" {
             String::new()
         } else {
@@ -73,7 +73,7 @@ fn how(subject: &DiffSubject, difference: &Difference) -> String {
     } else {
         format!("; {other} cannot tell")
     };
-    format!("only in {in_one}{}{doubt}", told(what))
+    format!("only in {in_one}{}{doubt}", value(what))
 }
 
 /// The summary: `a.bag and b.bag: 4 differences, 1 unknown`.

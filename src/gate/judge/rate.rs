@@ -34,11 +34,12 @@ impl Judge<'_> {
         if (low.len() + high.len()) as f64 <= allowed {
             return Vec::new();
         }
-        let told = [
+        let lines = [
             (FindingKind::TopicRateLow, low),
             (FindingKind::TopicRateHigh, high),
         ];
-        told.iter()
+        lines
+            .iter()
             .filter_map(|(kind, bad)| self.off(topic, *kind, bad, rates.len(), range, at))
             .collect()
     }
@@ -85,22 +86,23 @@ impl Judge<'_> {
     /// The findings on whether a topic's first message was in time.
     pub(super) fn first(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let heard = self.facts.heard(topic);
-        let (Some(within), Some(heard)) = (&facts.within, heard) else {
+        let active = self.facts.heard(topic);
+        let (Some(within), Some(active)) = (&facts.within, active) else {
             return Vec::new();
         };
         let allowed = within.value.on(whole);
         // A topic present when the recorder starts has an unknown start time.
-        let is_early = heard.start < allowed.start && heard.start.since(whole.start) > DISCOVERY_NS;
-        if heard.start <= allowed.end && !is_early {
+        let is_early =
+            active.start < allowed.start && active.start.since(whole.start) > DISCOVERY_NS;
+        if active.start <= allowed.end && !is_early {
             return Vec::new();
         }
         let name = self.facts.topic(topic);
-        let clock = self.facts.clock(heard.start);
+        let clock = self.facts.clock(active.start);
         let expected = format!("within {}", self.facts.stretch(allowed));
         let says = format!("{name} began at {clock}, expected {expected}");
         let finding = Finding::new(FindingKind::TopicLate, name, at, says);
-        let span = Span::new(whole.start, heard.start);
+        let span = Span::new(whole.start, active.start);
         let mut finding = finding.saw(format!("at {clock}"), expected).at(span);
         finding.details.extend(Self::senders(facts));
         vec![finding]
@@ -109,22 +111,22 @@ impl Judge<'_> {
     /// The findings on whether a topic ended in the time in which it may.
     pub(super) fn last(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let (Some(may_end), Some(heard)) = (&facts.may_end, self.facts.heard(topic)) else {
+        let (Some(may_end), Some(active)) = (&facts.may_end, self.facts.heard(topic)) else {
             return Vec::new();
         };
         let allowed = may_end.value.on(whole);
-        let is_over = whole.end.since(heard.end) <= CLOSING_NS;
-        if is_over || allowed.start <= heard.end && heard.end <= allowed.end {
+        let is_over = whole.end.since(active.end) <= CLOSING_NS;
+        if is_over || allowed.start <= active.end && active.end <= allowed.end {
             return Vec::new();
         }
         let name = self.facts.topic(topic);
-        let clock = self.facts.clock(heard.end);
+        let clock = self.facts.clock(active.end);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let says = format!("{name} ended at {clock}, expected {expected}");
-        let around = Span::new(heard.end.plus(-CLOSING_NS), heard.end.plus(CLOSING_NS));
+        let around = Span::new(active.end.plus(-CLOSING_NS), active.end.plus(CLOSING_NS));
         let mut finding = Finding::new(FindingKind::TopicGone, name, at, says)
             .saw(format!("ended at {clock}"), expected)
-            .at(Span::new(heard.end, whole.end));
+            .at(Span::new(active.end, whole.end));
         finding.details.extend(Self::senders(facts));
         finding.cause = self.facts.cause_for_topic(topic, around);
         vec![finding]

@@ -18,16 +18,16 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         let own = findings.iter().filter(|f| f.severity == severity);
         let own: Vec<&&Finding> = own.collect();
         // The last one shown states how many are not.
-        let told = if own.len() > MOST {
+        let shown = if own.len() > MOST {
             MOST - 1
         } else {
             own.len()
         };
-        for finding in own.iter().take(told) {
+        for finding in own.iter().take(shown) {
             annotation(subject, command, finding, &finding.says, &mut out);
         }
-        if let Some(next) = own.get(told) {
-            let rest = own.len() - told - 1;
+        if let Some(next) = own.get(shown) {
+            let rest = own.len() - shown - 1;
             let says = format!("{} (and {rest} more in the log)", next.says);
             annotation(subject, command, next, &says, &mut out);
         }

@@ -30,8 +30,8 @@ struct Lines {
 /// The report; ends in a new line. Accepted findings are left out.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings().into_iter();
-    let told = findings.filter(|f| f.severity != Severity::Allowed);
-    let issues: Vec<Issue<'_>> = told.map(|f| issue(subject, f)).collect();
+    let shown = findings.filter(|f| f.severity != Severity::Allowed);
+    let issues: Vec<Issue<'_>> = shown.map(|f| issue(subject, f)).collect();
     json(&issues)
 }
 

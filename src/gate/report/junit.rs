@@ -54,7 +54,7 @@ fn case(xml: &mut Xml, subject: &Subject<'_>, check: &Checked) {
         xml.open("failure")
             .attribute("type", first.kind.word())
             .attribute("message", &first.says)
-            .text(&told(subject, &errors))
+            .text(&details(subject, &errors))
             .close();
     } else if let Some(first) = unknown.first() {
         xml.open("skipped")
@@ -67,12 +67,12 @@ fn case(xml: &mut Xml, subject: &Subject<'_>, check: &Checked) {
             .close_empty();
     }
     if !milder.is_empty() {
-        xml.leaf("system-out", &told(subject, &milder));
+        xml.leaf("system-out", &details(subject, &milder));
     }
     xml.close_empty().raw("\n");
 }
 
-fn told(subject: &Subject<'_>, findings: &[&Finding]) -> String {
+fn details(subject: &Subject<'_>, findings: &[&Finding]) -> String {
     let line = |f: &&Finding| {
         let place = format!("{}:{}", subject.file, f.place.line);
         let word = f.severity.word();

@@ -24,11 +24,11 @@ const CAUSES: usize = 3;
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
     let facts = Facts::new(subject.mission);
-    let told = |severities: &[Severity]| -> Vec<&Finding> {
+    let of_severity = |severities: &[Severity]| -> Vec<&Finding> {
         let own = findings.iter().filter(|f| severities.contains(&f.severity));
         own.copied().collect()
     };
-    let broken = told(&[Severity::Error, Severity::Warning]);
+    let broken = of_severity(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
     // The worst first, then those with most consequences.
     let mut groups = grouped(&broken);
@@ -49,11 +49,11 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         );
     }
     list(
-        &told(&[Severity::Unknown]),
+        &of_severity(&[Severity::Unknown]),
         "What this bag cannot tell",
         &mut out,
     );
-    list(&told(&[Severity::Allowed]), "Allowed", &mut out);
+    list(&of_severity(&[Severity::Allowed]), "Allowed", &mut out);
     let (bag, file) = (mark(&subject.name()), mark(&subject.tracked));
     let _ = writeln!(out, "<!-- bagreel:{bag}:{file} -->");
     out
@@ -77,11 +77,11 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         0 => String::new(),
         unknown => format!("{unknown} unknown"),
     };
-    let mut said = vec![verdict.broken(), unknown, format!("{kept} kept")];
-    said.retain(|words| !words.is_empty());
+    let mut parts = vec![verdict.broken(), unknown, format!("{kept} kept")];
+    parts.retain(|words| !words.is_empty());
     format!(
         "### {sign} Graph check: {} · {} against {} · {} in windows of {}",
-        said.join(", "),
+        parts.join(", "),
         code(&subject.name()),
         code(&subject.file),
         words::duration(mission.span.nanos()),

@@ -27,8 +27,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
             })
         })
         .collect();
-    let told = findings.iter().take(MOST);
-    let results: Vec<Value> = told.map(|f| result(subject, f)).collect();
+    let shown = findings.iter().take(MOST);
+    let results: Vec<Value> = shown.map(|f| result(subject, f)).collect();
     let notes: Vec<Value> = match findings.len() - results.len() {
         0 => Vec::new(),
         rest => {

@@ -220,15 +220,15 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let space = node.map_or("", |id| {
         crate::base::name::namespace(elements.nodes[id as usize].name.as_str())
     });
-    let said = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
+    let phrases = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
         let names = short_topics(elements, &topics, space);
         (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(&names, NAMED)))
     });
-    let said: Vec<String> = said.into_iter().flatten().collect();
-    if said.is_empty() {
+    let phrases: Vec<String> = phrases.into_iter().flatten().collect();
+    if phrases.is_empty() {
         String::new()
     } else {
-        format!(": {}", said.join("; "))
+        format!(": {}", phrases.join("; "))
     }
 }
 
@@ -253,14 +253,14 @@ fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) ->
             let inner = inner.and_then(|rest| rest.strip_prefix('/'));
             visible(inner.unwrap_or(name)).into_owned()
         };
-        let said = match name.rsplit_once('/') {
+        let phrases = match name.rsplit_once('/') {
             Some((action, part)) if ACTION.contains(&part) && parts(action) > 1 => {
                 format!("{} (action)", within(action.trim_end_matches("/_action")))
             }
             _ => within(name),
         };
-        if !names.contains(&said) {
-            names.push(said);
+        if !names.contains(&phrases) {
+            names.push(phrases);
         }
     }
     names

@@ -270,27 +270,27 @@ mod tests {
 
     #[test]
     fn invalid_json_is_refused_with_its_line() {
-        let said = |text| read(text).unwrap_err().to_string();
-        assert!(said("{\n\"schema\": 3}").contains("line 2"));
-        assert!(said(r#"{"schema": "other/9", "windows": []}"#).contains("`other/9`"));
+        let outcome = |text| read(text).unwrap_err().to_string();
+        assert!(outcome("{\n\"schema\": 3}").contains("line 2"));
+        assert!(outcome(r#"{"schema": "other/9", "windows": []}"#).contains("`other/9`"));
         let back =
             r#"{"schema": "bagreel.evolution/1", "windows": [{"start_ns": 5, "end_ns": 5}]}"#;
-        assert!(said(back).contains("window 0 ends before it starts"));
+        assert!(outcome(back).contains("window 0 ends before it starts"));
     }
 
     #[test]
     fn impossible_sending_is_refused() {
-        let said = |sending: &str| {
+        let outcome = |sending: &str| {
             let text = SMALL.replace("\"future\": 1", &format!("\"sending\": {sending}"));
             read(&text).map_err(|e| e.to_string())
         };
         let good = r#"{"senders": [{"topic": "/t", "node": "/b", "stretches": [[1, 3, 2, 2, 0], [4, 9, 6, 1, 3]]},
             {"topic": "/other", "node": null, "stretches": []}]}"#;
-        let sending = said(good).unwrap().sending;
+        let sending = outcome(good).unwrap().sending;
         assert_eq!(sending.senders.len(), 1);
         assert!(sending.senders[0].stretches[1].is_joined);
-        let back = said(&good.replace("[4, 9", "[2, 9")).unwrap_err();
+        let back = outcome(&good.replace("[4, 9", "[2, 9")).unwrap_err();
         assert!(back.contains("`/t` do not ascend"), "{back}");
-        assert!(said(&good.replace("[1, 3, 2", "[1, 3, 0")).is_err());
+        assert!(outcome(&good.replace("[1, 3, 2", "[1, 3, 0")).is_err());
     }
 }

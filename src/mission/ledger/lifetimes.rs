@@ -27,7 +27,7 @@ struct Wholes {
 pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
     for turns in turns_by_role(context).values() {
-        tell_role(context, drafts, &mut wholes, turns);
+        add_role(context, drafts, &mut wholes, turns);
     }
     let recorded = || {
         context
@@ -37,7 +37,7 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     };
     for what in recorded() {
         if let (Some(node), Some(topic)) = context.elements.ends(what) {
-            tell_edge(context, drafts, &mut wholes, what, (node, topic));
+            add_edge(context, drafts, &mut wholes, what, (node, topic));
         }
     }
     for what in recorded() {
@@ -86,7 +86,7 @@ fn turns_by_role<'a>(context: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> 
 }
 
 /// Adds the entries of one role: an end followed by a beginning is a restart.
-fn tell_role(
+fn add_role(
     context: &LedgerInput<'_>,
     drafts: &mut Drafts,
     wholes: &mut Wholes,
@@ -132,7 +132,7 @@ fn tell_role(
 }
 
 /// Adds the entry of an edge: as a part of its node's entry at that time, or alone.
-fn tell_edge(
+fn add_edge(
     context: &LedgerInput<'_>,
     drafts: &mut Drafts,
     wholes: &mut Wholes,

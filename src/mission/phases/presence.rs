@@ -135,10 +135,10 @@ struct Subjects([Vec<Option<PresentThing>>; 3]);
 impl Subjects {
     /// The subjects: nodes and their publications, or topics.
     fn new(elements: &Elements, knows_publishers: bool) -> Self {
-        let told = |topic: &Topic| Some(topic.name.shared()).filter(|name| !is_quiet(name));
+        let name = |topic: &Topic| Some(topic.name.shared()).filter(|name| !is_quiet(name));
         if !knows_publishers {
             let topics = elements.topics.iter();
-            let topics = topics.map(|topic| told(topic).map(PresentThing::Topic));
+            let topics = topics.map(|topic| name(topic).map(PresentThing::Topic));
             return Self([Vec::new(), Vec::new(), topics.collect()]);
         }
         let role = |node: &Node| (!node.is_tool()).then(|| Arc::clone(&node.role));
@@ -146,7 +146,7 @@ impl Subjects {
         let publication = |edge: &Edge| {
             let role = roles.get(edge.node as usize)?.clone()?;
             let topic = elements.topics.get(edge.topic as usize)?;
-            Some(PresentThing::Publication(role, told(topic)?))
+            Some(PresentThing::Publication(role, name(topic)?))
         };
         let publishes = elements.publishes.iter().map(publication).collect();
         let nodes = roles

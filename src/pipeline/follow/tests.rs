@@ -69,9 +69,10 @@ fn followed(path: &Path, bytes: &[u8], seed: u64) -> (Mission, Vec<String>) {
                         .rposition(|line: &String| what(line) == what(gone));
                     lines.remove(at.expect("a line that was told"));
                 } else {
-                    let same =
-                        |told: &String| told.ends_with(" (so far)") && what(told) == what(&line);
-                    lines.retain(|told| !same(told));
+                    let same = |printed: &String| {
+                        printed.ends_with(" (so far)") && what(printed) == what(&line)
+                    };
+                    lines.retain(|printed| !same(printed));
                     lines.push(line);
                 }
             }
@@ -113,12 +114,12 @@ fn holds(name: &str, seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let (mission, lines) = followed(&path, &bytes, seed);
         assert!(json(mission) == expected, "{name}, seed {seed}");
-        let told = lines.iter().map(|line| what(line));
-        let mut told: Vec<&str> = told.collect();
-        told.sort_unstable();
+        let printed = lines.iter().map(|line| what(line));
+        let mut printed: Vec<&str> = printed.collect();
+        printed.sort_unstable();
         let mut log = log.clone();
         log.sort_unstable();
-        assert_eq!(told, log, "{name}, seed {seed}");
+        assert_eq!(printed, log, "{name}, seed {seed}");
     }
 }
 
