@@ -12,6 +12,7 @@ mod folder;
 mod input;
 mod mcap;
 mod model;
+pub(crate) mod moved;
 mod object;
 #[cfg(feature = "remote")]
 mod remote;

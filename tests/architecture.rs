@@ -24,7 +24,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("bag", &[
         &["checksum", "decompress", "model", "unknown"],
         &["source"],
-        &["adapters", "input", "straight"],
+        &["adapters", "input", "moved", "straight"],
         &["remote"],
         &["object"],
         &["deferred", "folder"],

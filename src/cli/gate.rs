@@ -48,6 +48,7 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
     let one = |path: &PathBuf| {
         let inputs = Inputs {
             bags: vec![path.clone()],
+            offset: Vec::new(),
             verify: false,
         };
         judged(&inputs, &args.time(), &args.graph)
@@ -144,6 +145,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     let runs = args.bags.iter().map(|bag| {
         let inputs = Inputs {
             bags: vec![bag.clone()],
+            offset: Vec::new(),
             verify: false,
         };
         judged(&inputs, &args.time, &args.graph)

@@ -18,6 +18,7 @@ pub(super) fn reading(
     let infers = |what: &str| graph.infer.iter().any(|word| word == what);
     Ok(Reading {
         inputs: inputs.bags.iter().map(Input::parse).collect(),
+        offsets: inputs.offset.clone(),
         verify: inputs.verify,
         division: Division {
             length: time.period.unwrap_or(Length::Auto),

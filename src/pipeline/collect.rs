@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::inputs::{each_once, known_span};
+use super::inputs::{check_offsets, each_once, in_time, known_span};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report};
@@ -29,7 +29,10 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     };
     let (inputs, twice) = each_once(&reading.inputs)?;
     let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
-    let mut readers = bag::open_each(inputs.clone(), &options).collect::<Result<Vec<_>>>()?;
+    check_offsets(reading, &inputs)?;
+    let readers = bag::open_each(inputs.clone(), &options).zip(&inputs);
+    let readers = readers.map(|(reader, input)| Ok(in_time(reading, input, reader?)));
+    let mut readers = readers.collect::<Result<Vec<_>>>()?;
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
     // If time goes back, a part of the mission is not a range of times.
     let cut = cut && readers.iter().all(|reader| reader.is_straight());

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use super::Reading;
+use crate::bag::moved::Moved;
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -34,6 +36,49 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     }
     refuse_copies(&once)?;
     Ok((once, twice))
+}
+
+/// The reader of an input with the offset of its recorder's clock.
+pub(super) fn in_time(
+    reading: &Reading,
+    input: &Input,
+    reader: Box<dyn Reader>,
+) -> Box<dyn Reader> {
+    let own = reading
+        .offsets
+        .iter()
+        .filter(|(name, _)| is_of(name, input));
+    match own
+        .map(|(_, by)| by)
+        .fold(0, |all: i64, by| all.saturating_add(*by))
+    {
+        0 => reader,
+        by => Box::new(Moved::new(reader, by)),
+    }
+}
+
+/// Whether an offset for `name` is for this input.
+fn is_of(name: &Path, input: &Input) -> bool {
+    match input {
+        Input::Path(path) => path.starts_with(name) || path.file_name() == Some(name.as_os_str()),
+        Input::Url(url) => name == Path::new(url),
+        Input::Stdin => name == Path::new("-"),
+    }
+}
+
+/// Refuses an offset that is for none of the inputs.
+pub(super) fn check_offsets(reading: &Reading, inputs: &[Input]) -> Result<()> {
+    let is_used = |name: &Path| inputs.iter().any(|input| is_of(name, input));
+    match reading.offsets.iter().find(|(name, _)| !is_used(name)) {
+        None => Ok(()),
+        Some((name, _)) => Err(Error::usage(
+            format!(
+                "`--offset` names `{}`, which is not among the bags",
+                name.display()
+            ),
+            "write the bag as it is given: `--offset run_2.bag=+0.35s`",
+        )),
+    }
 }
 
 /// The time span covered by all bags; `None` unless each reports its own without being read.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::Reading;
 use super::collect::Collected;
-use super::inputs::each_once;
+use super::inputs::{each_once, in_time};
 use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
@@ -34,7 +34,8 @@ pub(super) fn probe(
             continue;
         }
         wanted.sort_unstable();
-        let mut reader = bag::open(input, &OpenOptions::default())?;
+        let reader = bag::open(input, &OpenOptions::default())?;
+        let mut reader = in_time(reading, input, reader);
         for wanted in wanted.chunk_by(|a, b| b.0.since(a.0) <= AT_ONCE_NS) {
             let mut sink = Probe {
                 wanted,

@@ -33,6 +33,9 @@ use crate::mission::{Mission, Window, read_json};
 pub struct Reading {
     /// Bags of one mission, or one mission's own JSON.
     pub inputs: Vec<Input>,
+    /// The times by which the clocks of recorders were wrong, in nanoseconds: they are added to the times of those
+    /// inputs that have this path or name, or lie in this folder.
+    pub offsets: Vec<(PathBuf, i64)>,
     /// Whether to read everything again with a second reader and compare.
     pub verify: bool,
     /// The division of time into windows.
@@ -61,6 +64,7 @@ impl Default for Reading {
     fn default() -> Self {
         Self {
             inputs: Vec::new(),
+            offsets: Vec::new(),
             verify: false,
             division: Division::default(),
             skip_unchanged: false,

@@ -145,6 +145,7 @@ impl CheckArgs {
     pub(crate) fn inputs(&self) -> Inputs {
         Inputs {
             bags: self.bags.clone(),
+            offset: Vec::new(),
             verify: false,
         }
     }

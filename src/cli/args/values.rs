@@ -1,5 +1,7 @@
 //! Values of options, parsed from text; each error says what to write instead.
 
+use std::path::PathBuf;
+
 use crate::base::time::{Moment, Period, parse_nanos};
 use crate::graph::window::{Align, Cut, Length};
 
@@ -16,6 +18,19 @@ pub(super) fn period(text: &str) -> Result<Period, String> {
 
 pub(super) fn moment(text: &str) -> Result<Moment, String> {
     Moment::parse(text).ok_or_else(|| "write `90`, `1:30`, `2m`, `-30s`, or RFC 3339".to_owned())
+}
+
+/// A bag and the time by which its clock is corrected.
+pub(super) fn offset(text: &str) -> Result<(PathBuf, i64), String> {
+    let parsed = text.rsplit_once('=').and_then(|(bag, time)| {
+        let (sign, length) = match time.strip_prefix('-') {
+            Some(length) => (-1, length),
+            None => (1, time.strip_prefix('+').unwrap_or(time)),
+        };
+        Some((PathBuf::from(bag), sign * parse_nanos(length)?))
+    });
+    let parsed = parsed.filter(|(bag, _)| !bag.as_os_str().is_empty());
+    parsed.ok_or_else(|| "write a bag and a time, such as `robot2.bag=+0.35s`".to_owned())
 }
 
 pub(super) fn align(text: &str) -> Result<Align, String> {
