@@ -342,7 +342,7 @@ fn second_runs_of_recorded_missions_break_one_rule_of_a_hundred_at_most() {
 const STATISTICS: &str = "string topic\nstring node_pub\nstring node_sub\ntime window_start\ntime window_stop\n\
     int32 delivered_msgs\nint32 dropped_msgs\nint32 traffic\nduration period_mean\nduration period_stddev\n\
     duration period_max\nduration stamp_age_mean\nduration stamp_age_stddev\nduration stamp_age_max\n";
-const LOG: &str = "std_msgs/Header header\nbyte level\nstring name\nstring msg\nstring file\nstring function\n\
+pub(crate) const LOG: &str = "std_msgs/Header header\nbyte level\nstring name\nstring msg\nstring file\nstring function\n\
     uint32 line\nstring[] topics\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
 
 /// `rosgraph_msgs/TopicStatistics`: so many messages from one node to another.

@@ -11,6 +11,7 @@
 mod architecture;
 mod board;
 mod boxes;
+mod causes;
 mod ci;
 mod cli;
 mod clocks;
