@@ -216,7 +216,7 @@ fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]),
     assert_eq!(numbers.sum::<usize>(), all, "{at}: {first}");
 }
 
-/// A flow chart marks something exactly where there is a headline.
+/// A flow chart has marks if and only if there is a headline.
 fn chart(mermaid: &str, told: &BTreeSet<u64>, at: &str) {
     let is_mark = |line: &&str| {
         let mut words = line.split_whitespace();

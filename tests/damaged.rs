@@ -142,7 +142,7 @@ fn a_chunk_listed_at_a_wrong_position_is_reported_once() {
         };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(name);
-        // Into the chunk, in front of it, behind it.
+        // Into the chunk, before it, after it.
         for moved in [0x80, 0x40, 0x20, 0x10, 0x08, 0x01] {
             let mut bytes = bytes.clone();
             bytes[info + 10] ^= moved;
@@ -501,7 +501,7 @@ fn the_head_of_a_record_beyond_its_chunk_stops_the_second_reader() {
     };
     let chunk = (0..bytes.len()).find(is_chunk).unwrap();
     let packed = u64::from_le_bytes(bytes[chunk + 41..chunk + 49].try_into().unwrap());
-    // Five bytes behind its last record: the beginning of a head, and one of no length goes on behind them.
+    // Five bytes after its last record: the beginning of a head, which continues after the chunk.
     let mut bytes = bytes.clone();
     let end = chunk + 49 + usize::try_from(packed).unwrap();
     for (at, less) in [(1, 40), (41, 0), (25, 0)] {

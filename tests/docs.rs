@@ -173,7 +173,7 @@ fn every_command_of_readme_and_docs_runs() {
 /// The number of bytes that all pictures of the docs may have.
 const MOST_BYTES: u64 = 3_000_000;
 
-/// `INSTA_UPDATE=always` writes the pictures anew. Pixels are equal on one kind of processor only.
+/// `INSTA_UPDATE=always` rewrites the pictures. Pixels are only reproducible on one kind of processor.
 #[test]
 fn gallery_shows_what_its_commands_draw() {
     let (gallery, dir) = (chapter("gallery.md"), folder());

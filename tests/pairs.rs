@@ -345,7 +345,7 @@ const STATISTICS: &str = "string topic\nstring node_pub\nstring node_sub\ntime w
 pub(crate) const LOG: &str = "std_msgs/Header header\nbyte level\nstring name\nstring msg\nstring file\nstring function\n\
     uint32 line\nstring[] topics\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
 
-/// `rosgraph_msgs/TopicStatistics`: so many messages from one node to another.
+/// `rosgraph_msgs/TopicStatistics` for messages from one node to another.
 fn statistics(topic: &str, from: &str, to: &str, at: i64) -> Vec<u8> {
     let mut payload = Vec::new();
     for text in [topic, from, to] {

@@ -106,7 +106,7 @@ fn recording() -> impl Strategy<Value = Recording> {
     })
 }
 
-/// The recording in windows of so many seconds.
+/// The recording in windows of this many seconds.
 fn mission(bag: &std::path::Path, seconds: i64) -> Mission {
     let mut reading = Reading::of([bag]);
     let period = Period::from_nanos(seconds * 1_000_000_000).unwrap();

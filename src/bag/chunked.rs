@@ -1,6 +1,6 @@
 //! Bags made of chunks, ROS 1 and MCAP alike: one driver over two grammars of records.
 //!
-//! A [`Grammar`] parses the records of a bag and its tail. The driver reads a file by the index behind each chunk, or
+//! A [`Grammar`] parses the records of a bag and its tail. The driver reads a file by the index after each chunk, or
 //! record by record from the front where that is missing, and always from a pipe.
 
 mod check;
@@ -43,7 +43,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
     const NAME: &'static str;
     /// Whether a bag ends in a special last record.
     const HAS_END: bool;
-    /// The bytes behind that record.
+    /// The bytes after that record.
     const CLOSING: &'static [u8];
     /// The head of a description record.
     type Description;

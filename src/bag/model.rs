@@ -15,7 +15,7 @@ use crate::base::words::worded;
 pub enum Encoding {
     /// ROS 1 serialisation: little-endian, packed.
     Ros1,
-    /// ROS 2 serialisation: CDR behind a header of four bytes.
+    /// ROS 2 serialisation: CDR after a header of four bytes.
     Cdr,
     /// Anything else, as named in the bag; never decoded.
     Other(String),
@@ -100,12 +100,12 @@ pub trait Sink {
     /// Takes a new connection; returns the wanted part of its payloads.
     fn connection(&mut self, connection: &Connection) -> Want;
 
-    /// The sink behind this one, which gets all that this one does not take itself.
+    /// The next sink, which receives everything that this one does not handle.
     fn behind(&mut self) -> Option<&mut dyn Sink> {
         None
     }
 
-    /// Notes that all that follows stands in the file behind all that came, as far as stamps go.
+    /// Marks that all stamps that follow come later in the file than all before.
     fn part(&mut self) {
         if let Some(sink) = self.behind() {
             sink.part();
@@ -138,7 +138,7 @@ pub trait Sink {
         }
     }
 
-    /// Takes the progress of the reader, in bytes of `total` (0 where the size is not known).
+    /// Takes the progress of the reader, in bytes of `total` (0 if unknown).
     fn progress(&mut self, done: u64, total: u64) {
         if let Some(sink) = self.behind() {
             sink.progress(done, total);

@@ -129,7 +129,7 @@ fn middle(text: &str, width: usize) -> String {
     format!("{start}…{end}")
 }
 
-/// Numbers over time as bars; a blank where the number is 0.
+/// Numbers over time as bars; a blank for 0.
 fn bars(numbers: &[u64], width: usize) -> String {
     let columns = numbers.len().clamp(1, width.clamp(1, MOST_BARS));
     let part = |k: usize| {

@@ -81,7 +81,7 @@ impl WordColumn {
     }
 }
 
-/// The values of a column, the elements of its lists if it holds lists.
+/// The values of a column; for a column of lists, their elements.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ColumnValues {
     Flag(Vec<bool>),
@@ -364,7 +364,7 @@ impl Batch {
         table
     }
 
-    /// Adds a row: a cell per column, unknown where it is of another kind than the column.
+    /// Adds a row: one cell per column; a cell of another kind than its column becomes unknown.
     pub(crate) fn push(&mut self, row: &[TableCell<'_>]) {
         for (column, cell) in self.columns.iter_mut().zip(row) {
             column.push(cell);

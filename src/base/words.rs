@@ -81,9 +81,9 @@ pub fn count_range(from: Option<f64>, to: Option<f64>) -> String {
     }
 }
 
-/// The rate of `count` messages in `seconds`, with no more digits than so few messages can tell: `1 msg` for a single
-/// one, one significant digit below 10, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n. In less
-/// than a millisecond there is no rate, only the number.
+/// The rate of `count` messages in `seconds`, with only as many digits as are significant: `1 msg` for a single
+/// one, one digit below 10 messages, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n. Below a
+/// millisecond only the number is shown.
 pub fn rate_of(count: u64, seconds: f64) -> String {
     let hz = count as f64 / seconds;
     match count {

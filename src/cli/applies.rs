@@ -27,7 +27,7 @@ impl Given {
         Self(names.collect())
     }
 
-    /// Refuses these options, of which `what` says why.
+    /// Refuses these options for the reason `what`.
     fn refuse(&self, options: &str, what: &str, hint: &str) -> Result<()> {
         match self.any(options) {
             None => Ok(()),
@@ -214,7 +214,7 @@ pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]
     Ok(())
 }
 
-/// Refuses outputs that cannot hold a figure.
+/// Refuses outputs that cannot contain a figure.
 pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
     let holds = |o: &Output| {
         let is_one = o.format.whole != OneDrawing::Never && !o.target.is_numbered();
@@ -232,7 +232,7 @@ pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
 /// Options that say how bags are read and windows cut: a mission's JSON holds windows already.
 const OF_BAGS: &str = "offset verify period step start end align skip-unchanged cut grace roles topology source infer bytes";
 
-/// Refuses options about bags where the input is a mission's JSON.
+/// Refuses options about bags if the input is a mission's JSON.
 pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
     if given.any(OF_BAGS).is_some()
         && let Some(path) = mission_file(&reading.inputs)?
@@ -244,7 +244,7 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
     Ok(())
 }
 
-/// Options that say how time is cut into windows.
+/// Options that define windows.
 const OF_WINDOWS: &str = "period step align skip-unchanged cut grace";
 
 /// The note for an option about windows given for `what`, which uses continuous time; `None` without one. It is not an

@@ -99,7 +99,7 @@ impl OutputSink {
     /// Whether a file that a child process wrote to is empty.
     ///
     /// # Errors
-    /// Where the system cannot tell.
+    /// If the system cannot determine it.
     pub(crate) fn is_empty_file(&self) -> io::Result<bool> {
         Ok(self.to.get_ref().size()? == Some(0))
     }

@@ -37,7 +37,7 @@ pub(crate) struct Facts<'a> {
     edges: [Vec<Vec<u32>>; 2],
 }
 
-/// Words of evidence for what should be, not for what was. A file of the user's tells what was.
+/// Kinds of evidence for what should have run, not for what did. The user's topology file states what did.
 const DECLARING: [&str; 2] = ["source", "launch"];
 /// Kinds of evidence that name every ROS 1 node with recorded messages.
 const NAMING: [&str; 5] = [

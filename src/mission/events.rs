@@ -159,7 +159,7 @@ pub(crate) struct LogLine {
 }
 
 impl LogLine {
-    /// The time, with the space behind it.
+    /// The time with the space after it.
     pub(crate) fn lead(&self) -> &str {
         &self.lead
     }
@@ -207,7 +207,7 @@ pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
     shown.collect()
 }
 
-/// The rows by the time that each shows, parts behind the event that they belong to.
+/// The rows sorted by printed time, parts after the event that they belong to.
 fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
     let mut time = Stamp(i64::MIN);
     let timed = rows.iter().map(|row| {
@@ -225,7 +225,7 @@ fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
     timed.into_iter().map(|(_, row)| row).collect()
 }
 
-/// The time at which an entry is shown: the earliest possible one where that is written.
+/// The printed time of an entry: the earliest possible one if a range is printed.
 fn shown(entry: &Entry) -> Stamp {
     if entry.latest.since(entry.earliest) > ABOUT_NS {
         entry.earliest

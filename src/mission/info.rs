@@ -230,7 +230,7 @@ pub fn info(mission: &Mission) -> Info {
     info
 }
 
-/// Whether the bags come from ROS 1, in whatever format; `None` for a mission that was not recorded.
+/// Whether the bags are from ROS 1, in any format; `None` for a mission that was not recorded.
 fn is_ros1(mission: &Mission) -> Option<bool> {
     let bag = mission.bags.first()?;
     let mut facts = bag.facts.iter();

@@ -169,7 +169,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Whether it is shown by itself: neither quiet nor part of another.
+    /// Whether it is shown separately: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()
     }

@@ -1,8 +1,8 @@
 //! A live system, recorded to a temporary MCAP file that is followed like any other recording: its graph whenever it
-//! changes, a sign of life each second, and the messages of topics that were asked for.
+//! changes, a heartbeat each second, and the messages of requested topics.
 //!
-//! Nothing is published, set or called that changes the system. While it cannot be reached nothing is recorded, so that
-//! what is not seen is not taken for stopped.
+//! Nothing is published, set or called that changes the system. While it is unreachable nothing is recorded, so that
+//! its elements do not count as stopped.
 
 #[cfg(feature = "live")]
 mod bridge;
@@ -24,16 +24,16 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
 
-/// The time between two signs of life.
+/// The heartbeat interval.
 const BEAT: Duration = Duration::from_secs(1);
-/// The time for which an answer is waited for.
+/// The timeout of an answer.
 const WAIT: Duration = Duration::from_secs(5);
-/// The longest wait before the system is looked for again.
+/// The longest wait before reconnecting.
 const MOST_WAIT: Duration = Duration::from_secs(16);
 /// The most names of nodes, topics and services at a time, each end counted once.
 const MOST_NAMES: usize = 200_000;
 
-/// The ways to reach a live system, by the beginnings of their addresses; `None` for those left out of this build.
+/// The supported protocols by URL scheme; `None` for those disabled in this build.
 const WAYS: [(&str, Option<Watch>); 2] = [("ros1://", Some(master::watch)), ("ws://", BRIDGE)];
 #[cfg(feature = "live")]
 const BRIDGE: Option<Watch> = Some(bridge::watch);
@@ -43,7 +43,7 @@ const BRIDGE: Option<Watch> = None;
 /// Watches the system at an address (`host:port`) until the connection fails, or [`Watched::is_over`].
 type Watch = fn(&str, &mut Watched) -> io::Result<()>;
 
-/// A recording of a live system, which goes on until it is dropped or finished.
+/// A recording of a live system, which continues until it is dropped or finished.
 pub(crate) struct Live {
     path: PathBuf,
     is_over: Arc<AtomicBool>,
@@ -53,10 +53,10 @@ pub(crate) struct Live {
 }
 
 impl Live {
-    /// Begins to record the system at `address`, with the messages of `topics`; `None` if this is no address of one.
+    /// Begins to record the system at `address`, with the messages of `topics`; `None` if the scheme is unknown.
     ///
     /// # Errors
-    /// Where the file cannot be made.
+    /// If the file cannot be created.
     pub(crate) fn start(address: &Path, topics: &[String]) -> Result<Option<Self>> {
         let text = address.to_string_lossy();
         let mut ways = WAYS.into_iter();
@@ -100,21 +100,21 @@ impl Live {
         }))
     }
 
-    /// The file that grows.
+    /// The growing file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What became of the connection since the last time.
+    /// The connection's status messages since the last call.
     pub(crate) fn news(&self) -> impl Iterator<Item = String> + '_ {
         self.news.try_iter()
     }
 
-    /// Ends the recording; the file has its summary then.
+    /// Ends the recording and writes the file's summary.
     pub(crate) fn finish(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         if let Some(recorder) = self.recorder.take() {
-            // What a thread of ours says when it panics was printed already.
+            // A panic of the thread was printed already.
             let _ = recorder.join();
         }
     }
@@ -126,7 +126,7 @@ impl Drop for Live {
     }
 }
 
-/// Watches the system, again and again if the connection fails.
+/// Watches the system and reconnects if the connection fails.
 fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Sender<String>) {
     let mut wait = BEAT;
     while !watched.is_over() {
@@ -161,13 +161,13 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Se
     }
 }
 
-/// A live system that is watched, and its recording.
+/// A watched live system and its recording.
 struct Watched {
     file: GraphFile<BufWriter<File>>,
     /// The topics whose messages are recorded.
     topics: BTreeSet<String>,
     graph: LiveGraph,
-    /// The last graph that was written since the connection stands.
+    /// The last graph written since the connection was established.
     written: Option<Vec<u8>>,
     is_over: Arc<AtomicBool>,
 }
@@ -177,7 +177,7 @@ impl Watched {
         self.is_over.load(Ordering::Relaxed)
     }
 
-    /// Records that the system is there, and its graph if that has changed.
+    /// Records a heartbeat, and the graph if it has changed.
     fn beat(&mut self) -> io::Result<()> {
         let now = now();
         let payload = self.graph.payload();
@@ -190,7 +190,7 @@ impl Watched {
     }
 }
 
-/// Connects to a server; what it does not answer in time fails.
+/// Connects to a server, with timeouts.
 fn connect(place: &str) -> io::Result<TcpStream> {
     let mut failed = io::Error::other("the name has no address");
     for at in place.to_socket_addrs()? {
@@ -206,7 +206,7 @@ fn connect(place: &str) -> io::Result<TcpStream> {
     Err(failed)
 }
 
-/// The time of this machine.
+/// The current time of this machine.
 fn now() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     Stamp(since.map_or(0, |since| {
@@ -214,7 +214,7 @@ fn now() -> Stamp {
     }))
 }
 
-/// Who sends and receives what: for each of publishers, subscribers, clients and servers the names of nodes by topic or
+/// The ends of all connections: for publishers, subscribers, clients and servers, the names of nodes by topic or
 /// service.
 #[derive(Default)]
 struct LiveGraph {
@@ -223,13 +223,13 @@ struct LiveGraph {
     types: BTreeMap<String, String>,
 }
 
-/// The places in [`LiveGraph::ends`].
+/// The indices in [`LiveGraph::ends`].
 const PUBLISHERS: usize = 0;
 const SUBSCRIBERS: usize = 1;
 const SERVERS: usize = 3;
 
 impl LiveGraph {
-    /// Says which nodes are at a topic or service; none of them if it is gone.
+    /// Sets the nodes of a topic or service; none if it no longer exists.
     fn set(&mut self, side: usize, name: &str, nodes: BTreeSet<String>) {
         if nodes.is_empty() {
             self.ends[side].remove(name);
@@ -239,7 +239,7 @@ impl LiveGraph {
     }
 
     /// # Errors
-    /// Where there are more names than a robot has.
+    /// If there are implausibly many names.
     fn check(&self) -> io::Result<()> {
         let ends = self
             .ends

@@ -156,7 +156,7 @@ impl<G: Grammar> Visitor<G> for Records<'_, G> {
     ) -> Result<(), NoRecord> {
         if len <= MOST_PAYLOAD as u64 {
             let data = peek_whole(stream, len)?;
-            // What cannot be read is told when the bag is read whole.
+            // Errors are reported when the closed bag is read.
             let _ = self.bag.announced.describe(what, data, self.sink);
         }
         pass(stream, len)

@@ -220,7 +220,7 @@ impl<'s, G: Grammar> SecondFinds<'s, G> {
     }
 
     pub(crate) fn describe(&mut self, what: &G::Description, data: &[u8]) {
-        // What cannot be read is told when its messages come.
+        // Errors are reported with the connection's messages.
         let _ = self.announced.describe(what, data, self.sink);
     }
 

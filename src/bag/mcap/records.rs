@@ -40,7 +40,7 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     match kind {
         op::MESSAGE => return message(stream, len),
         op::CHUNK => return chunk(stream, len).map(RecordHead::Chunk),
-        // Zeros where the disk was full.
+        // A full disk leaves zeros.
         0 => return Err(NoRecord::Broken),
         _ => {}
     }

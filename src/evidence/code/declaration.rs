@@ -213,7 +213,7 @@ pub(crate) fn type_key(type_name: &str) -> String {
     }
 }
 
-/// A text on one line, cut where it is long; a call may span lines.
+/// A text on one line, cut if long; a call may span lines.
 pub(super) fn short(text: &str) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     words::shorten(&words, 100).into_owned()

@@ -43,7 +43,7 @@ pub(crate) struct FileDeclaration {
 pub(crate) struct Instance {
     /// The name without namespace.
     pub(crate) name: String,
-    /// The namespace, where a launch file gives one; empty at the root.
+    /// The namespace, if a launch file sets one; empty at the root.
     pub(crate) namespace: Option<String>,
     pub(crate) remaps: Vec<(String, String)>,
     /// The launch file and the line that start it.

@@ -1,7 +1,7 @@
 //! A cursor over serialised payloads, ROS 1 and CDR: numbers, strings and sequences, never past the end.
 //!
 //! ROS 1 is little-endian and packed (<http://wiki.ros.org/msg>); CDR aligns each number to its own size, counted
-//! from behind the encapsulation header (OMG DDSI-RTPS 2.5, section 10).
+//! after the encapsulation header (OMG DDSI-RTPS 2.5, section 10).
 
 use std::fmt;
 

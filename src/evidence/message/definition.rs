@@ -5,9 +5,9 @@ use crate::bag::{Connection, Encoding};
 
 /// A message layout.
 pub(crate) struct MessageLayout {
-    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start stands for anything.
+    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start is a wildcard.
     pub(crate) type_name: &'static str,
-    /// The type's md5 sum in ROS 1, used where the definition is missing; empty in ROS 2.
+    /// The type's md5 sum in ROS 1, used if the definition is missing; empty in ROS 2.
     pub(crate) md5: &'static str,
     /// The encoding that it is for.
     pub(crate) encoding: Encoding,
@@ -23,7 +23,7 @@ pub(crate) enum LayoutFit {
     OtherType,
     /// The connection has the type, but not its fields.
     OtherFields,
-    /// The connection has the layout, as far as the bag tells.
+    /// The connection has the layout, as far as known.
     Same,
 }
 
@@ -97,7 +97,7 @@ impl MessageLayout {
         }
     }
 
-    /// The message itself must have the fields; messages inside it are compared where the definition holds them.
+    /// The message itself must have the fields; nested messages are compared if the definition contains them.
     fn matches(&self, definition: &str) -> bool {
         outline(definition)
             .iter()

@@ -99,8 +99,8 @@ struct ToldData(
     Vec<(f64, u8, i64, String, EntryId)>,
 );
 
-/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end, 1
-/// by inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as
+/// A lifeline: its element (-1 for a namespace's title), its name, 1 below such a title, its lifetimes as `[start, end,
+/// 1 by inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as
 /// their times, signs and places in the log.
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EntryId)>);

@@ -27,7 +27,7 @@ impl<W: Write + Seek> GraphFile<W> {
     /// Begins a file with messages in compressed chunks, or readable as soon as they are flushed.
     ///
     /// # Errors
-    /// Where it cannot be written; this holds for all that follow.
+    /// If it cannot be written, as for all functions below.
     pub(crate) fn new(to: W, in_chunks: bool) -> io::Result<Self> {
         let options = WriteOptions::new()
             .compression(Some(Compression::Zstd))

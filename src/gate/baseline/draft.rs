@@ -67,7 +67,7 @@ pub(crate) struct TopicLine {
 }
 
 impl NodeLine {
-    /// The text behind the name: its facts as a mapping of YAML.
+    /// The text after the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
         let mut pairs = Vec::new();
         if let Some(state) = &self.lifecycle {
@@ -93,7 +93,7 @@ impl TopicLine {
         rates.map_or_else(String::new, |rates| format!("  # {rates}: not judged"))
     }
 
-    /// The text behind the name: its facts as a mapping of YAML.
+    /// The text after the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
         let mut pairs = Vec::new();
         if let Some(kind) = &self.kind {

@@ -155,7 +155,7 @@ impl Judge<'_> {
         rates
     }
 
-    /// Whether a condition holds, for each window.
+    /// Whether a condition is met, for each window.
     fn holds(&self, whilst: &While) -> Vec<bool> {
         let windows = &self.facts.mission.windows;
         let mut holds = vec![false; windows.len()];

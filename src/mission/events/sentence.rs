@@ -189,7 +189,7 @@ pub(crate) fn switched(one: &Switch) -> String {
     format!("mode switch: {stopped} stopped, {} started", one.started)
 }
 
-/// The name of the element of an entry: a role where a role restarted.
+/// The name of the element of an entry: its role if a role restarted.
 fn name(elements: &Elements, entry: &Entry) -> String {
     let (node, topic) = elements.names(entry.what);
     match (entry.what, node.map(visible), topic.map(visible)) {

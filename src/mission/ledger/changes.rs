@@ -8,7 +8,7 @@ use crate::graph::diff::{Change, ValueKind, diff};
 use crate::graph::{Element, Elements, Graph};
 use crate::mission::Window;
 
-/// The changes of each window since the one before, with the places of the entries that explain them.
+/// The changes of each window since the previous one, with the ids of the entries that explain them.
 pub(crate) fn explain(
     windows: impl Iterator<Item = (Span, Graph)>,
     elements: &Elements,

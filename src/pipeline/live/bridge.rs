@@ -1,5 +1,5 @@
-//! A server of Foxglove's WebSocket protocol, such as `foxglove_bridge`: the graph as it reports it, and messages of the
-//! topics asked for (<https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>).
+//! A server of Foxglove's WebSocket protocol, such as `foxglove_bridge`: the graph as it reports it, and messages of
+//! requested topics (<https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>).
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 
 use super::{BEAT, LiveGraph, PUBLISHERS, SERVERS, SUBSCRIBERS, Watched, connect, now};
 
-/// The versions of the protocol that are spoken.
+/// The supported protocol versions.
 const PROTOCOLS: HeaderValue = HeaderValue::from_static("foxglove.sdk.v1, foxglove.websocket.v1");
 /// The longest message that is read, in bytes.
 const MOST_MESSAGE: usize = 64 << 20;
@@ -44,7 +44,7 @@ pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
         .max_frame_size(Some(MOST_MESSAGE));
     let opened = client_with_config(request, stream, Some(config));
     let (socket, _) = opened.map_err(|e| io::Error::other(e.to_string()))?;
-    // Between two messages there is time to say that the connection stands.
+    // The timeout leaves time for heartbeats between two messages.
     socket.get_ref().set_read_timeout(Some(BEAT / 10))?;
     watched.graph = LiveGraph::default();
     let bridge = Bridge {
@@ -78,7 +78,7 @@ impl Bridge<'_> {
                     ) => {}
                 Err(error) => return Err(io::Error::other(error)),
             }
-            // Several messages make one graph: it is written when they have been read.
+            // Several messages describe one graph, which is written after all of them.
             if beat.elapsed() >= if is_new { BEAT / 10 } else { BEAT } {
                 self.watched.beat()?;
                 (beat, is_new) = (Instant::now(), false);
@@ -89,7 +89,7 @@ impl Bridge<'_> {
         Ok(())
     }
 
-    /// Takes a message of the server's into account.
+    /// Handles a message from the server.
     fn take(&mut self, message: &Value) -> io::Result<()> {
         match text(message, "op") {
             "serverInfo" => {
@@ -114,7 +114,7 @@ impl Bridge<'_> {
         Ok(())
     }
 
-    /// Takes over what has changed in the graph.
+    /// Applies changes of the graph.
     fn changed(&mut self, message: &Value) {
         let graph = &mut self.watched.graph;
         for (sides, gone) in [
@@ -143,7 +143,7 @@ impl Bridge<'_> {
         }
     }
 
-    /// Notes the type of a channel, and subscribes to it if its messages were asked for.
+    /// Records the type of a channel, and subscribes to it if requested.
     fn advertised(&mut self, channel: &Value) -> io::Result<()> {
         let Some(id) = channel["id"].as_u64() else {
             return Ok(());

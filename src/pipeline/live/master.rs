@@ -1,4 +1,4 @@
-//! The master of ROS 1, asked for the whole graph each second (`getSystemState` and `getTopicTypes` of its XML-RPC
+//! The ROS 1 master, polled for the whole graph each second (`getSystemState` and `getTopicTypes` of its XML-RPC
 //! interface: <http://wiki.ros.org/ROS/Master_API>).
 
 use std::io::{self, Read as _, Write as _};
@@ -11,7 +11,7 @@ use crate::base::name::OWN_NODE;
 /// The longest answer that is read, in bytes.
 const MOST_ANSWER: u64 = 32 << 20;
 
-/// Asks the master at `place` (`host:port`) again and again.
+/// Polls the master at `place` (`host:port`).
 pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
     while !watched.is_over() {
         let mut graph = LiveGraph::default();
@@ -63,7 +63,7 @@ fn ask(place: &str, method: &str) -> io::Result<String> {
     }
 }
 
-/// The last of the three values that a master answers with: a code, a message, and what was asked for.
+/// The last of the three values that a master answers with: a code, a message, and the result.
 fn value<'a>(answer: &'a Document<'a>) -> io::Result<Node<'a, 'a>> {
     let all = answer.descendants().find(|node| node.has_tag_name("value"));
     let third = all.and_then(|answer| items(answer).nth(2));
