@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn every_panel_tells_its_time_and_change_and_the_legend_stands_once() {
+    fn panels_have_time_and_change_and_share_a_legend() {
         let strip = strip_of("changes", None);
         let words: Vec<&str> = texts(&strip).iter().map(|t| t.text.as_str()).collect();
         for expected in [
@@ -504,7 +504,7 @@ mod tests {
     }
 
     #[test]
-    fn on_paper_the_width_is_exact_and_captions_can_be_read() {
+    fn on_paper_the_width_is_exact_and_captions_are_legible() {
         let strip = strip_of("2x2", Some(88.0));
         assert_eq!(strip.scene.width_mm, Some(88.0));
         assert!((strip.scene.size.w - 88.0 * PX_PER_MM).abs() < 1e-9);
@@ -517,13 +517,13 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_too_small_is_told_with_what_would_help() {
+    fn too_small_text_is_reported_with_advice() {
         let strip = strip_of("2x2", Some(20.0));
         assert!(strip.remarks[0].contains("mm`"), "{:?}", strip.remarks);
     }
 
     #[test]
-    fn everything_stands_on_the_page() {
+    fn everything_is_on_the_page() {
         for choice in ["2x2", "0", "changes"] {
             let strip = strip_of(choice, None);
             let page = strip.scene.size;

@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn every_builtin_style_is_whole() {
+    fn every_builtin_style_is_complete() {
         for (name, _) in BUILTIN {
             let style = Style::builtin(name).unwrap();
             assert!(style.palette().len() >= 2, "{name}");
@@ -389,14 +389,14 @@ mod tests {
     }
 
     #[test]
-    fn a_printed_style_reads_back_as_itself() {
+    fn a_printed_style_round_trips() {
         for (name, text) in BUILTIN {
             assert_eq!(read(text).unwrap(), Style::builtin(name).unwrap(), "{name}");
         }
     }
 
     #[test]
-    fn a_style_may_hold_only_what_differs() {
+    fn a_style_may_be_partial() {
         let mine = read("base = \"dark\"\n[added]\ncolor = \"#0000ff\"\nwidth = 4").unwrap();
         let dark = Style::builtin("dark").unwrap();
         assert_eq!(mine.added.color.to_string(), "#0000FF");
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_is_seen_on_the_page_and_in_a_namespace() {
+    fn every_line_has_contrast_on_page_and_namespace() {
         for (name, _) in BUILTIN {
             let style = Style::builtin(name).unwrap();
             let lines = [

@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_are_equally_wide_so_that_clocks_stand_still() {
+    fn digits_have_equal_widths() {
         let fonts = Fonts::bundled();
         for weight in [Weight::Regular, Weight::SemiBold] {
             let of = |t: &str| fonts.width(t, 100.0, weight);
@@ -234,14 +234,14 @@ mod tests {
     }
 
     #[test]
-    fn the_signs_that_we_draw_are_in_the_font() {
+    fn all_drawn_signs_are_in_the_font() {
         let fonts = Fonts::bundled();
         let signs = "≥≤×·→←−–—▲▼◆…éÿąłŠωΩЖя±²\"'&<>";
         assert_eq!(fonts.missing(signs).collect::<String>(), "");
     }
 
     #[test]
-    fn what_the_font_lacks_is_spelled_out() {
+    fn missing_glyphs_are_spelled_out() {
         let fonts = Fonts::bundled();
         assert_eq!(fonts.shown("/scan"), "/scan");
         assert_eq!(fonts.shown("/机\n"), "/\\u{673a}\\u{a}");
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_font_is_refused() {
+    fn a_file_that_is_not_a_font_is_refused() {
         let error = Fonts::bundled().with(b"no font".to_vec(), Path::new("x.ttf"));
         assert!(error.is_err_and(|e| e.to_string().contains("x.ttf")));
     }

@@ -491,7 +491,7 @@ mod tests {
     }
 
     #[test]
-    fn long_names_fill_no_memory() {
+    fn long_names_do_not_exhaust_memory() {
         let mut claims = Claims::default();
         for k in 0..1000 {
             claims.name(&format!("{k:060000}"));

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bag_that_is_one_piece_or_two_halves_is_kept_whole() {
+    fn a_bag_in_one_or_two_parts_is_kept_completely() {
         assert_eq!(kept(&[(0, 500)]), None);
         assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
         assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
@@ -124,14 +124,14 @@ mod tests {
     }
 
     #[test]
-    fn what_was_recorded_before_the_clock_was_set_is_set_aside() {
+    fn messages_before_the_clock_was_set_are_set_aside() {
         assert_eq!(kept(&[(0, 249), (20_000, 250)]), Some((20_000, 20_001)));
         assert_eq!(kept(&[(10_957, 249), (20_000, 250)]), None);
         assert_eq!(kept(&[(0, 250), (20_000, 249)]), None);
     }
 
     #[test]
-    fn no_mission_is_longer_than_a_hundred_years() {
+    fn missions_are_limited_to_a_hundred_years() {
         assert_eq!(kept(&[(0, 2), (100_000, 2)]), Some((100_000, 100_001)));
         assert_eq!(kept(&[(0, 3), (100_000, 2)]), Some((0, 1)));
         let yearly: Vec<_> = (0..200).map(|year| (year * 365, 1)).collect();
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_that_stays_on_the_axis_is_told() {
+    fn a_plausible_clock_jump_is_reported() {
         let days = [(10_957, 249), (20_000, 250)].into_iter().collect();
         let told = believed(&days).jump.unwrap();
         assert!(

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_counts_on_until_its_numbers_fall() {
+    fn a_process_continues_until_its_sequence_numbers_drop() {
         let told = |numbers: &[u32]| {
             let mut all = Numbers::default();
             for (at, number) in (0..).zip(numbers) {
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_kept_where_they_begin_again() {
+    fn restarted_sequence_numbers_are_kept() {
         let mut all = Numbers::default();
         let seconds = |s: i64| Stamp(s * 1_000_000_000);
         for (at, number) in [(0, 7), (1, 8), (2, 9), (10, 2), (11, 3), (12, 300), (13, 6)] {

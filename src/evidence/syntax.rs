@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn broken_text_still_yields_what_stands_around_it() {
+    fn broken_text_does_not_affect_text_around_it() {
         let parsed = Parsed::new(
             Language::Python,
             "a = f(1)\n)) print 'x'\nb = g(2)\n".into(),
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn nesting_without_end_is_no_danger() {
+    fn unbounded_nesting_is_refused() {
         for language in [Language::Python, Language::Cpp] {
             let deep = "(".repeat(200_000);
             if let Some(parsed) = Parsed::new(language, deep) {

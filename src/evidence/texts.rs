@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_field_repeats_is_kept_once() {
+    fn repeated_field_values_are_kept_once() {
         let mut texts = LoggedTexts::default();
         for (time, value) in [(3, "b"), (1, "a"), (2, "a"), (4, "a")] {
             texts.show(Stamp(time), (0, 0), value);

@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn any_order_comes_back_sorted() {
+    fn values_are_returned_sorted() {
         let mut all = Stamps::default();
         let id = all.series();
         for part in [5000..9000, 0..3000, 2500..5000] {
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn many_stamps_leave_memory_and_come_back() {
+    fn many_stamps_are_spilled_and_read_back() {
         let mut all = Stamps::default();
         let ids: Vec<_> = (0..3).map(|_| all.series()).collect();
         // Far apart, so that each takes many bytes.

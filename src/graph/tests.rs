@@ -89,7 +89,7 @@ fn a_node_lives_until_its_rhythm_breaks() {
 }
 
 #[test]
-fn no_evidence_is_not_absence() {
+fn missing_evidence_is_not_absence() {
     let built = graphs(
         &[
             ("/a", Some("/x"), false, &[12, 35]),
@@ -200,7 +200,7 @@ fn a_topic_with_an_uneven_rhythm_does_not_vanish() {
 }
 
 #[test]
-fn a_latched_message_holds_its_node_to_the_end() {
+fn a_latched_message_keeps_its_node_alive() {
     let built = graphs(
         &[
             ("/map", Some("/x"), true, &[5]),
@@ -282,7 +282,7 @@ fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
 }
 
 #[test]
-fn roles_fold_anonymous_nodes_into_one() {
+fn roles_combine_anonymous_nodes() {
     let talks: [Talk<'_>; 2] = [
         ("/a", Some("/probe_12_1795171273454"), false, &[0, 5]),
         ("/a", Some("/probe_34_1795171318449"), false, &[20, 29]),
@@ -301,7 +301,7 @@ fn roles_fold_anonymous_nodes_into_one() {
 }
 
 #[test]
-fn what_the_user_tells_is_added_and_overwrites_nothing() {
+fn user_topology_is_added_without_overwriting() {
     let entry = |element, from_ns, to_ns| crate::evidence::topology::TopologyEntry {
         element,
         from_ns,
@@ -439,7 +439,7 @@ fn the_only_publisher_of_a_merged_topic_ends_with_its_rhythm() {
 }
 
 #[test]
-fn a_merged_topic_of_two_publishers_ends_nobody() {
+fn a_merged_topic_of_two_publishers_ends_no_node() {
     let all: Vec<i64> = (0..99).collect();
     let talks: &[Talk<'_>] = &[
         ("/base", Some("/host"), false, &all),

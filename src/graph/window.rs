@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn too_many_windows_name_a_period_that_would_do() {
+    fn too_many_windows_suggest_a_period() {
         let error = divide(&every("1ms"), secs(0, 3600)).unwrap_err();
         assert!(error.is_usage());
         assert_eq!(error.hint(), "`--period 100ms` would do");
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn start_and_end_cut_the_bag() {
+    fn start_and_end_limit_the_range() {
         let cut = |start, end| {
             let moment = |t: Option<&str>| t.and_then(Moment::parse);
             range(

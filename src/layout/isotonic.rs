@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sequence_that_grows_stays() {
+    fn a_growing_sequence_keeps_its_start() {
         assert_eq!(
             nearest(&[(1.0, 1.0), (2.0, 1.0), (4.0, 1.0)]),
             [1.0, 2.0, 4.0]
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn violators_meet_at_their_weighted_mean() {
+    fn violating_blocks_are_merged_at_their_weighted_mean() {
         assert_eq!(nearest(&[(4.0, 1.0), (1.0, 2.0)]), [2.0, 2.0]);
     }
 }

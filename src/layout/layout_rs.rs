@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_inside_is_not_heard_and_any_other_is() {
+    fn panics_inside_are_silenced_and_others_are_not() {
         let before = panic::take_hook();
         panic::set_hook(Box::new(move |told| {
             HEARD.set(HEARD.get() + 1);

@@ -196,7 +196,7 @@ mod tests {
     use crate::layout::tests::{cluster, link, vertex};
 
     #[test]
-    fn the_known_stay_and_the_new_stand_beside() {
+    fn known_boxes_stay_and_new_ones_are_placed_beside() {
         let plan = Plan {
             vertices: vec![vertex(None), vertex(Some(0)), vertex(Some(0))],
             links: vec![link(0, 2)],

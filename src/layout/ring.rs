@@ -1,4 +1,5 @@
-//! A third engine, for few boxes with many edges among them: the boxes around the page's rim, the edges across its middle.
+//! A third engine, for few boxes with many edges among them: the boxes around the page's rim, the edges across its
+//! middle.
 //!
 //! Layers would lead most of such edges past most of the boxes. On a rim no box lies between two others.
 
@@ -238,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn no_edge_between_any_two_boxes_meets_a_third_and_no_boxes_overlap() {
+    fn edges_avoid_other_boxes_and_boxes_do_not_overlap() {
         for n in 1..=MOST {
             let plan = plan(n);
             let layout = Ring.lay_out(&plan, &page()).unwrap();

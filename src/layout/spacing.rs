@@ -423,7 +423,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stretch_grows_without_leaving_what_it_held() {
+    fn an_extended_segment_contains_the_original() {
         assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 100.0)), (10.0, 50.0));
         assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 45.0)), (0.0, 50.0));
         assert_eq!(stretched((10.0, 30.0), 35.0, (0.0, 20.0)), (5.0, 35.0));

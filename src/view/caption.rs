@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn topics_rates_and_connections_have_their_own_words() {
+    fn topics_rates_and_connections_have_their_own_wording() {
         assert_eq!(caption(&["/a", "/a =/s/scan"]), "+ scan appears");
         assert_eq!(
             caption(&["=/s/scan@15", "=/s/scan@7.4"]),
@@ -418,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn names_give_way_until_the_headline_fits_its_line() {
+    fn names_are_shortened_until_the_headline_fits() {
         let name = "x".repeat(10_000);
         let now = format!("/{name} /b /c /d =/e =/h@5 =/i@5 =/j@5 =/k@5 =/l@5");
         let frame = last(&["/m =/h@1 =/i@1 =/j@1 =/k@1 =/l@1", &now]);

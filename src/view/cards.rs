@@ -1,5 +1,5 @@
-//! Cards: a topic that only one box is connected to is a row of that box, so that no leaves stand around it; the plumbing
-//! is a row in every box that is connected to it, so that no lines lead there from everywhere.
+//! Cards: a topic that only one box is connected to is a row of that box, so that no leaves stand around it; the
+//! plumbing is a row in every box that is connected to it, so that no lines lead there from everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -38,9 +38,9 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Makes topics with one known end rows of the box there, and, if `hides_plumbing`, the plumbing rows of all boxes that
-    /// are connected to it. Topics that are there without a connection in some window stay boxes. The rows are sorted by
-    /// their boxes; what is sent comes before what is received.
+    /// Makes topics with one known end rows of the box there, and, if `hides_plumbing`, the plumbing rows of all boxes
+    /// that are connected to it. Topics that are there without a connection in some window stay boxes. The rows are
+    /// sorted by their boxes; what is sent comes before what is received.
     pub(super) fn fold_leaves(&mut self, hides_plumbing: bool) -> Vec<CardRow> {
         let mut lines: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (at, arrow) in self.arrows.iter().enumerate() {
@@ -102,8 +102,8 @@ impl Drawn {
         }
     }
 
-    /// Whether one of these arrows of a topic is there whenever the topic is; of plumbing, whenever something is reported of
-    /// it.
+    /// Whether one of these arrows of a topic is there whenever the topic is; of plumbing, whenever something is
+    /// reported of it.
     fn is_told(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
         let Some(looks) = self.items_shown.get(topic as usize) else {
             return true;
@@ -170,7 +170,8 @@ impl Drawn {
         }
     }
 
-    /// Makes the two arrows of a box that both sends and receives a topic one line, with a head at each end that is used.
+    /// Makes the two arrows of a box that both sends and receives a topic one line, with a head at each end that is
+    /// used.
     pub(super) fn join_twins(&mut self) {
         let place = |arrows: &[Arrow], from: u32, to: u32| {
             arrows
@@ -346,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_that_two_nodes_send_stays_a_box() {
+    fn a_topic_with_two_publishers_stays_a_box() {
         let (boxes, rows) = drawn(&["/a>/t /b>/t"], Mode::All);
         assert_eq!(
             (boxes, rows.len()),
@@ -355,13 +356,13 @@ mod tests {
     }
 
     #[test]
-    fn rows_come_and_go_with_their_marks() {
+    fn rows_appear_and_vanish_with_their_marks() {
         let (_, rows) = drawn(&["/a", "/a>/t@9", "/a>/t@40", "/a"], Mode::All);
         assert_eq!(rows, ["/a → /t  +!-"]);
     }
 
     #[test]
-    fn lines_between_nodes_leave_rows_to_topics_that_change() {
+    fn changing_topics_have_rows_instead_of_lines() {
         let windows = ["/a>/t /b</t /a>/quiet", "/a>/t /b</t /a>/quiet /a>/new"];
         let (boxes, rows) = drawn(&windows, Mode::Bundles);
         assert_eq!(boxes, ["/a", "/b"]);
@@ -384,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_without_any_known_end_stands_in_words() {
+    fn a_topic_without_known_ends_is_text() {
         for mode in [Mode::All, Mode::Bundles] {
             let options = ViewOptions {
                 mode,

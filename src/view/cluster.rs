@@ -12,7 +12,8 @@ const DEEPEST: usize = 16;
 ///
 /// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
 /// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
-/// namespace around a single thing is left out, unless it is one of `kept`; a thing called like one of those stands in it.
+/// namespace around a single thing is left out, unless it is one of `kept`; a thing called like one of those stands in
+/// it.
 pub(crate) fn clusters(
     items: &mut [Item],
     depth: Option<usize>,
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn all_levels_are_drawn_but_not_around_a_single_thing() {
+    fn all_namespace_levels_are_drawn_except_around_a_single_item() {
         let want = ["/a/b/x in /a/b", "/a/b/c/d/x in /a/b", "/a/b < -"];
         assert_eq!(boxes(&["/a/b/x", "/a/b/c/d/x"], None), want);
         let got = boxes(&["/a/x", "/a/b/c/x", "/a/b/c/y"], None);
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_names_make_no_odd_boxes() {
+    fn unusual_names_are_boxed_correctly() {
         let slashes = "/".repeat(10_000);
         assert_eq!(boxes(&[&slashes, "", "a/b/c", "/"], None).len(), 4);
         let deep = "/a".repeat(10_000);

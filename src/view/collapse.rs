@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_can_stay_open_beside_the_rest() {
+    fn changing_elements_can_stay_outside_a_collapsed_box() {
         let mission = mission(&["/a/x>/a/t /a/y>/a/u /a/z>/a/u", "/a/x>/a/t /a/z>/a/u"]);
         let whole = outline(&mission, &options(&[], &[]));
         let open = whole.holding(&headlines(&mission).collect(), "/a");
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fold_has_two_members() {
+    fn a_collapsed_box_has_at_least_two_members() {
         let mission = mission(&["/a/x /b/y /b/z>/b/u", "/a/x /b/z>/b/u"]);
         let names = |options: &ViewOptions| -> Vec<String> {
             let view = outline(&mission, options);
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_least_is_collapsed_first() {
+    fn namespaces_with_fewest_changes_are_collapsed_first() {
         let mission = mission(&["/a/x>/a/t /b/y>/b/u /b/z", "/a/x>/a/t /b/z"]);
         let options = options(&[], &[]);
         let all = outline(&mission, &options).collapsible(&mission, &options);

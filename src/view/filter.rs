@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_a_lone_slash_let_all_pass_but_a_slash_in_a_list_does_not() {
+    fn an_empty_filter_or_a_lone_slash_matches_everything() {
         for all in ["", "/", "  "] {
             assert_eq!(passing(all, NAMES), NAMES.join(" "));
         }
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_pattern_is_a_usage_error() {
+    fn an_invalid_pattern_is_a_usage_error() {
         for bad in ["/a(", "-[", "a)(b", "(?=/tf)"] {
             assert!(NameFilter::parse(bad).unwrap_err().is_usage(), "{bad}");
         }

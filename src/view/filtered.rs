@@ -247,7 +247,7 @@ mod tests {
     use crate::view::{Hide, NameFilter};
 
     #[test]
-    fn what_is_left_out_is_gone_with_its_edges_and_changes() {
+    fn hidden_elements_lose_their_edges_and_changes() {
         let all = mission(&["/a>/t@1 /b</t", "/a>/t@1 /a>/clock@9 /c</t /b</t"]);
         let view = filtered(&all, &ViewOptions::default());
         assert_eq!(
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn active_leaves_out_what_carries_no_message() {
+    fn active_mode_hides_topics_without_messages() {
         let all = mission(&["/a>/t~ /b</t~ /c>/u"]);
         let options = ViewOptions {
             mode: Mode::Active,

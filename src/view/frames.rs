@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_group_tells_the_rate_of_its_members() {
+    fn a_group_has_the_rate_of_its_members() {
         let go = |feedback: u32| {
             let rest = ["goal", "cancel", "result"].map(|t| format!("/a>/go/{t}@0"));
             format!(
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn active_shows_only_what_carries_messages() {
+    fn active_mode_only_shows_topics_with_messages() {
         let options = ViewOptions {
             mode: Mode::Active,
             ..ViewOptions::default()
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_node_is_unreachable_only_if_asked() {
+    fn silent_nodes_are_unreachable_only_on_request() {
         let hide = Hide {
             unreachable: true,
             ..Hide::default()
@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_collapsed_namespace_holds_what_does_not_leave_it() {
+    fn a_collapsed_namespace_contains_its_internal_topics() {
         let windows = [
             "/n/a>/n/t@20 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
             "/n/a>/n/t@40 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_vanish_with_what_is_hidden() {
+    fn edges_of_hidden_elements_are_hidden() {
         let windows = ["/record_1</t /a>/t /a>/rosout /rosout</rosout"];
         assert_eq!(seen(&windows, &ViewOptions::default()), ["/a /t /a>/t"]);
         let all = ViewOptions {

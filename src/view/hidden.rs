@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_hidden_without_a_word() {
+    fn hidden_elements_are_reported() {
         let window = "/a>/clock /a>/rosout /record_7</t /a>/t /b/x</t";
         assert_eq!(
             told(window, &ViewOptions::default()),

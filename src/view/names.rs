@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quiet_is_short_and_exact() {
+    fn quiet_matches_exact_names() {
         for name in ["/clock", "/a/parameter_updates", "/events/write_split"] {
             assert!(is_quiet(name), "{name}");
         }

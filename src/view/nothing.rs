@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_matches_nothing_is_told_with_the_nearest_name() {
+    fn names_without_a_match_are_reported_with_the_nearest() {
         let options = ViewOptions {
             ns_filter: NameFilter::parse("/robot1/.*,-/rviz").unwrap(),
             topic_filter: NameFilter::parse("/robot1/plam").unwrap(),
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_name_or_namespace_is_named() {
+    fn the_nearest_name_or_namespace_is_suggested() {
         assert_eq!(
             hint("/robt1/.*"),
             "the nearest namespace is `/robot1`: `/robot1/.*` is all of it"

@@ -12,8 +12,8 @@ worded! {
     pub enum Mode {
         /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
         Nodes = "nodes",
-        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a graph that
-        /// no page can hold.
+        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a
+        /// graph that no page can hold.
         Bundles = "bundles",
         /// Nodes and topics, in each window only those that carry messages in it.
         Active = "active",
@@ -198,8 +198,8 @@ pub struct ViewOptions {
     pub expand: Vec<Arc<str>>,
     /// Whether to show the recorder and the player.
     pub show_recorder: bool,
-    /// Whether it is only looked at: topics with one known end, and those that half the system is connected to, are rows in
-    /// boxes, and topics without a known end are words.
+    /// Whether it is only looked at: topics with one known end, and those that half the system is connected to, are
+    /// rows in boxes, and topics without a known end are words.
     pub(crate) is_picture: bool,
     /// Whether bundles name nodes that never change in words too if one line leads to them.
     pub(crate) are_leaves_in_words: bool,
@@ -248,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_takes_the_place_of_the_default() {
+    fn a_list_replaces_the_default() {
         let hide = Hide::parse("dead, leaf").unwrap();
         assert!(hide.dead && hide.leaf && !hide.quiet && !hide.debug);
         assert_eq!(Hide::parse("none").unwrap(), Hide::NONE);
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_words_are_named() {
+    fn unknown_words_are_reported() {
         for error in [
             Hide::parse("dead,dad").unwrap_err(),
             Grouping::parse("action").unwrap_err(),

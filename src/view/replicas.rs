@@ -1,4 +1,5 @@
-//! Namespaces and names that are the same but for their index, such as the robots of a fleet: they are drawn once for all.
+//! Namespaces and names that are the same but for their index, such as the robots of a fleet: they are drawn once for
+//! all.
 
 use std::cmp::Reverse;
 use std::collections::hash_map::DefaultHasher;
@@ -293,8 +294,8 @@ fn partners(elements: &Elements) -> Vec<(&str, &str)> {
     edges.filter_map(pair).collect()
 }
 
-/// Drops fleets of which a member is linked to one of the same index that is in no fleet, and those linked to them: they
-/// only look alike.
+/// Drops fleets of which a member is linked to one of the same index that is in no fleet, and those linked to them:
+/// they only look alike.
 fn keep_linked(found: &mut Vec<(&str, Vec<&str>)>, partners: &[(&str, &str)]) {
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
     for (at, (_, members)) in found.iter().enumerate() {
@@ -346,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_robots_are_one_and_the_odd_one_stays() {
+    fn equal_robots_are_merged_and_a_different_one_is_not() {
         let text: Vec<String> = (1..=4).map(|n| robot(n, "")).collect();
         let text = text.join(" ") + " " + &robot(5, "/r5/cam>/r5/image");
         let mission = mission(&[&text]);
@@ -377,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn names_with_an_index_are_one_too() {
+    fn names_with_an_index_are_merged_too() {
         let worker = |n: usize| format!("/work_{n}</jobs_{n} /chief>/jobs_{n} /work_{n}>/done");
         let text: Vec<String> = (1..=4).map(worker).collect();
         let numbers = ["1609459200", "1609459201", "1609459202"];
@@ -400,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_linked_to_the_unequal_is_not_equal() {
+    fn elements_linked_to_unequal_ones_are_not_equal() {
         let seen = |text: &str| outline(&mission(&[text]), &ViewOptions::default());
         let chain = "/work_1>/out_1 /work_2>/out_2 /work_3>/out_3 /work_4>/out_4";
         assert_eq!(seen(chain).items.len(), 2);
@@ -411,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn thousands_of_names_are_no_fleet() {
+    fn thousands_of_names_are_not_a_fleet() {
         let folded = |many: usize| {
             let text: Vec<String> = (0..many).map(|n| format!("/n{n}")).collect();
             outline(&mission(&[&text.join(" ")]), &ViewOptions::default())
@@ -432,14 +433,14 @@ mod tests {
     }
 
     #[test]
-    fn two_robots_stand_side_by_side() {
+    fn two_robots_are_drawn_side_by_side() {
         let text = [robot(1, ""), robot(2, "")].join(" ");
         let seen = outline(&mission(&[&text]), &ViewOptions::default());
         assert!(seen.items.iter().any(|i| &*i.name == "/r1/odom"));
     }
 
     #[test]
-    fn the_roll_tells_who_joins_and_who_leaves_and_rates_are_those_of_each() {
+    fn members_joining_and_leaving_are_shown_with_their_own_rates() {
         let all = |robots: &[usize]| -> String {
             let texts: Vec<String> = robots.iter().map(|n| robot(*n, "")).collect();
             texts.join(" ")

@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn every_window_can_be_sought() {
+    fn every_window_can_be_looked_up() {
         let added = Some((Some(Mark::Added), 10.0));
         let removed = Some((Some(Mark::Removed), 0.0));
         let runs = runs(&[
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_the_same_is_one_spell() {
+    fn constant_states_are_one_run() {
         let runs = runs(&[Some((None, 9.8)); 50]);
         assert_eq!(
             serde_json::to_string(&runs.arrows).unwrap(),

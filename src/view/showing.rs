@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shown_is_found_again() {
+    fn shown_elements_can_be_looked_up() {
         let all = [
             None,
             shown(1.0, Some(Mark::Added)),
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_looks_each_is_kept_once() {
+    fn each_look_is_kept_once() {
         let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
         let showing = Showing::of(all.iter().map(Option::as_ref));
         assert_eq!(showing.looks().len(), 20);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_takes_no_room() {
+    fn constant_elements_take_no_memory() {
         let (slow, fast) = (shown(1.0, None), shown(2.0, None));
         let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
         let showing = Showing::of(all.map(Option::as_ref));
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn two_are_told_together() {
+    fn two_events_are_reported_together() {
         let (one, two) = (shown(1.0, None), shown(2.0, None));
         let a = Showing::of([one.as_ref(), one.as_ref(), two.as_ref()]);
         let b = Showing::of([None, one.as_ref(), one.as_ref()]);

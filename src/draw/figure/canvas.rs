@@ -104,8 +104,8 @@ impl<'a> PaperCanvas<'a> {
         self.groups.push(Group::named(id));
     }
 
-    /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about them
-    /// is its title.
+    /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about
+    /// them is its title.
     pub(crate) fn begin_mark(&mut self, class: &str, entries: &[EntryId], title: String) {
         let mut group = Group::named(&format!("{class}-{}", self.groups.len()));
         class.clone_into(&mut group.class);
@@ -329,7 +329,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_cut_fits_however_long_it_was() {
+    fn shortened_text_always_fits() {
         let fonts = Fonts::bundled();
         let canvas = PaperCanvas::new(&fonts, Sizes::of_names(7.0), PX_PER_MM);
         // Held against every prefix, this would take hours.

@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_short_to_be_seen_is_no_step() {
+    fn invisibly_short_runs_are_not_steps() {
         let found = told(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
         assert_eq!(found, [(0, 100, 15.0)]);
         let found = told(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);

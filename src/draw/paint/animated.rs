@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_are_written_once_with_the_times_at_which_they_are_seen() {
+    fn looks_are_written_once_with_their_times() {
         let scenes = [
             scene(&[("a", "x"), ("b", "x")]),
             scene(&[("a", "x"), ("b", "y"), ("c", "x")]),
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn each_scene_is_painted_in_its_own_order() {
+    fn every_scene_has_its_own_painting_order() {
         let scenes = [
             scene(&[("a", "x"), ("b", "x"), ("c", "x")]),
             scene(&[("b", "x"), ("a", "x"), ("c", "x")]),

@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn decimals_have_no_needless_zero() {
+    fn decimals_have_no_trailing_zeros() {
         let all = [-3.04, -0.25, 0.04, 0.5, 12.0, f64::NAN].map(tenth);
         assert_eq!(all, ["-3", "-.3", "0", ".5", "12", "0"]);
     }

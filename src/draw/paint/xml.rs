@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_written_stays_inside_its_quotes_and_tags() {
+    fn text_cannot_leave_its_quotes_and_tags() {
         let mut xml = Xml::default();
         xml.open("g").attribute("data-name", "\"><script>");
         xml.open("text").text("</text>&\u{1}\n\u{202e}").close();

@@ -494,7 +494,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_lose_the_namespace_they_stand_in() {
+    fn names_are_relative_to_their_namespace() {
         assert_eq!(short_name("/a/b/c", "/a"), "b/c");
         assert_eq!(short_name("/a", ""), "/a");
         assert_eq!(short_name("/a/", "/a"), "/a/");

@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn faster_arrows_are_thicker_but_not_without_end() {
+    fn faster_arrows_are_thicker_up_to_a_limit() {
         let style = Style::builtin("light").unwrap();
         let width = |hz| {
             let shown = shown(State::Active, Degree::Measured, None, hz);
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn every_difference_survives_in_grey() {
+    fn differences_are_visible_in_greyscale() {
         for name in ["light", "dark", "paper", "rqt"] {
             let style = Style::builtin(name).unwrap();
             let active = (State::Active, Degree::Measured, None);

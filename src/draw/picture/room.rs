@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_badge_leaves_the_corner_that_a_line_runs_by() {
+    fn a_badge_avoids_a_corner_with_a_line() {
         let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
         place_badges(&mut cards, &mut [along(130.0)], 8.0, 1.0);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_badge_on_an_arrow_leaves_the_place_where_another_crosses() {
+    fn a_badge_on_an_arrow_avoids_crossings() {
         let mut both = [
             line(Point::new(0.0, 0.0), Point::new(200.0, 0.0)),
             line(Point::new(100.0, -30.0), Point::new(100.0, 90.0)),

@@ -51,7 +51,7 @@ fn is_element(group: &Group) -> bool {
 }
 
 #[test]
-fn nothing_ever_moves() {
+fn positions_are_constant_across_windows() {
     let mut places: BTreeMap<String, Form> = BTreeMap::new();
     for scene in scenes(&MISSION) {
         // Rates differ in length, and so do the pills under them.
@@ -68,7 +68,7 @@ fn nothing_ever_moves() {
 }
 
 #[test]
-fn no_line_runs_over_words() {
+fn lines_do_not_cross_text() {
     for scene in scenes(&MISSION) {
         let is_line = |g: &Group| g.class.starts_with("edge") && !g.id.ends_with("..over");
         let last_line = scene.groups.iter().rposition(is_line).unwrap();
@@ -92,7 +92,7 @@ fn no_line_runs_over_words() {
 }
 
 #[test]
-fn every_id_occurs_once_and_is_an_xml_name() {
+fn ids_are_unique_xml_names() {
     for scene in scenes(&MISSION) {
         let ids: BTreeSet<&str> = scene.groups.iter().map(|g| g.id.as_str()).collect();
         assert_eq!(ids.len(), scene.groups.len());
@@ -108,7 +108,7 @@ fn every_id_occurs_once_and_is_an_xml_name() {
 }
 
 #[test]
-fn a_frame_says_what_changed_in_names_classes_and_words() {
+fn a_frame_marks_changes_in_names_classes_and_text() {
     let all = scenes(&MISSION);
     let svg = |k: usize| crate::draw::paint::svg::write(&all[k]);
     assert!(svg(1).contains("15 → 7 Hz"));
@@ -128,7 +128,7 @@ fn a_frame_says_what_changed_in_names_classes_and_words() {
 }
 
 #[test]
-fn names_are_shortened_inside_their_namespace_only() {
+fn names_are_only_shortened_inside_their_namespace() {
     let nested = ["/base/driver>/base/odom@5 /base/ekf</base/odom /root</base/odom"];
     let svg = crate::draw::paint::svg::write(&scenes(&nested)[0]);
     assert!(
@@ -158,7 +158,7 @@ fn characters_without_a_glyph_are_spelled_out_and_noticed() {
 }
 
 #[test]
-fn colours_never_move_anything() {
+fn colours_do_not_affect_positions() {
     let places = |style| {
         with_picture(&MISSION, style, PageOptions::default(), |p| {
             p.layout().clone()
@@ -169,7 +169,7 @@ fn colours_never_move_anything() {
 }
 
 #[test]
-fn a_bare_picture_is_the_graph_alone() {
+fn a_bare_picture_contains_only_the_graph() {
     let options = PageOptions {
         bare: true,
         ..PageOptions::default()
@@ -180,7 +180,7 @@ fn a_bare_picture_is_the_graph_alone() {
 }
 
 #[test]
-fn a_tween_goes_changes_and_comes_and_nothing_moves() {
+fn a_tween_fades_without_movement() {
     with_picture(&MISSION, "light", PageOptions::default(), |p| {
         assert_eq!(p.between(2, 1.0), p.scene(2));
         assert_eq!(p.between(0, 0.5), p.scene(0));
@@ -208,7 +208,7 @@ fn a_tween_goes_changes_and_comes_and_nothing_moves() {
 }
 
 #[test]
-fn frames_drawn_one_over_the_other_equal_frames_drawn_anew() {
+fn incremental_frames_equal_fully_drawn_ones() {
     let painter = Painter::new(&Fonts::bundled());
     let options = PageOptions {
         size: Size::new(480.0, 300.0),
@@ -228,7 +228,7 @@ fn frames_drawn_one_over_the_other_equal_frames_drawn_anew() {
 }
 
 #[test]
-fn pages_of_any_size_hold_their_furniture() {
+fn furniture_fits_pages_of_any_size() {
     for (w, h) in [
         (1920.0, 1080.0),
         (800.0, 450.0),

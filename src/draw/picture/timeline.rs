@@ -149,8 +149,8 @@ impl<'a> Timeline<'a> {
         groups
     }
 
-    /// The groups that change from frame to frame: what lives in the window at place `k` (or the bars up to it), and the
-    /// head over exactly its time.
+    /// The groups that change from frame to frame: what lives in the window at place `k` (or the bars up to it), and
+    /// the head over exactly its time.
     pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
         let shown = frame.shown();
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_stand_at_round_times() {
+    fn ticks_are_at_round_times() {
         const SECOND: i64 = 1_000_000_000;
         assert_eq!(round_length(7 * SECOND), 10 * SECOND);
         assert_eq!(round_length(100 * SECOND), 120 * SECOND);

@@ -63,8 +63,8 @@ impl Row {
     }
 }
 
-/// The names of the topics of an arrow as they are drawn: as short as tells them apart, without the form that an image is
-/// carried in.
+/// The names of the topics of an arrow as they are drawn: as short as tells them apart, without the form that an image
+/// is carried in.
 pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
     let plain = |name: &Arc<str>| {
         let family = FAMILIES.iter().find_map(|end| name.strip_suffix(end));
@@ -118,8 +118,8 @@ fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     shorter.min_by_key(|rest| rest.len()).unwrap_or(name)
 }
 
-/// The rows of a line in a window: of up to three topics one each, those that changed first, then by rate; of more, those
-/// that changed or the one with the highest rate, with the number of the others.
+/// The rows of a line in a window: of up to three topics one each, those that changed first, then by rate; of more,
+/// those that changed or the one with the highest rate, with the number of the others.
 pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let both = uses(shown) == [true, true];
     let news = shown.topics.iter().filter(|row| row.mark.is_some()).count();
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_as_short_as_tells_them_apart() {
+    fn names_are_shortened_while_distinguishable() {
         let equal = "/a>/n/l/map@1 /a>/n/g/map@2 /b</n/l/map /b</n/g/map";
         assert_eq!(words(equal), ["/n/g/map 2 Hz", "/n/l/map 1 msg"]);
         let image = "/a>/n/camera/image/compressed@30 /b</n/camera/image/compressed";

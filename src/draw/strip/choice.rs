@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn choices_are_read_as_people_write_them() {
+    fn choices_are_parsed_in_all_forms() {
         assert_eq!(Choice::parse("3x2").unwrap(), Choice::Grid(3, 2));
         assert_eq!(
             Choice::parse("0, 4,9").unwrap(),
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_are_named_by_their_index() {
+    fn windows_are_selected_by_index() {
         assert_eq!(places("12,10", &[0, 0, 0]), [2, 0]);
         let missing = Choice::Windows(vec![9]).places(&view(&[0]));
         assert!(missing.is_err_and(|e| e.is_usage()));

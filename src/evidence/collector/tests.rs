@@ -175,7 +175,7 @@ fn a_log_connection_of_another_node_was_merged() {
 }
 
 #[test]
-fn roscpp_tells_of_its_subscribers() {
+fn roscpp_log_messages_reveal_subscribers() {
     let text = "Connection to subscriber [callerid=[/c] address=[x]] to topic [/scan] dropped";
     let record = Payload::log("/a", text, "link.cpp", &[]);
     let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
@@ -190,7 +190,7 @@ fn the_recorder_dates_a_topic() {
 }
 
 #[test]
-fn statistics_know_both_ends() {
+fn statistics_name_both_ends() {
     let message = Payload::ros1()
         .text("/scan")
         .text("/lidar")
@@ -320,7 +320,7 @@ fn flow() -> Collector {
 }
 
 #[test]
-fn a_node_that_passes_stamps_on_subscribes_their_source() {
+fn a_node_that_forwards_stamps_subscribes_to_their_source() {
     let recorded = flow().finish().unwrap();
     let span = recorded.span.unwrap();
     let options = crate::evidence::conclude::ConcludeOptions::default();

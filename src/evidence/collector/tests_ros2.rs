@@ -54,7 +54,7 @@ fn parameter_events_name_their_node() {
 }
 
 #[test]
-fn a_transition_tells_the_state() {
+fn a_transition_sets_the_state() {
     let message = Payload::cdr()
         .u64(1)
         .byte(3)
@@ -195,7 +195,7 @@ fn losses_of_the_recorder_name_the_topic_and_the_number() {
 }
 
 #[test]
-fn topic_statistics_tell_publishers_from_subscribers() {
+fn topic_statistics_distinguish_publishers_and_subscribers() {
     let one = |p: Payload, kind, node| {
         let p = p.byte(kind).text(node).text("/scan").u32(9);
         p.time().time().time()
@@ -276,7 +276,7 @@ fn service_events_count_clients_and_calls() {
 }
 
 #[test]
-fn services_tell_their_calls_and_clients() {
+fn service_events_yield_calls_and_clients() {
     let message = Payload::cdr()
         .byte(1)
         .time()

@@ -174,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_snapshot_without_a_claim_tells_of_its_absence() {
+    fn a_claim_missing_in_a_snapshot_is_an_absence() {
         let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
         let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
         assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));

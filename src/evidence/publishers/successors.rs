@@ -255,8 +255,8 @@ impl Habit {
     }
 }
 
-/// The longest silence of a topic that begins when a node was last seen, give or take one of its pauses: the last message
-/// and the next one. `None` unless it is long for the topic.
+/// The longest silence of a topic that begins when a node was last seen, give or take one of its pauses: the last
+/// message and the next one. `None` unless it is long for the topic.
 fn silence(times: &[Stamp], habit: Habit, end: Stamp) -> Option<(Stamp, Option<Stamp>)> {
     let from = times.partition_point(|t| *t < habit.last.plus(-habit.pause));
     let to = times.partition_point(|t| *t <= habit.last.plus(habit.pause));
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_falls_silent_with_its_node_or_not_at_all() {
+    fn silence_of_a_topic_requires_silence_of_its_node() {
         let times = seconds((0..20).chain(60..90));
         let habit = |last: i64, pause: i64| Habit {
             last: Stamp(last * 1_000_000_000),
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_signs_are_no_habit() {
+    fn a_few_signs_are_not_a_rhythm() {
         assert!(Habit::of(&seconds([1, 2, 3, 4])).is_none());
         let habit = Habit::of(&seconds([1, 2, 3, 9, 10])).unwrap();
         assert_eq!((habit.last.0, habit.pause), (10_000_000_000, 6_000_000_000));

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_node_of_another_program_is_not_meant() {
+    fn a_node_of_another_program_does_not_match() {
         let row = [
             "amcl",
             "amcl_node.cpp",
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peculiar_type_tells_its_program() {
+    fn a_unique_type_identifies_its_program() {
         let owners = Owners::new();
         let owner = |topic| owners.node("turtlesim/Pose", topic);
         assert_eq!(owner("/turtle1/pose").as_deref(), Some("/turtlesim"));

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_nodelet_is_no_part_of_its_caller() {
+    fn a_nodelet_is_not_part_of_its_caller() {
         assert!(is_nodelet("/mgr", "/decim"));
         assert!(!is_nodelet("/move_base", "/move_base"));
         assert!(!is_nodelet("/move_base", "/move_base/costmap"));

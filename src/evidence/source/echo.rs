@@ -302,7 +302,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_stands_on_its_own() {
+    fn values_match_only_as_whole_words() {
         assert_eq!(place("I heard: [Hello 3]", "Hello 3"), Some(10..17));
         assert_eq!(place("I heard: [Hello 31]", "Hello 3"), None);
         assert_eq!(place("rate 2.5", "5"), None);
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_say_whether_they_sent_or_received() {
+    fn verbs_in_texts_determine_the_direction() {
         assert_eq!(verb("Publishing: '", "'"), Some(true));
         assert_eq!(verb("I heard: [", "]"), Some(false));
         assert_eq!(verb("state ", ""), None);

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_publisher_tells_of_the_loggers_own_subscription() {
+    fn a_lost_publisher_reveals_the_loggers_subscription() {
         let text = "Retrying connection to [127.0.0.1:4] for topic [/scan]";
         assert_eq!(
             link(text),

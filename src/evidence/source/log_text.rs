@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_resolved_as_their_node_means_them() {
+    fn names_are_resolved_relative_to_their_node() {
         assert_eq!(resolved("odom", "/r1/base"), "/r1/odom");
         assert_eq!(resolved("odom", "/base"), "/odom");
         assert_eq!(resolved("~/odom", "/r1/base"), "/r1/base/odom");

@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn a_copy_that_the_recorder_gets_first_is_a_copy_too() {
+    fn a_copy_recorded_before_its_original_is_detected() {
         let message = |n: u32| {
             let (at, early) = (i64::from(n) * 100, n % 5 == 0);
             [(0, at, n), (1, if early { at - 1 } else { at + 1 }, n)]
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_long_ago_is_no_input() {
+    fn old_messages_are_not_inputs() {
         assert!(walked(&[(0, 0, 7), (1, 2_500, 7)]).pairs.is_empty());
     }
 
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_copies_of_one_topic_neither_is_the_others_input() {
+    fn two_copies_of_a_topic_are_not_each_others_input() {
         let messages: Vec<_> = (0..40_u32)
             .flat_map(|n| {
                 let at = i64::from(n) * 100;

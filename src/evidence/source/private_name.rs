@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_topic_belongs_to_the_node_it_lies_below() {
+    fn a_topic_in_a_private_namespace_belongs_to_its_node() {
         let names = ["/amcl", "/r1", "/r1/nav"].into_iter().map(Arc::from);
         let nodes: NodesByName = names.zip((0..).map(Name)).collect();
         let owner = |topic| owner(topic, &nodes, &spaces(&nodes));

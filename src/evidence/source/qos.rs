@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_list_of_offers_offers_nothing() {
+    fn invalid_qos_lists_have_no_offers() {
         assert!(offers("").is_empty() && offers("a: b").is_empty() && offers("- 5").is_empty());
         assert!(!is_transient_local(""));
     }

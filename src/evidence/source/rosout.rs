@@ -1,7 +1,7 @@
 //! Log records of ROS 1: a node is alive, and the topics it names as its own.
 //!
-//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the file that
-//! logged.
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the file
+//! that logged.
 
 use std::collections::BTreeSet;
 
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rospy_is_recognised_by_a_file_without_a_folder() {
+    fn rospy_is_recognized_by_a_file_without_folder() {
         for file in ["node.py", "lib/node.py", "follow_wall", "<stdin>"] {
             assert!(is_rospy(file), "{file}");
         }

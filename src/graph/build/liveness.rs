@@ -183,9 +183,9 @@ impl Liveness {
         }
     }
 
-    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence. For
-    /// the same reason a node without a proof of its beginning is there from the start; a topic with an uneven rhythm
-    /// does not end.
+    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence.
+    /// For the same reason a node without a proof of its beginning is there from the start; a topic with an uneven
+    /// rhythm does not end.
     pub(crate) fn live(&mut self, mission: (Stamp, Stamp), is_node: bool) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
@@ -478,13 +478,13 @@ mod tests {
     }
 
     #[test]
-    fn a_life_spans_its_signs() {
+    fn a_lifetime_spans_its_signs() {
         assert_eq!(stretches(&[1, 5, 9], &[]), [(1, 9)]);
         assert_eq!(stretches(&[], &[4]), []);
     }
 
     #[test]
-    fn an_end_closes_a_life_and_the_next_sign_opens_another() {
+    fn an_end_closes_a_lifetime_and_the_next_sign_begins_another() {
         assert_eq!(stretches(&[1, 5, 9, 10], &[6]), [(1, 6), (9, 10)]);
         assert_eq!(stretches(&[1, 5], &[0, 7, 8]), [(1, 7)]);
         assert_eq!(stretches(&[1, 5], &[5]), [(1, 5)]);

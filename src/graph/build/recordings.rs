@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn senders_that_pause_together_show_a_pause_of_the_recorder() {
+    fn simultaneous_pauses_are_a_recorder_pause() {
         let fast = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
         let slow = [stretch(0, 9_500, 500), stretch(15_400, 30_000, 500)];
         // Too slow to show it: a message every four seconds.
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn one_node_that_pauses_is_not_the_recorder() {
+    fn a_pause_of_one_node_is_not_a_recorder_pause() {
         let on = [stretch(0, 30_000, 10)];
         let off = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
         assert_eq!(told(&[(1, &off), (1, &off), (1, &off)]), []);

@@ -336,13 +336,13 @@ mod tests {
     }
 
     #[test]
-    fn a_node_that_is_always_heard_was_not_away() {
+    fn a_node_without_gaps_was_not_away() {
         let signs: Vec<Stamp> = (0..100).map(|n| Stamp(n * 90_000_000)).collect();
         assert_eq!(widest_gap(&signs, signs[1], signs[90]), None);
     }
 
     #[test]
-    fn what_two_streams_tell_of_one_restart_is_narrowed() {
+    fn restart_times_from_two_streams_are_intersected() {
         let [a, b, c, d] = [1, 2, 3, 4].map(Stamp);
         assert_eq!(narrowed(vec![(b, d), (a, c)]), [(b, c)]);
         assert_eq!(narrowed(vec![(a, b), (c, d)]), [(a, b), (c, d)]);

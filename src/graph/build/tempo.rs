@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_messages_are_no_change_of_rate() {
+    fn lost_messages_are_not_a_rate_change() {
         let all = times(&[(300, 500)]);
         for seed in 0..20_u64 {
             let mut dice = seed;
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_is_a_gap_and_a_lost_message_is_none() {
+    fn a_pause_is_a_gap_and_a_lost_message_is_not() {
         let found = told(&[(50, 100), (1, 30_000), (50, 100)]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(!found[1].2);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_at_random_is_not_even() {
+    fn random_arrivals_are_not_even() {
         let mut at = 0;
         let mut noise = 12_345_i64;
         let times: Vec<Stamp> = (0..200)

@@ -124,7 +124,7 @@ pub(crate) fn graph() -> impl Strategy<Value = Graph> {
 
 proptest! {
     #[test]
-    fn what_is_put_in_comes_out(list in proptest::collection::vec((graph(), 1..4_usize, 1..5_000_000_000_i64), 0..12)) {
+    fn stored_graphs_round_trip(list in proptest::collection::vec((graph(), 1..4_usize, 1..5_000_000_000_i64), 0..12)) {
         // Some windows repeat the one before; some are shorter than others.
         let mut at = Stamp(0);
         let mut graphs: Vec<(Span, Graph)> = Vec::new();
@@ -160,7 +160,7 @@ proptest! {
 }
 
 #[test]
-fn what_stays_the_same_takes_no_room() {
+fn constant_states_take_no_memory() {
     let second = |n: i64| Span::new(Stamp(n * 1_000_000_000), Stamp((n + 1) * 1_000_000_000));
     let topic = TopicState {
         id: 0,
@@ -182,7 +182,7 @@ fn what_stays_the_same_takes_no_room() {
 }
 
 #[test]
-fn very_many_elements_take_only_their_own_room() {
+fn memory_is_proportional_to_the_states_of_elements() {
     let node = |id| NodeState {
         id,
         state: State::Active,

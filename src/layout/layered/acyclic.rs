@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn the_greedy_order_is_the_one_that_is_told() {
+    fn the_greedy_order_is_returned() {
         let mut state = 7_usize;
         let mut number = |below: usize| {
             state = state

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deep_graph_stays_as_it_is() {
+    fn a_deep_graph_is_not_wrapped() {
         let edges = [(0, 1), (1, 2), (2, 3)];
         assert_eq!(
             fold(&[0, 1, 2, 3], &edges, &[0; 4], 3),

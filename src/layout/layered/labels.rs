@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn two_labels_on_two_near_edges_stand_apart() {
+    fn labels_on_adjacent_edges_do_not_overlap() {
         let plan = plan(vec![labelled(40.0, 13.0); 2]);
         let level = |y: f64| straight(Point::new(80.0, y), Point::new(200.0, y));
         let routes = vec![level(12.0), level(18.0)];
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_is_on_no_other_edge() {
+    fn labels_do_not_overlap_other_edges() {
         let crowded = plan(vec![labelled(40.0, 13.0), link(0, 1), link(0, 1)]);
         let upright = |x: f64| straight(Point::new(x, 30.0), Point::new(x, 160.0));
         let routes = [40.0, 30.0, 50.0].map(upright).to_vec();

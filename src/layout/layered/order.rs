@@ -16,8 +16,8 @@ pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
     Search::new(layers, effort).finished()
 }
 
-/// A search for an order with few crossings. Its effort counts edges swept: the search begins anew, then shakes the best
-/// order, until that is spent.
+/// A search for an order with few crossings. Its effort counts edges swept: the search begins anew, then shakes the
+/// best order, until that is spent.
 pub(crate) struct Search<'a> {
     pub(crate) layers: &'a Layers,
     sorter: CrossingReducer<'a>,
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn crossings_that_need_not_be_are_undone() {
+    fn avoidable_crossings_are_removed() {
         let (rows, crossings) = order(&crossed(), 1000);
         assert_eq!(crossings, 0);
         assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);

@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_source_slides_to_its_reader() {
+    fn a_late_source_is_moved_next_to_its_reader() {
         assert_eq!(ranks(4, &[(0, 1), (1, 2), (3, 2)]), [0, 1, 2, 1]);
     }
 }

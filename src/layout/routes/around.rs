@@ -190,7 +190,8 @@ pub(crate) struct Map {
 
 impl Map {
     pub(crate) fn new(boxes: &[Rect]) -> Self {
-        // Where a look from every corner at every box is beyond the effort, no way would be found: all edges run straight.
+        // Where a look from every corner at every box is beyond the effort, no way would be found: all edges run
+        // straight.
         if boxes.len().saturating_mul(boxes.len()) > EFFORT {
             return Self {
                 obstacles: Vec::new(),
@@ -235,8 +236,8 @@ impl Map {
         Some(rounded(&way))
     }
 
-    /// The way from a box to a point of a level lane. Where it has to turn on the way, it meets the lane upright from its
-    /// last turn: a way back to the point itself would be a sharp bend.
+    /// The way from a box to a point of a level lane. Where it has to turn on the way, it meets the lane upright from
+    /// its last turn: a way back to the point itself would be a sharp bend.
     fn way_to_lane(&mut self, end: End, lane: Point) -> Option<Vec<Point>> {
         let own = (end.at, end.at);
         let mut way = self.way(end.rect.centre(), lane, own)?;
@@ -340,7 +341,7 @@ mod tests {
     use crate::layout::tests::{link, vertex};
 
     #[test]
-    fn a_crowd_is_crossed_straight_and_at_once() {
+    fn routes_through_a_crowd_are_straight_and_fast() {
         let n = 20_000;
         let plan = Plan {
             vertices: vec![vertex(None); n],
@@ -363,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_from_a_lane_has_no_sharp_bend() {
+    fn a_route_from_a_lane_has_no_sharp_bend() {
         let boxes = [(400.0, 0.0), (-20.0, 100.0), (0.0, 200.0)];
         let boxes = boxes.map(|(x, y)| Rect::new(x, y, 80.0, 30.0));
         let end = |at: usize| End {
@@ -390,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_goes_around_what_stands_between() {
+    fn an_edge_goes_around_boxes_in_between() {
         let plan = Plan {
             vertices: vec![vertex(None); 3],
             links: vec![link(0, 2)],

@@ -111,7 +111,7 @@ mod tests {
     use crate::view::{Hide, ViewOptions, outline};
 
     #[test]
-    fn names_are_escaped_as_rqt_graph_does() {
+    fn names_are_escaped_like_in_rqt_graph() {
         let all = [
             ("n_/talker", "n___talker"),
             ("t_/robot1/image", "t___robot1__image"),

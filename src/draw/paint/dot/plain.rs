@@ -140,7 +140,7 @@ mod tests {
     use crate::view::{ViewOptions, view};
 
     #[test]
-    fn it_has_a_title_and_colours_and_no_places() {
+    fn plain_dot_has_title_and_colours_without_positions() {
         let mission = mission(&["/ns/a>/t@3", "/ns/a>/t@3 /b</t"]);
         let (view, _) = view(&mission, &ViewOptions::default());
         let drawing = DotView::new(&mission, &view, Style::builtin("light").unwrap());

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_and_topics_are_written_as_rqt_graph_does() {
+    fn nodes_and_topics_are_written_like_in_rqt_graph() {
         let file = file(
             &["/ns/a>/t@12.5 /b</t /a>/tf /ns/c"],
             &ViewOptions::default(),

@@ -106,7 +106,7 @@ fn apart(scene: &Scene, scale: f32) -> Vec<u8> {
 }
 
 #[test]
-fn groups_drawn_apart_look_like_the_whole_document() {
+fn separately_drawn_groups_equal_the_whole_document() {
     let scene = page((0..12).map(|i| element(i, i)).collect());
     // Soft edges are rounded once more for each group, and a curve is cut into other steps elsewhere on a page.
     let small = apart(&scene, 1.0);
@@ -122,7 +122,7 @@ fn groups_drawn_apart_look_like_the_whole_document() {
 }
 
 #[test]
-fn a_frame_drawn_over_the_last_equals_one_drawn_anew() {
+fn incremental_drawing_equals_full_drawing() {
     let painter = painter();
     for scale in [1.0, 1.5] {
         let mut canvas = Canvas::new(&painter, scale);
@@ -142,7 +142,7 @@ fn a_frame_drawn_over_the_last_equals_one_drawn_anew() {
 }
 
 #[test]
-fn what_is_told_to_have_changed_is_all_that_did() {
+fn reported_changes_are_complete() {
     let painter = painter();
     let mut canvas = Canvas::new(&painter, 1.5);
     let mut copy = vec![0; 300 * 180 * 4];
@@ -162,7 +162,7 @@ fn what_is_told_to_have_changed_is_all_that_did() {
 }
 
 #[test]
-fn what_changes_its_place_in_the_pile_is_drawn_anew() {
+fn elements_with_a_new_painting_order_are_redrawn() {
     let painter = painter();
     let mut canvas = Canvas::new(&painter, 1.0);
     let scene = page(vec![element(0, 3), element(1, 3)]);

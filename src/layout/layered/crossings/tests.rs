@@ -23,7 +23,7 @@ fn counted(layers: &Layers, rows: &LayerRows) -> u64 {
 }
 
 #[test]
-fn what_is_kept_of_rows_is_what_they_give_anew() {
+fn cached_rows_equal_recomputed_ones() {
     let (n, mut state) = (24, 5_usize);
     let mut number = |below: usize| {
         state = state
@@ -70,7 +70,7 @@ fn inversions_are_pairs_out_of_order() {
 }
 
 #[test]
-fn the_median_leans_to_the_crowded_side() {
+fn the_median_is_weighted_to_the_crowded_side() {
     assert!((centre(&[0, 4, 5, 20], true) - 4.2).abs() < 0.1);
     assert!(centre(&[], true).is_nan());
 }
