@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_growing_sequence_keeps_its_start() {
+    fn an_increasing_sequence_is_unchanged() {
         assert_eq!(
             nearest(&[(1.0, 1.0), (2.0, 1.0), (4.0, 1.0)]),
             [1.0, 2.0, 4.0]

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn each_look_is_kept_once() {
+    fn equal_looks_are_stored_once() {
         let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
         let showing = Showing::of(all.iter().map(Option::as_ref));
         assert_eq!(showing.looks().len(), 20);
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn two_events_are_reported_together() {
+    fn two_showings_are_paired_by_window() {
         let (one, two) = (shown(1.0, None), shown(2.0, None));
         let a = Showing::of([one.as_ref(), one.as_ref(), two.as_ref()]);
         let b = Showing::of([None, one.as_ref(), one.as_ref()]);

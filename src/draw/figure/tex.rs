@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_not_executed() {
+    fn names_are_escaped_for_latex() {
         assert_eq!(
             escaped("/a_b%{x}\\input"),
             "/a\\_b\\%\\{x\\}\\textbackslash{}input"

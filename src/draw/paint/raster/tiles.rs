@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_outside_the_page_are_clipped() {
+    fn elements_outside_the_page_take_few_tiles() {
         let mut tiles = Tiles::none(Size::new(100.0, 100.0));
         tiles.add(Rect::new(-500.0, -500.0, 10.0, 10.0));
         tiles.add(Rect::new(5000.0, 20.0, 10.0, 10.0));
