@@ -103,16 +103,18 @@ impl Viewed {
             subscribed: elements.subscribes.iter().map(pair).collect(),
             ..Self::default()
         };
+        viewed.drawn = vec![true; elements.topics.len()];
+        viewed.is_in_words[0] = vec![false; elements.nodes.len()];
         if options.mode == Mode::Bundles {
             viewed.drawn = bundles::drawn(mission, options);
+        }
+        // What is written down or can be opened has a box for each.
+        if options.mode == Mode::Bundles && options.is_picture {
             viewed.is_in_words[0] = bundles::nodes_in_words(
                 mission,
                 (&viewed.selection, &viewed.drawn),
                 options.are_leaves_in_words,
             );
-        } else {
-            viewed.drawn = vec![true; elements.topics.len()];
-            viewed.is_in_words[0] = vec![false; elements.nodes.len()];
         }
         viewed.set_items(mission, options, &groups);
         if options.mode.is_direct() {

@@ -14,6 +14,8 @@ const BURST: i64 = 66;
 const END: i64 = 33;
 /// The least number of rows that live throughout and are folded.
 const FEWEST_FOLDED: usize = 3;
+/// The most rows of a figure in which nothing comes or goes that stand one by one.
+const MOST_OPEN: usize = 12;
 
 /// One row of the figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,12 +74,12 @@ fn of_space(
     }
     let mut rows = vec![FigureRow::Space(space.to_owned())];
     let is_folded = |at: &usize| !marked.contains(at) && is_throughout(&tracks[*at], whole);
-    let folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
-    let folded = if folded.len() < FEWEST_FOLDED {
-        Vec::new()
-    } else {
-        folded
-    };
+    let mut folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
+    // Where nothing else is shown, few rows say more than their number.
+    let is_all = folded.len() == tracks.len() && tracks.len() <= MOST_OPEN;
+    if folded.len() < FEWEST_FOLDED || is_all {
+        folded.clear();
+    }
     let open = own
         .into_iter()
         .filter(|at| folded.binary_search(at).is_err());

@@ -18,25 +18,31 @@ use crate::draw::figure::place::PlacedPanel;
 use crate::draw::figure::talks::Talk;
 use crate::draw::scene::Scene;
 
-/// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that come and go together.
+/// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that come and go together;
+/// where that is too high and the user chose no steps, without the first phase, then without the smallest steps.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
-    let studio = StepSource::new(sheet)?;
-    let chosen = studio.chosen()?;
-    let phases: Vec<usize> = match sheet.options.steps[..] {
-        [] => std::iter::once(0).chain(chosen.iter().copied()).collect(),
-        _ => chosen.clone(),
-    };
-    let left = studio.left_out(&chosen);
-    for is_grouped in [false, true] {
-        for columns in (1..=studio.columns).rev() {
-            let mut wide = StepSource::new(sheet)?;
-            wide.columns = columns;
-            let panels = Union::new(&wide, &chosen, is_grouped).panels(&phases);
-            let scene = panels.map(|panels| wide.page(&panels, &[], left));
-            if let Some(scene) = scene.filter(|s| s.size.h <= MOST_HEIGHT * PX_PER_MM) {
-                return Ok((scene, Vec::new()));
+    let mut studio = StepSource::new(sheet)?;
+    let most = studio.columns;
+    let mut chosen = studio.chosen()?;
+    let is_free = sheet.options.steps.is_empty();
+    while !chosen.is_empty() {
+        let left = studio.left_out(&chosen);
+        for (is_grouped, has_first) in [(false, true), (false, false), (true, false)] {
+            let first = Some(0).filter(|_| is_free && has_first);
+            let phases: Vec<usize> = first.into_iter().chain(chosen.iter().copied()).collect();
+            for columns in (1..=most).rev() {
+                studio.columns = columns;
+                let panels = Union::new(&studio, &chosen, is_grouped).panels(&phases);
+                let scene = panels.map(|panels| studio.page(&panels, &[], left));
+                if let Some(scene) = scene.filter(|s| s.size.h <= MOST_HEIGHT * PX_PER_MM) {
+                    return Ok((scene, Vec::new()));
+                }
             }
         }
+        if !is_free {
+            break;
+        }
+        studio.drop_least(&mut chosen);
     }
     Err(Error::usage(
         format!("these phases are higher than {MOST_HEIGHT} mm at the same places"),
