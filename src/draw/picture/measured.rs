@@ -155,8 +155,11 @@ impl MeasuredGraph {
             vertices,
             links: links.collect(),
             clusters,
-            is_labelled: (view.arrows.iter().zip(&rooms))
-                .any(|(arrow, room)| arrow.kind == ArrowKind::Bundle && room.is_some()),
+            // Lines between nodes name their topics.
+            is_labelled: (view.arrows.iter().zip(&rooms)).any(|(arrow, room)| {
+                let is_direct = matches!(arrow.kind, ArrowKind::Bundle | ArrowKind::Direct(_));
+                is_direct && room.is_some()
+            }),
         };
         let rated = rooms.iter().map(Option::is_some).collect();
         Self {
@@ -266,13 +269,9 @@ impl Measurer<'_> {
                 continue;
             };
             if let Some(line) = second_line(shown, tells[at]) {
-                let width = self
-                    .fonts
-                    .width(&line, self.body(item).small, Weight::SemiBold);
-                let silence = self
-                    .fonts
-                    .width(NO_MESSAGE, self.body(item).small, Weight::SemiBold);
-                widen(&mut widest[at], width.max(silence));
+                let size = self.body(item).small;
+                let width = |text: &str| self.fonts.width(text, size, Weight::SemiBold);
+                widen(&mut widest[at], width(&line).max(width(NO_MESSAGE)));
             }
         }
         widest
@@ -292,17 +291,12 @@ impl Measurer<'_> {
             .zip(topics);
         let rooms = all.map(|(((arrow, showing), is_told), names)| {
             let mut widest = None;
-            let item = |at: u32| {
-                self.view
-                    .items
-                    .get(at as usize)
-                    .map(|item| item.kind.word())
-            };
-            if arrow.kind == ArrowKind::Bundle && item(arrow.to) == Some("topic") {
-                // The box of the topic has its name and its rate.
-                return None;
-            }
             if arrow.kind == ArrowKind::Bundle {
+                // The box of a topic has its name and its rate.
+                let to = self.view.items.get(arrow.to as usize)?;
+                if to.kind.word() == "topic" {
+                    return None;
+                }
                 let rooms = showing.looks().iter();
                 let rooms =
                     rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
