@@ -241,8 +241,8 @@ pub struct Arrow {
 }
 
 impl Arrow {
-    /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those with
-    /// the highest rate first; `None` for one from or to a topic.
+    /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those
+    /// with the highest rate first; `None` for one from or to a topic.
     pub fn carries(&self, shown: &Shown) -> Option<String> {
         let topic = match &self.kind {
             ArrowKind::Publish | ArrowKind::Subscribe => return None,
@@ -269,7 +269,7 @@ impl Arrow {
     }
 }
 
-/// A topic on a line between two boxes in a window, or several that are told as one.
+/// A topic on a line between two boxes in a window, or several that are shown as one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicRow {
     /// Its place in [`Arrow::topics`].
@@ -288,7 +288,7 @@ pub struct TopicRow {
     pub rates: Option<(f64, f64)>,
 }
 
-/// The properties that tell one topic of a bundle without a mark from another.
+/// The properties that distinguish unmarked topics of a bundle.
 type RowKey = (u32, [bool; 2], State, [Option<u64>; 2]);
 
 impl TopicRow {
@@ -378,8 +378,8 @@ pub struct Shown {
     pub hz: Option<f64>,
     /// Messages per second, averaged between the two changes of its rate that this window lies between.
     pub steady_hz: Option<f64>,
-    /// The rate that is written, with its number of messages: that of an earlier window as long as chance alone may make
-    /// the difference.
+    /// The rate that is written, with its number of messages: that of an earlier window as long as chance alone may
+    /// make the difference.
     pub held: Option<(f64, Option<u64>)>,
     /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,

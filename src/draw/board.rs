@@ -31,7 +31,7 @@ const LARGEST: Size = Size::new(1920.0, 1080.0);
 const TYPES: f64 = 58.0;
 const RATES: f64 = 15.0;
 const BETWEEN: f64 = 2.4;
-/// The height below the rows in millimetres, for nodes and for the line that says why this is not a graph.
+/// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
 const PILL: f64 = 3.5;

@@ -44,7 +44,7 @@ worded! {
         /// Life lines: when each row was alive, how busy it was, and what changed.
         #[default]
         Lives = "lives",
-        /// The graph of nodes over the whole mission, with the phases in which each lives.
+        /// The graph of nodes over the whole mission, with the phases in which each exists.
         Map = "map",
         /// A panel per change of phase, with only the differences.
         Steps = "steps",

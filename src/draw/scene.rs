@@ -38,7 +38,7 @@ pub struct Group {
     pub pieces: Vec<Piece>,
 }
 
-/// The opacity of a group, 0..=1; opaque unless said otherwise.
+/// The opacity of a group, 0..=1; opaque by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fade(pub f64);
 

@@ -74,9 +74,9 @@ pub(crate) enum Claim {
     Type(Name, Name),
     /// This topic is offered with this quality of service.
     Quality(Name, Name),
-    /// A log text of this logger says that its node publishes this topic.
+    /// According to a log text, this logger's node publishes this topic.
     SaysPublish(Name, Name),
-    /// A log text of this logger says that its node subscribes this topic.
+    /// According to a log text, this logger's node subscribes to this topic.
     SaysSubscribe(Name, Name),
     /// This logger logs from this source file (its own name, no folder).
     LogsFrom(Name, Name),
@@ -334,7 +334,7 @@ impl Claims {
         }
     }
 
-    /// Adds what a statistic says, as long as there is room.
+    /// Adds a statistic, up to the limit.
     pub(crate) fn measure(&mut self, measurement: Measurement) {
         if self.measured.len() < budget::MEASUREMENTS {
             self.measured.push(measurement);

@@ -96,7 +96,7 @@ impl Numbers {
     }
 }
 
-/// Whether the messages of a connection begin with a header that holds a number, as its definition says.
+/// Whether the messages of a connection begin with a header with a sequence number, according to its definition.
 pub(crate) fn is_numbered(connection: &Connection) -> bool {
     let definition = connection.definition.as_deref().unwrap_or_default();
     connection.encoding == Encoding::Ros1

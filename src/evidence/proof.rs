@@ -112,7 +112,7 @@ pub(crate) enum Validity {
     Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
     /// At these moments; without other proofs, it is not known to last.
     Moments(Vec<Stamp>),
-    /// As long as this other element lives.
+    /// As long as this other element exists.
     Like(ElementKey),
     /// For the whole mission, unless signs give times.
     Whole,
@@ -315,7 +315,7 @@ impl<'a> Conclusions<'a> {
         })
     }
 
-    /// The number of publishers of a topic when its recording began; `None` if the bag does not tell.
+    /// The number of publishers of a topic when its recording began; `None` if unknown.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
         self.offers.get(&topic).copied()
     }

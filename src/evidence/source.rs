@@ -91,7 +91,7 @@ impl SourceContext<'_> {
         self.facts.name(text)
     }
 
-    /// Adds what a statistic says of an interval, which ends now if it has no length.
+    /// Adds a statistic of an interval, which ends now if it has no length.
     pub(crate) fn measure(&mut self, measurement: Measurement) {
         let now = self.time.unwrap_or(measurement.span.end);
         let nanos = measurement.span.nanos().clamp(1, 3_600_000_000_000);

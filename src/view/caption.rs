@@ -122,7 +122,7 @@ impl<'a> Speaker<'a> {
         )
     }
 
-    /// Who misses the topic of a node that is away: `a, b get no detections`; `None` where nobody is known to.
+    /// The subscribers without messages while a node is away: `a, b get no detections`; `None` if none is known.
     fn missed(&self, what: Element, home: &str) -> Option<String> {
         let Element::Node(node) = what else {
             return None;

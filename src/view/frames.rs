@@ -404,7 +404,7 @@ mod tests {
         };
         let windows = ["/a>/t~ /b</t~ /c>/t", "/a>/t~ /b</t~"];
         assert_eq!(seen(&windows, &options)[0], "/a /b /c /t /c>/t /t>/b");
-        // What falls silent goes without a sign: nothing in the ledger says that it ended.
+        // Silence has no sign: the ledger has no entry for an end.
         assert_eq!(seen(&windows, &options)[1], "/a /b -/c");
     }
 

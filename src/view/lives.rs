@@ -1,7 +1,7 @@
 //! The lives of elements by the ledger: one without a beginning in it was there before, one without an end stays.
 //!
 //! The picture follows from these and not from the messages that fall into a window, so that nothing comes, goes or
-//! changes its look without an entry that says so.
+//! changes its look without an entry.
 
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, Element, Elements, PerElement};
@@ -17,7 +17,7 @@ pub(crate) struct ItemTurns<'a> {
     pauses: PerElement<Vec<Span>>,
 }
 
-/// Whether each element lives.
+/// Whether each element exists.
 pub(crate) type Alive = PerElement<bool>;
 
 impl<'a> ItemTurns<'a> {
@@ -29,8 +29,8 @@ impl<'a> ItemTurns<'a> {
         };
         let entries = &mission.ledger.entries;
         for entry in entries {
-            // A part is reported with its whole, so that it comes and goes with it. What restarts keeps its parts; of a role
-            // one run ends there and the next one begins, without which each of them would live all the time.
+            // A part is reported with its whole, so that it comes and goes with it. What restarts keeps its parts; of a
+            // role one run ends there and the next one begins, without which each of them would live all the time.
             let whole = entry.part_of.and_then(|id| entries.get(id as usize));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
             if is_kept && !matches!(entry.what, Element::Node(_)) {

@@ -38,7 +38,8 @@ pub(crate) struct News {
 
 impl News {
     /// The news of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
-    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is no news.
+    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is no
+    /// news.
     pub(crate) fn new(
         ledger: &Ledger,
         (parts, beginning): (&Parts, Option<Stamp>),
@@ -65,7 +66,7 @@ impl News {
                 time: entry.time,
             });
             news.tell(viewed, entry, id, Part::of(entry, span));
-            // One that came back says so by itself.
+            // A return has its own mark.
             let parts = parts.get(&id).filter(|_| entry.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
                 if let Some(part) = ledger.entries.get(*part as usize) {
@@ -150,7 +151,7 @@ impl Reach {
         match viewed.items.get(id as usize) {
             Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
             Some(item) if item.is_replica => Self::Part,
-            // Runs of one node, of which one lives at a time.
+            // Runs of one node, of which one exists at a time.
             Some(item) if item.kind == ItemKind::Node => Self::Whole,
             Some(item) if item.members.len() > 1 => Self::Part,
             _ => Self::Whole,

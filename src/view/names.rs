@@ -27,7 +27,7 @@ pub(crate) fn is_debug_label(topic: &str) -> bool {
     matches!(topic, "/time" | "/clock" | "/rosout" | "/statistics")
 }
 
-/// Whether it is a topic that every system has and nearly every node is connected to: it says nothing of what a robot
+/// Whether it is a topic that every system has and nearly every node is connected to: it is irrelevant to what a robot
 /// does.
 pub(crate) fn is_plumbing(topic: &str) -> bool {
     const LAST: [&str; 9] = [

@@ -35,7 +35,7 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    /// The index of each member, which tells it from the others: `01`.
+    /// The distinguishing index of each member: `01`.
     pub(crate) fn indices(&self) -> Vec<Arc<str>> {
         self.members.iter().map(|m| index(m).into()).collect()
     }

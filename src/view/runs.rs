@@ -145,7 +145,7 @@ impl LookClass {
     }
 }
 
-/// The class word that tells a mark from all others: the class of its badge.
+/// The class name that identifies a mark: the class of its badge.
 pub(crate) fn word(mark: Mark) -> &'static str {
     match mark {
         Mark::Added => "added",

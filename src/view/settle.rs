@@ -58,7 +58,7 @@ struct LookRun<'a> {
 /// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest degree, and its average rate
 /// between two changes of it.
 ///
-/// A topic that speaks once a minute is as alive in the seconds between as in those in which it is heard; only a pause
+/// A topic with a message per minute is equally alive in the seconds in between; only a pause
 /// that the ledger knows is drawn as one.
 pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
     let mut runs = runs(raw, lengths.windows());
@@ -191,8 +191,8 @@ fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
     writer.finish()
 }
 
-/// The least difference of a rate that changes the number that is written: as a share, and in standard deviations of the
-/// number of messages.
+/// The least difference of a rate that changes the number that is written: as a share, and in standard deviations of
+/// the number of messages.
 const DIFFERENT: (f64, f64) = (0.25, 2.0);
 
 /// The fewest messages in a window that make a rate.

@@ -74,7 +74,7 @@ pub(super) struct ShowingWriter {
 /// than all else.
 const FEW: usize = 4;
 
-/// The properties that tell one look without a mark from another.
+/// The properties that distinguish looks without marks.
 type LookKey = (
     (State, Degree, bool),
     [Option<u64>; 3],

@@ -169,7 +169,7 @@ impl<'a> Now<'a> {
         window.nanos() != self.span.nanos()
     }
 
-    /// The state of an element, `None` if it does not live; [`One::UNHEARD`] where it lives but was not heard.
+    /// The state of an element, `None` if it does not exist; [`One::UNHEARD`] if it exists without messages.
     fn one(&self, what: Element) -> Option<One> {
         let (alive, paused) = &self.lives;
         let heard = |row: &Row| One {
@@ -234,7 +234,7 @@ impl<'a> Now<'a> {
         Some(One { count: None, ..one })
     }
 
-    /// The look of an item; `None` where nothing of it lives. Ghosts are not among them.
+    /// The look of an item; `None` if no part of it exists. Ghosts are excluded.
     pub(crate) fn item(&self, id: u32) -> Option<Shown> {
         let item = self.viewed.items.get(id as usize)?;
         let mut slot = None;
@@ -336,7 +336,7 @@ impl<'a> Now<'a> {
             if let Some((topic, way)) = row {
                 rows.entry(topic).or_default().1[way] = true;
             }
-            // What several nodes of a box hear comes once.
+            // Messages to several nodes of a box count once.
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
@@ -382,7 +382,7 @@ impl<'a> Now<'a> {
         self.mission.ledger.entries.get(id as usize)
     }
 
-    /// Whether the options hide elements that are not heard in a window.
+    /// Whether the options hide elements without messages in a window.
     pub(crate) fn hides_the_silent(&self) -> bool {
         self.options.hide.unreachable || self.options.mode == Mode::Active
     }

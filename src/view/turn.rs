@@ -16,7 +16,7 @@ pub(super) struct WindowTurn {
 
 /// An item in a window with headlines.
 pub(super) struct Marked {
-    /// Whether anything of it lives.
+    /// Whether any part of it exists.
     is_there: bool,
     pub(super) marked: Option<Shown>,
 }

@@ -34,7 +34,7 @@ pub(crate) struct CoursePhase {
 pub(crate) struct CourseRow {
     /// The names of its members; of none for events that belong to no row.
     pub(crate) names: Vec<String>,
-    /// The times in which a member lives.
+    /// The times in which a member exists.
     pub(crate) lives: Vec<Span>,
     pub(crate) marks: Vec<CourseMark>,
 }

@@ -14,7 +14,7 @@ use crate::mission::phases::configurations;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NodeGroup {
     pub(crate) space: String,
-    /// The phases it lives in, counted from 0; empty where there are no phases.
+    /// The phases in which it exists, counted from 0; empty without phases.
     pub(crate) phases: BTreeSet<usize>,
     /// Places of its members in the list of names given.
     pub(crate) members: Vec<usize>,
@@ -34,10 +34,10 @@ pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTre
     tracks.iter().map(of).collect()
 }
 
-/// The most parts of namespaces that tell groups apart: each is a layout to try, and names come from the bag.
+/// The most parts of namespaces that distinguish groups: each is a layout to try, and names come from the bag.
 const MOST_PARTS: usize = 8;
 
-/// The numbers of parts of namespaces that may tell groups apart, from all of them down to the first one.
+/// The numbers of parts of namespaces that may distinguish groups, from all of them down to one.
 pub(crate) fn depths(tracks: &[Track]) -> impl Iterator<Item = usize> + use<> {
     let parts = |t: &Track| namespace(&t.name).matches('/').count();
     let deepest = tracks.iter().map(parts).max().unwrap_or(1).max(1);

@@ -9,7 +9,7 @@ use super::signs::{cross, dot, start};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::Stroke;
 
-/// Every sign that `lives` draws, with its words.
+/// Every sign that `lives` draws, with its label.
 pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     let open: Vec<_> = lives
         .rows

@@ -1,6 +1,7 @@
 //! Life lines: a row per node (or topic), time to the right; when it is alive, how busily it sends, what changed.
 //!
-//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page already, the rows alone.
+//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page already, the rows
+//! alone.
 //! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives the height of the rows, and
 //! `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A canvas in pixels (a timeline below
 //! frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with pixels per millimetre as its scale, and gives
@@ -249,7 +250,7 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
-    /// What the log says of an event.
+    /// The text of an event in the log.
     fn sentence(&self, entry: EntryId) -> String {
         let mission = self.source.mission;
         let event = mission.ledger.entries.get(entry as usize);

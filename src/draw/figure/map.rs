@@ -51,7 +51,7 @@ struct MapDrawing {
     talks: Vec<Talk>,
     labels: Vec<Vec<Vec<String>>>,
     placed: PlacedPanel,
-    /// Nodes outside framed namespaces without a known partner, which a note tells.
+    /// Nodes outside framed namespaces without a known partner, which a note lists.
     alone: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-//! The marks of a figure: events of the log on the rows of their elements. Nothing is marked that is not in the log, and
-//! every headline of an element that has a row is marked there.
+//! The marks of a figure: events of the log on the rows of their elements. Nothing is marked that is not in the log,
+//! and every headline of an element that has a row is marked there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -160,7 +160,7 @@ impl Marks {
                 .total_cmp(&weight(&circles[*a]))
                 .then(a.cmp(b))
         });
-        // A connection says enough by its circle: words for each of them would fill the page.
+        // A circle suffices for a connection: labels for all of them would fill the page.
         let has_words = |e: &Entry| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
         let is_lettered = |at: &usize| {
             entries
@@ -313,8 +313,8 @@ impl Rows {
         (row(from), row(to))
     }
 
-    /// The row on which an event is marked: that of its element; of an edge that of its node or topic; of a topic, among
-    /// nodes, that of a sender. A part of another event is marked only where it is a row that begins or ends.
+    /// The row on which an event is marked: that of its element; of an edge that of its node or topic; of a topic,
+    /// among nodes, that of a sender. A part of another event is marked only where it is a row that begins or ends.
     fn of(&self, source: &FigureSource<'_>, event: &Entry) -> Option<usize> {
         let elements = &source.mission.elements;
         let (node, topic) = elements.ends(event.what);

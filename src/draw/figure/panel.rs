@@ -162,7 +162,7 @@ fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     let stroke = Stroke { color, width, dash };
     canvas.frame(rect, 0.6, fill, &stroke);
     if look.fate == Fate::ChangedHands {
-        // A double frame, so that grey print tells it.
+        // A double frame, to be distinguishable in grey print.
         let inner = Stroke::solid(ink::CHANGED, HAIRLINE);
         canvas.frame(rect.grown(-0.45), 0.3, Color::NONE, &inner);
     }

@@ -47,7 +47,7 @@ struct StepSource<'s> {
     marks: Marks,
     /// The number of panels side by side.
     columns: usize,
-    /// How many parts of namespaces tell groups apart.
+    /// The number of parts of namespaces that distinguish groups.
     depth: usize,
 }
 

@@ -156,7 +156,7 @@ impl<'a> Talks<'a> {
     }
 }
 
-/// The time that both lists of lives have in common inside `time`, in nanoseconds.
+/// The overlap of both lists of lifetimes inside `time`, in nanoseconds.
 fn shared(a: &[Span], b: &[Span], time: Span) -> i64 {
     let both = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
     let inside = both.map(|(a, b)| {

@@ -1,4 +1,4 @@
-//! A figure for `LaTeX`: the lines that include it, and a caption that says what is drawn.
+//! A figure for `LaTeX`: the code that includes it, and a caption that describes it.
 
 use super::band::{clock, title};
 use super::source::FigureSource;

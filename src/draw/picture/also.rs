@@ -62,7 +62,7 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
     view.also.iter().map(footer).collect()
 }
 
-/// A name with what is to be told of it: the rate of a topic, and the sign of a change.
+/// A name with its annotations: the rate of a topic, and the sign of a change.
 fn said(item: &Item, shown: &Shown, name: &str) -> String {
     let rate = match shown.rates {
         _ if item.kind.word() == "node" || shown.mark == Some(Mark::Removed) => None,

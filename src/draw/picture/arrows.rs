@@ -202,7 +202,7 @@ impl Arrows<'_> {
         (group, over)
     }
 
-    /// The line with a head at its end and at its start, as `heads` says.
+    /// The line with a head at its end and at its start, according to `heads`.
     fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook, heads: [bool; 2]) {
         let (Some(first), Some(last)) = (track.curves.first(), track.curves.last()) else {
             return;
@@ -340,7 +340,7 @@ impl Arrows<'_> {
     }
 }
 
-/// Whether a changed arrow carries a badge: not where one of its ends tells the same, and not where its rate does.
+/// Whether a changed arrow carries a badge: not if one of its ends or its rate shows the same.
 pub(crate) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
     let rate = matches!(mark, Mark::Faster | Mark::Slower);
     let mut marks = ends.into_iter().flatten().filter_map(|end| end.mark);

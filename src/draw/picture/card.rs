@@ -1,4 +1,4 @@
-//! Cards: boxes of nodes with a row for each topic that nobody else is known to send or to receive.
+//! Cards: boxes of nodes with a row for each topic without any other known publisher or subscriber.
 
 use super::badge;
 use super::boxes::{Boxes, ItemBox, class, data, title};

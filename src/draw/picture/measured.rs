@@ -302,7 +302,7 @@ impl Measurer<'_> {
                     rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
                 return rooms.reduce(|a, b| Size::new(a.w.max(b.w), a.h.max(b.h)));
             }
-            // A subscription tells its rate where its topic has another.
+            // A subscription shows its rate if its topic has another.
             let topic = self.view.items_shown.get(arrow.from as usize);
             let topic = topic.filter(|_| is_told && arrow.kind == ArrowKind::Subscribe);
             let looks = both(
@@ -332,7 +332,7 @@ fn widen(most: &mut Option<f64>, width: f64) {
     *most = Some(most.map_or(width, |m: f64| m.max(width)));
 }
 
-/// The rates that a box tells itself because no arrow does.
+/// The rates that a box shows because no arrow does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tells {
     /// None: it is not a topic.
@@ -343,7 +343,7 @@ pub(crate) enum Tells {
     Rates,
 }
 
-/// The rates that each item tells: all those of a topic, unless several publishers share it; then only those that
+/// The rates that each item shows: all those of a topic, unless several publishers share it; then only those that
 /// changed.
 pub(crate) fn tells(view: &View) -> Vec<Tells> {
     let mut senders = vec![0_usize; view.items.len()];
@@ -360,7 +360,7 @@ pub(crate) fn tells(view: &View) -> Vec<Tells> {
     view.items.iter().zip(senders).map(tells).collect()
 }
 
-/// Whether each arrow tells its rate: a publication whose topic does not, a subscription that hears another rate.
+/// Whether each arrow shows its rate: a publication whose topic does not, a subscription with another rate.
 fn told_by_arrows(view: &View) -> Vec<bool> {
     let tells = tells(view);
     let told = |arrow: &Arrow| {
@@ -421,7 +421,7 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     }
 }
 
-/// The pendant of a box in one window: the rate that changed, where neither an arrow nor its smaller line tells it.
+/// The pendant of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
 pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
     let (before, now) = shown.rates.filter(|_| tells == Tells::Changes)?;
     Some(words::rate_change(before, now))

@@ -90,7 +90,7 @@ pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
         .collect()
 }
 
-/// The last part of a name, with the one before it if it says nothing alone.
+/// The last part of a name, with the previous one if it is too generic.
 fn last(name: &str) -> &str {
     let mut parts = name
         .rmatch_indices('/')

@@ -43,7 +43,7 @@ pub struct UnionElement {
     pub rect: Rect,
     /// Its name where the font of the drawing lacks some of it, for readers that have more fonts.
     pub name: Option<String>,
-    /// The bar at its left that says that its last message is kept, if it ever is.
+    /// The bar at its left for a latched last message, if any.
     pub latch: Option<Form>,
     /// The middle of its badge.
     pub badge: Point,

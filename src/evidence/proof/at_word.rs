@@ -50,7 +50,7 @@ impl Conclusions<'_> {
             if signs.is_empty() && matches!(fact.claim, Claim::Joins(..)) {
                 continue;
             }
-            // Where every record is the first one, nobody counts.
+            // If every record has the first number, sequence numbers are unused.
             if let Claim::Begins(node) = fact.claim
                 && signs.len() > 1
                 && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))

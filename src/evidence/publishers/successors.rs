@@ -71,7 +71,7 @@ struct NodeEnd {
     next: Option<Stamp>,
 }
 
-/// All that one rewritten bag tells about the ends of nodes.
+/// The evidence of one rewritten bag for the ends of nodes.
 struct RewrittenBag<'a> {
     streams: &'a [Stream],
     of_bag: &'a [usize],

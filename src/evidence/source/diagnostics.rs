@@ -83,7 +83,7 @@ fn node(name: &str) -> Option<&str> {
     node.split('/').all(part).then_some(node)
 }
 
-/// Adds publishers by the names in statuses, where the header does not tell the publisher.
+/// Adds publishers by the names in statuses, if the header does not name the publisher.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);

@@ -1,5 +1,5 @@
-//! Log texts about two nodes of one name: rcl, where both log over one publisher, and the master of ROS 1, which ends the
-//! older one.
+//! Log texts about two nodes of one name: rcl, where both log over one publisher, and the master of ROS 1, which ends
+//! the older one.
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
@@ -21,7 +21,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The node of which a text says that there are two.
+/// The duplicated node according to a text.
 fn doubled(record: &LogRecord<'_>) -> Option<String> {
     let text = record.text;
     if let Some((before, _)) = text.split_once("] Reason: new node registered with same name") {

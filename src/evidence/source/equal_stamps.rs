@@ -43,7 +43,7 @@ const LISTS: [&str; 3] = [
     "visualization_msgs/MarkerArray",
 ];
 
-/// Whether a connection's messages begin with a header, or with a list of such elements, as far as the bag tells.
+/// Whether a connection's messages begin with a header, or with a list of such elements, as far as known.
 pub(crate) fn is_stamped(connection: &Connection) -> bool {
     if LOGS.contains(&connection.topic.as_str()) {
         return false;

@@ -12,7 +12,7 @@ pub(crate) fn read(
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
-    // What a recorder or a player says of topics is about others.
+    // Topics in the logs of a recorder or player belong to other nodes.
     if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
         return Ok(());
     }

@@ -4,7 +4,7 @@
 use crate::evidence::claim::{Degree, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-/// Topics that any node may publish, so that one known publisher says nothing about the others.
+/// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
 const SHARED: [&str; 8] = [
     "/tf",
     "/tf_static",

@@ -36,7 +36,7 @@ const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
 
-/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one says nothing.
+/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one is no evidence.
 pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     if beginning.is_empty() {
         return;

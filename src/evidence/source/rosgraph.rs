@@ -1,8 +1,8 @@
-//! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, and `/nodl/observed_node` of
-//! nodl, each message one node.
+//! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, and `/nodl/observed_node`
+//! of nodl, each message one node.
 //!
-//! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message is parsed by
-//! the definition in the bag, or by the built-in one that it fits exactly.
+//! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message is parsed
+//! by the definition in the bag, or by the built-in one that it fits exactly.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -36,8 +36,8 @@ pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout {
     ..SHAPE
 };
 
-/// The types that no form has changed, and those of the two forms of 2026, whose messages are in the order in which nodl
-/// and the core interfaces have them: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
+/// The types that no form has changed, and those of the two forms of 2026, whose messages are in the order in which
+/// nodl and the core interfaces have them: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
 const COMMON: &[(&str, &str)] = &[
     ("InterfaceType", "string name;TypeHash hash"),
     ("TypeHash", "byte version;byte[32] value"),
@@ -173,7 +173,7 @@ struct SnapshotEnd<'a> {
     qos: Option<&'a MessageValue>,
 }
 
-/// Adds the claims of nodes in one snapshot; `of` tells snapshots of single nodes apart.
+/// Adds the claims of nodes in one snapshot; `of` distinguishes snapshots of single nodes.
 fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
     let topic = heard.stream.connection.topic.shared();
     let group = heard.name(format!("snapshot {topic} {of}").trim_end());
@@ -297,8 +297,8 @@ fn kind<'a>(end: &'a MessageValue, field: &str) -> &'a str {
     }
 }
 
-/// The policy by which a subscriber gets nothing: it asks for more than is offered (DDS 1.4, section 2.2.3). Policies that
-/// are not known fit.
+/// The policy by which a subscriber gets nothing: it asks for more than is offered (DDS 1.4, section 2.2.3). Policies
+/// that are not known fit.
 fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static str> {
     let is =
         |qos: &MessageValue, policy, value| qos.field(policy) == Some(&MessageValue::Byte(value));

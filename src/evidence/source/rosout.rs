@@ -105,7 +105,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         };
         let own = known.publishers(topic).any(|p| p == node) || has_twin(known, node, topic);
-        // What a player sends, somebody published.
+        // A player's messages were published by other nodes.
         let mut streams = known.streams.iter().filter(|s| s.topic == topic);
         let is_played = streams.any(|s| s.trust == Reliability::Player);
         let others = is_played || known.publishers(topic).any(|p| p != node);
@@ -122,7 +122,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         known.prove(Proof {
             what,
             source,
-            // Where headers do not tell all publishers, a node that names a topic may be one of them.
+            // If headers do not name all publishers, a node that names a topic may be one of them.
             degree: if told {
                 Degree::Stated
             } else {

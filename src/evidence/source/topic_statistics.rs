@@ -65,7 +65,7 @@ pub(crate) fn read(
                 age_ns: Some(mean),
             });
         }
-        // A statistic over no message says no more than that the endpoint is there.
+        // A statistic over no messages only proves that the endpoint exists.
         let degree = if count > 0 {
             Degree::Measured
         } else {

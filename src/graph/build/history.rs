@@ -301,7 +301,7 @@ impl Assembly<'_> {
             runs: spans(track),
         });
         let mut record = Record::new(track, self.findings.mission, silent);
-        // A node lives by more than messages.
+        // A node's lifetime depends on more than messages.
         record.needs_messages = false;
         if track.speaks && !record.is_declared() {
             record.fixed = None;

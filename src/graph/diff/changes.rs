@@ -110,7 +110,7 @@ impl<'a> Changes<'a> {
         let crowded = self.crowded(graph);
         for (old, new) in &diff.publishes.changed {
             let topic = self.elements.publishes[new.id as usize].topic;
-            // With one publisher the topic's own change says it all.
+            // With one publisher the topic's own change is sufficient.
             if crowded.contains(&topic) && steady.contains(&topic) {
                 changes.extend(self.rate(Element::Publish(new.id), (old.hz, new.hz), spans));
             }

@@ -54,7 +54,7 @@ fn longest_paths(after: &[Vec<usize>], before: &[Vec<usize>]) -> (Vec<usize>, Ve
     (rank, order)
 }
 
-/// Moves one vertex to the end of its slack that shortens more edges; says whether it moved.
+/// Moves one vertex to the end of its slack that shortens more edges; returns whether it moved.
 fn slide(v: usize, after: &[Vec<usize>], before: &[Vec<usize>], rank: &mut [usize]) -> bool {
     let low = before[v].iter().map(|&u| rank[u] + 1).max();
     let high = after[v].iter().map(|&u| rank[u].saturating_sub(1)).min();

@@ -1,5 +1,5 @@
-//! The map with differences: nodes that come and go, and those they talk to, at the same places in every phase, with what
-//! the phase changes in colour.
+//! The map with differences: nodes that come and go, and those they talk to, at the same places in every phase, with
+//! what the phase changes in colour.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -162,7 +162,7 @@ impl<'u, 's> Union<'u, 's> {
         self.studio.look(fate, members, named, None)
     }
 
-    /// Phase `k`: what lives in it, and what ended as it began.
+    /// Phase `k`: the elements that exist in it, and those that ended as it began.
     fn panel(
         &self,
         k: usize,
