@@ -304,11 +304,11 @@ fn the_top_level_modules_are_the_stations() {
     assert_eq!(doors, expected);
     let lib = all.iter().find(|f| f.path == "lib").unwrap();
     let shown = words_after(&lib.code, "\npub mod ");
-    let told: BTreeSet<&str> = words_after(&lib.code, "\nmod ").chain(shown).collect();
+    let reported: BTreeSet<&str> = words_after(&lib.code, "\nmod ").chain(shown).collect();
     let page = ["values", "commands", "internals"];
     let expected: BTreeSet<&str> = STATIONS.iter().copied().chain(page).collect();
     assert_eq!(
-        told, expected,
+        reported, expected,
         "the stations, and what the front page is made of"
     );
     assert!(

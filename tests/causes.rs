@@ -22,7 +22,7 @@ fn mission(bag: &Recording) -> Mission {
     read(&reading).unwrap()
 }
 
-fn told(bag: &Recording) -> String {
+fn shown(bag: &Recording) -> String {
     log(&mission(bag), LogFormat::Text, LogOptions::default())
 }
 
@@ -57,7 +57,7 @@ fn a_connection_that_flaps_is_one_line() {
         }
     }
     bag.messages.sort_by_key(|m| m.1);
-    let text = told(&bag);
+    let text = shown(&bag);
     assert!(
         text.contains("/beat → /view comes and goes 4 times"),
         "{text}"
@@ -67,7 +67,7 @@ fn a_connection_that_flaps_is_one_line() {
 
 #[test]
 fn topics_that_a_node_begins_together_are_one_line() {
-    let text = told(&minute(&[
+    let text = shown(&minute(&[
         ("/base", "/a", 30, 60),
         ("/base", "/b", 30, 60),
         ("/base", "/c", 30, 60),
@@ -81,7 +81,7 @@ fn topics_that_a_node_begins_together_are_one_line() {
 
 #[test]
 fn nodes_that_stop_and_start_together_are_a_switch() {
-    let text = told(&minute(&[
+    let text = shown(&minute(&[
         ("/a", "/a1", 0, 30),
         ("/b", "/b1", 0, 30),
         ("/c", "/c1", 0, 30),
@@ -108,7 +108,7 @@ fn the_end_of_an_input_does_not_end_its_relay() {
         bag.messages.push((relay, late, payload));
     }
     bag.messages.sort_by_key(|m| m.1);
-    let text = told(&bag);
+    let text = shown(&bag);
     assert!(text.contains("/camera stopped"), "{text}");
     assert!(!text.contains("/relay stopped"), "{text}");
 }

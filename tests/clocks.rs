@@ -99,7 +99,7 @@ impl Healthy {
 }
 
 /// One line per mission: the number of headlines, the restarts, the interruptions, the notes.
-fn told(name: &str, recordings: &[Recording]) -> String {
+fn shown(name: &str, recordings: &[Recording]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let place = |(at, recording): (usize, &Recording)| -> PathBuf {
         let path = folder.path().join(format!("{at}.bag"));
@@ -254,6 +254,6 @@ fn clock_faults_are_attributed_to_the_recorder() {
             ],
         ),
     ];
-    let lines = all.iter().map(|(name, recordings)| told(name, recordings));
+    let lines = all.iter().map(|(name, recordings)| shown(name, recordings));
     insta::assert_snapshot!("clocks", lines.collect::<String>());
 }

@@ -15,9 +15,9 @@ fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
         .iter()
         .flat_map(|e| e["parts"].as_array().into_iter().flatten());
     let parts: BTreeSet<u64> = parts.map(|p| p.as_u64().unwrap()).collect();
-    let told =
+    let shown =
         |entry: &&Value| entry["quiet"] == false && !parts.contains(&entry["id"].as_u64().unwrap());
-    let headlines: Vec<&Value> = ledger.iter().filter(told).collect();
+    let headlines: Vec<&Value> = ledger.iter().filter(shown).collect();
     let window = |window: &Value| {
         let span = window["start_ns"].as_i64().unwrap()..window["end_ns"].as_i64().unwrap();
         let inside = headlines
@@ -95,12 +95,12 @@ fn every_frame_has_the_counts_of_the_data() {
         let (lasting, over) = lasting(&mission);
         let reported = joined(&expected, &lasting);
         let changed = joined(&expected, &over);
-        for (index, told) in reported.iter().enumerate() {
+        for (index, shown) in reported.iter().enumerate() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
-            frame(&svg, told, &at);
+            frame(&svg, shown, &at);
             alive(&svg, &mission["windows"][index], &at);
-            chart(&text(&format!("x{index:0digits$}.mmd")), told, &at);
+            chart(&text(&format!("x{index:0digits$}.mmd")), shown, &at);
         }
         settled(&folder.path().join("x"), &reported, digits);
         terminal(&said, &expected);
@@ -117,16 +117,16 @@ fn every_frame_has_the_counts_of_the_data() {
 }
 
 /// One frame: its headline, and the marks of its boxes, rows, words and arrows.
-fn frame(svg: &str, told: &BTreeSet<u64>, at: &str) {
+fn frame(svg: &str, shown: &BTreeSet<u64>, at: &str) {
     let named: BTreeSet<u64> = groups(svg, "headline").flatten().collect();
-    assert_eq!(named, *told, "headline of {at}");
+    assert_eq!(named, *shown, "headline of {at}");
     let marks = ["node", "topic", "edge", "also"].into_iter();
     let marked: BTreeSet<u64> = marks
         .flat_map(|class| groups(svg, class))
         .flatten()
         .collect();
-    assert_eq!(marked, *told, "marks of {at}");
-    assert_eq!(told.is_empty(), svg.contains("no change"), "words of {at}");
+    assert_eq!(marked, *shown, "marks of {at}");
+    assert_eq!(shown.is_empty(), svg.contains("no change"), "words of {at}");
 }
 
 /// A node that is drawn as active is one of the window's nodes in the data: of an anonymous one, a run of it.
@@ -165,12 +165,12 @@ fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), a
         .unwrap();
     let (_, rest) = rest.split_once('>').unwrap();
     let data: Value = serde_json::from_str(&rest[..rest.find("</script>").unwrap()]).unwrap();
-    let mut told = vec![0; expected.len()];
+    let mut shown = vec![0; expected.len()];
     for row in data["told"].as_array().unwrap() {
-        told[place(&row[0])] = row[1].as_u64().unwrap();
+        shown[place(&row[0])] = row[1].as_u64().unwrap();
     }
-    let numbers: Vec<u64> = expected.iter().map(|told| told.len() as u64).collect();
-    assert_eq!(told, numbers, "chips of the page of {at}");
+    let numbers: Vec<u64> = expected.iter().map(|shown| shown.len() as u64).collect();
+    assert_eq!(shown, numbers, "chips of the page of {at}");
     let graph = &data["graphs"][0];
     let classes: Vec<&str> = graph["classes"]
         .as_array()
@@ -192,7 +192,7 @@ fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), a
             marked[window] |= is_mark(classes[run[1]]);
         }
     }
-    let is_changed: Vec<bool> = changed.iter().map(|told| !told.is_empty()).collect();
+    let is_changed: Vec<bool> = changed.iter().map(|shown| !shown.is_empty()).collect();
     assert_eq!(marked, is_changed, "marks of the page of {at}");
 }
 
@@ -202,12 +202,12 @@ fn place(number: &Value) -> usize {
 
 /// The report's first line: its numbers add up to all headlines.
 fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
-    let windows = all.iter().filter(|told| !told.is_empty()).count();
+    let windows = all.iter().filter(|shown| !shown.is_empty()).count();
     let all: usize = expected.iter().map(BTreeSet::len).sum();
     let mut lines = markdown.lines().filter(|line| !line.is_empty());
     let (first, second) = (lines.next().unwrap(), lines.next().unwrap());
-    let (_, told) = first.split_once("**: ").unwrap();
-    let numbers = told
+    let (_, shown) = first.split_once("**: ").unwrap();
+    let numbers = shown
         .split(' ')
         .filter_map(|word| word.parse::<usize>().ok());
     let (_, changed) = second.split_once(", of which ").unwrap();
@@ -217,13 +217,13 @@ fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]),
 }
 
 /// A flow chart has marks if and only if there is a headline.
-fn chart(mermaid: &str, told: &BTreeSet<u64>, at: &str) {
+fn chart(mermaid: &str, shown: &BTreeSet<u64>, at: &str) {
     let is_mark = |line: &&str| {
         let mut words = line.split_whitespace();
         matches!(words.next(), Some("class" | "linkStyle")) && words.last() != Some("space")
     };
     let marks = mermaid.lines().filter(is_mark).count();
-    assert_eq!(marks == 0, told.is_empty(), "flow chart of {at}");
+    assert_eq!(marks == 0, shown.is_empty(), "flow chart of {at}");
 }
 
 /// The line at the end counts the headlines.

@@ -399,20 +399,20 @@ fn messages_at_the_end_of_time_are_counted() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.db3");
     sqlite3::write(&recording, &path);
-    let (code, told) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
+    let (code, shown) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
     assert!(
-        code == Some(0) && told.contains("\"messages\": 2"),
-        "{told}"
+        code == Some(0) && shown.contains("\"messages\": 2"),
+        "{shown}"
     );
     recording.messages.remove(0);
     let (_dir, path) = placed(
         "x.mcap",
         &mcap::write(&recording, &mcap::Options::default()),
     );
-    let (code, told) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
+    let (code, shown) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
     assert!(
-        code == Some(0) && told.contains("\"messages\": 1"),
-        "{told}"
+        code == Some(0) && shown.contains("\"messages\": 1"),
+        "{shown}"
     );
 }
 
@@ -425,10 +425,10 @@ fn messages_set_aside_set_the_exit_code() {
         "x.mcap",
         &mcap::write(&recording, &mcap::Options::default()),
     );
-    let (code, told) = bagreel(&["info", path.to_str().unwrap()]);
+    let (code, shown) = bagreel(&["info", path.to_str().unwrap()]);
     assert!(
-        code == Some(3) && told.contains("impossible time"),
-        "{told}"
+        code == Some(3) && shown.contains("impossible time"),
+        "{shown}"
     );
 }
 
@@ -436,10 +436,10 @@ fn messages_set_aside_set_the_exit_code() {
 fn a_second_reader_that_stops_verifies_nothing() {
     let mut bytes = mcap::write(&short(), &mcap::Options::default());
     let (_dir, path) = placed("sound.mcap", &bytes);
-    let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    let (code, shown) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
     assert!(
-        code == Some(0) && told.contains("counts the same"),
-        "{told}"
+        code == Some(0) && shown.contains("counts the same"),
+        "{shown}"
     );
     // The checksum of the last chunk precedes the name of its compression.
     let last = bytes
@@ -452,10 +452,13 @@ fn a_second_reader_that_stops_verifies_nothing() {
         .rfind(|at| bytes[at - 41] == 6 && *at < data_end);
     bytes[last.unwrap() - 5] ^= 1;
     let (_dir, path) = placed("x.mcap", &bytes);
-    let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
-    assert_eq!(code, Some(3), "{told}");
-    assert!(told.contains("could not be verified"), "{told}");
-    assert!(!told.contains("a second reader counts the same"), "{told}");
+    let (code, shown) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    assert_eq!(code, Some(3), "{shown}");
+    assert!(shown.contains("could not be verified"), "{shown}");
+    assert!(
+        !shown.contains("a second reader counts the same"),
+        "{shown}"
+    );
 }
 
 #[test]
@@ -524,9 +527,12 @@ fn the_head_of_a_record_beyond_its_chunk_stops_the_second_reader() {
 fn unverified_bags_are_reported() {
     let bytes = rosbag1::unindexed(&rosbag1::write(&short(), Pack::Lz4, 4000));
     let (_dir, path) = placed("killed.bag.active", &bytes);
-    let (_, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
-    assert!(told.contains("could not be verified"), "{told}");
-    assert!(!told.contains("a second reader counts the same"), "{told}");
+    let (_, shown) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    assert!(shown.contains("could not be verified"), "{shown}");
+    assert!(
+        !shown.contains("a second reader counts the same"),
+        "{shown}"
+    );
 }
 
 #[test]
@@ -537,16 +543,16 @@ fn a_bag_given_twice_counts_once_and_is_reported() {
         &mcap::write(&recording, &mcap::Options::default()),
     );
     let path = path.to_str().unwrap();
-    let (code, told) = bagreel(&["info", path, path]);
+    let (code, shown) = bagreel(&["info", path, path]);
     let count = format!("{} messages", recording.messages.len());
-    assert!(code == Some(0) && told.contains("given twice"), "{told}");
-    assert!(told.contains(&count), "no `{count}` in {told}");
-    let (code, told) = bagreel(&["info", "-", "-"]);
-    assert!(code == Some(2) && told.contains("only once"), "{told}");
-    let (code, told) = bagreel(&["info", "--verify", "-"]);
+    assert!(code == Some(0) && shown.contains("given twice"), "{shown}");
+    assert!(shown.contains(&count), "no `{count}` in {shown}");
+    let (code, shown) = bagreel(&["info", "-", "-"]);
+    assert!(code == Some(2) && shown.contains("only once"), "{shown}");
+    let (code, shown) = bagreel(&["info", "--verify", "-"]);
     assert!(
-        code == Some(2) && told.contains("reads a bag twice"),
-        "{told}"
+        code == Some(2) && shown.contains("reads a bag twice"),
+        "{shown}"
     );
 }
 
@@ -563,11 +569,11 @@ fn a_survey_reports_and_lists_unreadable_bags() {
     fs::copy(folder.join("good.mcap"), folder.join("below/other.mcap")).unwrap();
     // A folder of storage files would be one recording.
     fs::rename(folder.join("good.mcap"), folder.join("below/third.mcap")).unwrap();
-    let (code, told) = bagreel(&["info", folder.to_str().unwrap()]);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, shown) = bagreel(&["info", folder.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{shown}");
     fs::write(folder.join("bad.bag"), b"#ROSBAG V1.0\n").unwrap();
-    let (code, told) = bagreel(&["info", folder.to_str().unwrap()]);
-    assert!(code == Some(3) && told.contains("bad.bag"), "{told}");
+    let (code, shown) = bagreel(&["info", folder.to_str().unwrap()]);
+    assert!(code == Some(3) && shown.contains("bad.bag"), "{shown}");
 }
 
 #[test]
@@ -598,10 +604,10 @@ fn more_parts_than_the_limit_of_open_files_are_all_read() {
         );
         let mut run = Command::new("sh");
         let run = run.current_dir(dir.path()).args(["-c", &command]);
-        let (code, told) = said(&run.output().unwrap());
+        let (code, shown) = said(&run.output().unwrap());
         assert!(
-            code == Some(0) && told.contains("\"messages\": 90"),
-            "{told}"
+            code == Some(0) && shown.contains("\"messages\": 90"),
+            "{shown}"
         );
     }
 }

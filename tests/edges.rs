@@ -660,7 +660,7 @@ fn why_lists_conclusions_as_evidence() {
 }
 
 /// A robot of two nodes, with additional entries from the user.
-fn told(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
+fn shown(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
     bag.send(scan, (0, 10_001), 100, &[1; 8]);
@@ -699,7 +699,7 @@ fn entry(element: NamedElement, to_s: Option<i64>) -> TopologyEntry {
 fn an_end_given_by_the_user_is_exclusive() {
     let node = || NamedElement::Node("/slam".to_owned());
     let there = |end| {
-        let built = told(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
+        let built = shown(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
         let nodes = built.graphs.iter().map(|g| g.nodes.len());
         nodes.collect::<Vec<_>>()
     };
@@ -721,7 +721,7 @@ fn unknown_names_are_reported_with_the_nearest() {
             None,
         ),
     ];
-    let built = told(entries, &[(0, 10)]);
+    let built = shown(entries, &[(0, 10)]);
     let notices: Vec<_> = built.notices.iter().map(|n| n.text).collect();
     assert_eq!(
         notices,

@@ -395,7 +395,7 @@ fn a_video_shows_every_window_for_its_duration() {
     for name in ["a.mp4", "b.webm"] {
         let path = folder.path().join(name).to_string_lossy().into_owned();
         let entries = "stream=width,height:format=duration";
-        let told = output_of(
+        let found = output_of(
             "ffprobe",
             &[
                 "-v",
@@ -408,7 +408,7 @@ fn a_video_shows_every_window_for_its_duration() {
             ],
         );
         assert_eq!(
-            told.split_whitespace().collect::<Vec<_>>(),
+            found.split_whitespace().collect::<Vec<_>>(),
             ["240,100", "8.000000"],
             "{name}"
         );

@@ -89,9 +89,9 @@ fn left_out(svg: &str) -> (u32, u32) {
     let text = between.map(|(_, text)| text).collect::<Vec<_>>().join(" ");
     let words: Vec<&str> = text.split_whitespace().collect();
     let number = |at: usize| words[at].parse::<u32>().ok();
-    let told = (0..words.len() - 2).filter(|at| words[at + 1] == "of");
-    let mut told = told.filter_map(|at| Some((number(at)?, number(at + 2)?)));
-    told.next_back().unwrap_or((0, 0))
+    let shown = (0..words.len() - 2).filter(|at| words[at + 1] == "of");
+    let mut shown = shown.filter_map(|at| Some((number(at)?, number(at + 2)?)));
+    shown.next_back().unwrap_or((0, 0))
 }
 
 #[test]

@@ -206,10 +206,10 @@ fn columns_match_the_help() {
     };
     let help = bagreel(dir.path(), &["tables", "--help"]);
     let help = String::from_utf8(help.stdout).unwrap();
-    let told = help.split("counts: ").nth(1).unwrap();
+    let shown = help.split("counts: ").nth(1).unwrap();
     let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(plain(told).starts_with(&names("counts")), "{told}");
-    assert!(plain(told).contains(&names("bags")), "{told}");
+    assert!(plain(shown).starts_with(&names("counts")), "{shown}");
+    assert!(plain(shown).contains(&names("bags")), "{shown}");
 }
 
 #[test]

@@ -272,12 +272,12 @@ fn held(printed: &[u8]) -> Vec<String> {
         let plain = line
             .trim_end_matches(" (so far)")
             .trim_end_matches(" (withdrawn)");
-        let is_open = |told: &(String, bool)| told.1 && told.0 == what(plain);
+        let is_open = |shown: &(String, bool)| shown.1 && shown.0 == what(plain);
         if line.ends_with(" (withdrawn)") {
-            let told = held.iter().rposition(|told| told.0 == what(plain));
-            held.remove(told.expect("what is withdrawn was told"));
-        } else if let Some(told) = held.iter_mut().find(|told| is_open(told)) {
-            told.1 = false;
+            let shown = held.iter().rposition(|shown| shown.0 == what(plain));
+            held.remove(shown.expect("what is withdrawn was told"));
+        } else if let Some(shown) = held.iter_mut().find(|shown| is_open(shown)) {
+            shown.1 = false;
         } else {
             held.push((what(plain).to_owned(), line.ends_with(" (so far)")));
         }

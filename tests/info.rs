@@ -14,7 +14,7 @@ fn example(name: &str) -> PathBuf {
         .join(name)
 }
 
-fn told(bag: PathBuf) -> Info {
+fn shown(bag: PathBuf) -> Info {
     let reading = Reading::of([bag]);
     info(&read(&reading, &mut Unwatched).unwrap())
 }
@@ -44,7 +44,7 @@ fn recorded() -> (tempfile::TempDir, PathBuf) {
 #[test]
 fn the_recorder_is_not_a_subscriber_and_suppresses_no_advice() {
     let (_folder, inputs) = recorded();
-    let info = told(inputs);
+    let info = shown(inputs);
     assert_eq!(info.subscribes_by_degree.total(), 0);
     assert!(info.topics.iter().all(|t| t.subscribers.is_empty()));
     assert_eq!(info.topics_without_subscriber, 2);
@@ -63,7 +63,7 @@ fn the_recorder_is_not_a_subscriber_and_suppresses_no_advice() {
 
 #[test]
 fn advice_on_ros2_lists_gaps_files_and_record_options() {
-    let info = told(example("courier.mcap"));
+    let info = shown(example("courier.mcap"));
     let missing = format!(
         "{} without a known publisher, {} without a known subscriber",
         info.topics_without_publisher, info.topics_without_subscriber
@@ -97,11 +97,11 @@ fn the_evidence_of_an_edge_includes_conclusions() {
 
 #[test]
 fn info_suggests_a_figure_that_fits() {
-    let words = |inputs| -> Vec<&str> { told(inputs).figures.iter().map(|f| f.figure).collect() };
+    let words = |inputs| -> Vec<&str> { shown(inputs).figures.iter().map(|f| f.figure).collect() };
     assert_eq!(words(example("warehouse.bag")), ["lives", "map", "steps"]);
     // One log record and one scan: no connection is known.
     let (_folder, inputs) = recorded();
-    let info = told(inputs);
+    let info = shown(inputs);
     assert_eq!(info.figures.len(), 1);
     assert!(
         info.figures[0].shows.contains("without a known publisher"),

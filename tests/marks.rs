@@ -132,7 +132,7 @@ fn unescaped(text: &str) -> String {
 }
 
 /// Checks that every mark names events of the log, of its own kind; returns all of them.
-fn told(log: &Log, svg: &str, at: &str) -> BTreeSet<u64> {
+fn shown(log: &Log, svg: &str, at: &str) -> BTreeSet<u64> {
     let mut all = BTreeSet::new();
     for mark in marks(svg) {
         assert!(!mark.ids.is_empty(), "a {} of {at} is no event", mark.class);
@@ -192,7 +192,7 @@ fn every_mark_of_a_figure_is_an_event_of_the_log() {
             let Some(svg) = rendered(&bag, &flags, "figure.svg") else {
                 continue;
             };
-            told(&log, &svg, &at);
+            shown(&log, &svg, &at);
             for letter in marks(&svg).iter().filter(|m| m.class == "letter") {
                 if let Some(numbers) = numbers(&letter.title) {
                     let text = svg.replace("</text>", " ");
@@ -222,7 +222,7 @@ fn every_headline_is_marked_in_the_row_of_its_element() {
             let Some(svg) = rendered(&bag, &flags, "figure.svg") else {
                 continue;
             };
-            let marked = told(&log, &svg, &at);
+            let marked = shown(&log, &svg, &at);
             for (id, event) in log.headlines() {
                 let (kind, what) = (
                     event["kind"].as_str().unwrap(),
@@ -277,19 +277,19 @@ fn the_marks_of_frames_strips_and_pages_are_events_too() {
         let log = Log::of(&bag);
         let at = bag.display().to_string();
         let frames = rendered(&bag, &["--period", "60"], "frame{n}.svg").unwrap();
-        told(&log, &frames, &at);
+        shown(&log, &frames, &at);
         if let Some(strip) = rendered(
             &bag,
             &["--view", "graph", "--strip", "changes"],
             "strip.svg",
         ) {
-            told(&log, &strip, &at);
+            shown(&log, &strip, &at);
         }
         let html = rendered(&bag, &["--period", "60"], "page.html").unwrap();
         let data = page(&html);
         let id = |value: &Value| value.as_u64().unwrap();
         let lists = |key: &str| data[key].as_array().unwrap().iter();
-        let lines = lists("told").flat_map(|told| told[3].as_array().unwrap());
+        let lines = lists("told").flat_map(|shown| shown[3].as_array().unwrap());
         let lines: BTreeSet<u64> = lines.map(|line| id(&line[4])).collect();
         assert!(
             lines.iter().all(|id| log.headlines().contains_key(id)),

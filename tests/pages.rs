@@ -280,7 +280,7 @@ fn holds_its_windows(data: &Value, mission: &Value) {
         windows.iter().map(secs)
     };
     assert!(list("starts").eq(of("start_ns")) && list("ends").eq(of("end_ns")));
-    let mut told = 0;
+    let mut shown = 0;
     for at in data["told"].as_array().unwrap() {
         let window = usize::try_from(at[0].as_u64().unwrap()).unwrap();
         let (start, end) = (
@@ -292,10 +292,10 @@ fn holds_its_windows(data: &Value, mission: &Value) {
                 (start..end).contains(&line[0].as_f64().unwrap()),
                 "{line} in {start} – {end}"
             );
-            told += 1;
+            shown += 1;
         }
     }
-    assert!(told > 5);
+    assert!(shown > 5);
 }
 
 #[test]
@@ -349,14 +349,14 @@ fn bars_and_jumps_count_headlines() {
         .collect();
     let is_headline = |e: &&Value| e["quiet"] != true && !parts.contains(&&e["id"]);
     let entries = ledger.iter().filter(is_headline).count() as u64;
-    let told: u64 = data["told"]
+    let shown: u64 = data["told"]
         .as_array()
         .unwrap()
         .iter()
         .map(|t| t[1].as_u64().unwrap())
         .sum();
-    assert!(told > 10);
-    assert_eq!(told, entries);
+    assert!(shown > 10);
+    assert_eq!(shown, entries);
     for window in data["told"].as_array().unwrap() {
         assert_eq!(
             usize::try_from(window[1].as_u64().unwrap()).unwrap(),

@@ -125,8 +125,8 @@ fn crash(run: &mut Recording, node: &str, second: i64) {
     let logs: Vec<bool> = (0..run.publishers.len()).map(is_log).collect();
     // Its own messages, and its log as forwarded by others.
     let is_own = |(place, _, payload): &(usize, i64, Vec<u8>)| {
-        let told = || payload.windows(node.len()).any(|w| w == node.as_bytes());
-        own.contains(place) || logs[*place] && told()
+        let shown = || payload.windows(node.len()).any(|w| w == node.as_bytes());
+        own.contains(place) || logs[*place] && shown()
     };
     run.messages.retain(|m| m.1 < end || !is_own(m));
 }

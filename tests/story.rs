@@ -29,7 +29,7 @@ const ALL: LogOptions = LogOptions {
 };
 
 /// Every headline of a kind: its element and its time in seconds.
-fn told(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
+fn shown(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
     let headlines = mission.ledger.entries.iter();
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
     let name = |e: &bagreel::internals::mission::ledger::Entry| match mission.elements.ends(e.what)
@@ -43,8 +43,9 @@ fn told(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
         .collect()
 }
 
-fn near(told: &[(String, i64)], name: &str, second: i64) -> bool {
-    told.iter()
+fn near(shown: &[(String, i64)], name: &str, second: i64) -> bool {
+    shown
+        .iter()
         .any(|(n, at)| n == name && (at - second).abs() <= 2)
 }
 
@@ -52,7 +53,7 @@ fn near(told: &[(String, i64)], name: &str, second: i64) -> bool {
 fn crashes_restarts_and_rates_of_the_warehouse_are_logged() {
     // Times from the scripts that ran the mission; every line was compared with the master's own state.
     let mission = mission("warehouse.bag", 60);
-    let restarted = told(&mission, Kind::Restarted);
+    let restarted = shown(&mission, Kind::Restarted);
     assert!(
         near(&restarted, "/robot2/lidar_driver", 246),
         "{restarted:?}"
@@ -62,7 +63,7 @@ fn crashes_restarts_and_rates_of_the_warehouse_are_logged() {
         "{restarted:?}"
     );
     assert_eq!(restarted.len(), 2);
-    let stopped = told(&mission, Kind::Stopped);
+    let stopped = shown(&mission, Kind::Stopped);
     for (node, second) in [
         ("/robot1/replanner", 156),
         ("/robot1/planner", 176),
@@ -70,10 +71,10 @@ fn crashes_restarts_and_rates_of_the_warehouse_are_logged() {
     ] {
         assert!(near(&stopped, node, second), "{stopped:?}");
     }
-    assert_eq!(told(&mission, Kind::Vanished), []);
-    let rates = told(&mission, Kind::Rate);
+    assert_eq!(shown(&mission, Kind::Vanished), []);
+    let rates = shown(&mission, Kind::Rate);
     assert!(near(&rates, "/robot1/camera_driver", 236), "{rates:?}");
-    let handed = told(&mission, Kind::HandedOver);
+    let handed = shown(&mission, Kind::HandedOver);
     assert!(near(&handed, "/robot1/cmd_vel", 299), "{handed:?}");
     let headlines = mission.ledger.entries.iter().filter(|e| e.is_headline());
     assert!(headlines.count() <= 60);
@@ -137,8 +138,8 @@ fn every_window_difference_refers_to_its_log_entry() {
             for change in &after.changes {
                 *words.entry(change.word()).or_insert(0) += 1;
             }
-            let told = words.get("added").unwrap_or(&0) + words.get("removed").unwrap_or(&0);
-            assert_eq!(moved, told, "window {} of {seconds} s", after.index);
+            let shown = words.get("added").unwrap_or(&0) + words.get("removed").unwrap_or(&0);
+            assert_eq!(moved, shown, "window {} of {seconds} s", after.index);
             assert_eq!(after.changes.len(), after.entries.len());
             let places = after.entries.iter().map(|id| *id as usize);
             assert!(
@@ -204,13 +205,13 @@ fn starts_and_stops_are_timed_independent_of_the_period() {
         let mission = mission("warehouse.bag", seconds);
         let (mut errors, mut inside, mut missed) = (Vec::new(), 0, Vec::new());
         for (word, kind) in [("started", Kind::Started), ("stopped", Kind::Stopped)] {
-            let mut told = turns(&mission, kind);
+            let mut shown = turns(&mission, kind);
             for event in truth.iter().filter(|e| e["kind"] == word) {
                 let (node, at) = (
                     event["node"].as_str().unwrap(),
                     event["time_s"].as_f64().unwrap(),
                 );
-                let near = told
+                let near = shown
                     .iter()
                     .enumerate()
                     .filter(|(_, (name, ..))| name == node);
@@ -222,15 +223,15 @@ fn starts_and_stops_are_timed_independent_of_the_period() {
                 let [from, to] = ["earliest_s", "latest_s"].map(|key| event[key].as_f64().unwrap());
                 errors.push((from - time).max(time - to).max(0.0));
                 inside += usize::from(*earliest <= to && from <= *latest);
-                told.remove(place);
+                shown.remove(place);
             }
             // Additional events are within two seconds of the bag's ends, or concern the recorder.
             let end = mission.offset(mission.span.end) as f64 / 1e9;
-            told.retain(|(name, at, (earliest, latest))| {
+            shown.retain(|(name, at, (earliest, latest))| {
                 let is_edge = *at < 5.0 && *earliest < 2.0 || *latest > end - 2.0;
                 !is_edge && !name.contains("record")
             });
-            assert!(told.is_empty(), "{word} by {seconds} s: {told:?}");
+            assert!(shown.is_empty(), "{word} by {seconds} s: {shown:?}");
         }
         assert!(missed.is_empty(), "{missed:?}");
         errors.sort_by(f64::total_cmp);
@@ -253,13 +254,13 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
         _ => "",
     };
     let near = |from: f64, to: f64, at: f64| from - 5.0 <= at && at <= to + 5.0;
-    let told = |entry: &&bagreel::internals::mission::ledger::Entry| !entry.quiet;
+    let shown = |entry: &&bagreel::internals::mission::ledger::Entry| !entry.quiet;
     let mut explained = 0;
     for event in &truth {
         let topic = event["topic"].as_str().unwrap_or_default();
         let number = |key: &str| event[key].as_f64().unwrap();
         let of = |kind: Kind| {
-            let entries = mission.ledger.entries.iter().filter(told);
+            let entries = mission.ledger.entries.iter().filter(shown);
             entries.filter(move |e| e.kind == kind && name(e.what) == topic)
         };
         match event["kind"].as_str().unwrap() {
@@ -285,7 +286,7 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
             _ => {}
         }
     }
-    let all = mission.ledger.entries.iter().filter(told);
+    let all = mission.ledger.entries.iter().filter(shown);
     let all = all.filter(|e| matches!(e.kind, Kind::Rate | Kind::HandedOver));
     let of_parts = |e: &&bagreel::internals::mission::ledger::Entry| e.part_of.is_none();
     assert!(all.filter(of_parts).count() <= explained, "a false line");

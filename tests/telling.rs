@@ -41,14 +41,14 @@ fn every_headline_is_counted_captioned_and_marked() {
         for (k, frame) in view.frames.iter().enumerate() {
             let seen = view.seen(k);
             let at = format!("{name}, window {}", frame.index);
-            let told: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
-            assert_eq!(told.len(), frame.counts.total(), "{at}");
-            let told: BTreeSet<u32> = frame.entries().collect();
+            let reported: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
+            assert_eq!(reported.len(), frame.counts.total(), "{at}");
+            let reported: BTreeSet<u32> = frame.entries().collect();
             let said: usize = frame.caption.iter().map(|phrase| phrase.names.len()).sum();
-            assert_eq!(told.len(), said, "{at}");
+            assert_eq!(reported.len(), said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
             let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
-            assert_eq!(marked, told, "{at}");
+            assert_eq!(marked, reported, "{at}");
             assert!(
                 all(&seen).all(|s| s.mark.is_none() || !s.entries.is_empty()),
                 "{at}"

@@ -178,14 +178,14 @@ fn captions_are_read_from_a_pipe() {
     assert!(is_done, "{error}");
     let mission: serde_json::Value = serde_json::from_str(&text).unwrap();
     let phases = mission["phases"].as_array().unwrap();
-    let told = phases.iter().skip(1).map(|phase| {
+    let shown = phases.iter().skip(1).map(|phase| {
         let start = phase["start_ns"].as_i64().unwrap();
         let second = (start - ORIGIN) / 1_000_000_000;
         (second, phase["name"].as_str().unwrap())
     });
     // A repeated caption is not a new phase, and the time before the first one is a phase of its own.
-    let told: Vec<_> = told.collect();
-    assert_eq!(told, [(10, "driving"), (30, "picking"), (45, "docking")]);
+    let shown: Vec<_> = shown.collect();
+    assert_eq!(shown, [(10, "driving"), (30, "picking"), (45, "docking")]);
 }
 
 #[test]

@@ -237,7 +237,7 @@ fn a_hundred_thousand_nodes_fit_into_memory() {
 fn an_empty_video_is_an_error() {
     let dir = tempfile::tempdir().unwrap();
     let bin = tempfile::tempdir().unwrap();
-    for (then, code, told) in [
+    for (then, code, shown) in [
         ("exit 0", 1, "wrote nothing"),
         ("echo no such codec >&2; exit 3", 1, "no such codec"),
         ("echo film", 0, ""),
@@ -248,7 +248,7 @@ fn an_empty_video_is_an_error() {
             .output()
             .unwrap();
         assert_eq!(done.status.code(), Some(code), "{then}: {}", errors(&done));
-        assert!(errors(&done).contains(told), "{then}: {}", errors(&done));
+        assert!(errors(&done).contains(shown), "{then}: {}", errors(&done));
         assert_eq!(dir.path().join("x.mp4").exists(), code == 0, "{then}");
     }
 }
