@@ -20,13 +20,12 @@ pub(crate) mod palette;
 pub(crate) mod parquet;
 #[cfg(feature = "pdf")]
 mod pdf;
-mod png;
 pub(crate) mod report;
 pub mod run;
 pub mod sequence;
 pub(crate) mod sink;
 mod spells;
-mod svg;
+mod still;
 pub(crate) mod tables;
 pub(crate) mod target;
 mod tex;
@@ -38,7 +37,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
-use self::png::StillKind;
+use self::still::StillKind;
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Pack, Packet};
@@ -73,13 +72,13 @@ pub const FORMATS: &[OutputFormat] = &[
     OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| png::start(sequence, target, StillKind::Png),
+        start: |sequence, target| still::start(sequence, target, StillKind::Png),
         ..IMAGE
     },
     OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, otherwise a film strip",
-        start: |sequence, target| png::start(sequence, target, StillKind::WebP),
+        start: |sequence, target| still::start(sequence, target, StillKind::WebP),
         ..IMAGE
     },
     OutputFormat {
@@ -186,7 +185,7 @@ pub const FORMATS: &[OutputFormat] = &[
 const POSTER: &OutputFormat = &OutputFormat {
     word: "png",
     what: "the first window as an image",
-    start: png::start_poster,
+    start: still::start_poster,
     ..PICTURE
 };
 
@@ -196,7 +195,7 @@ fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn 
     if is_sequence && !target.is_numbered() {
         animated_svg::start(sequence, target)
     } else {
-        svg::start(sequence, target)
+        still::start(sequence, target, StillKind::Svg)
     }
 }
 

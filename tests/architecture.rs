@@ -61,7 +61,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["sequence", "sink"],
         &["check", "encoder"],
         &["spells"],
-        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "still", "tex", "video"],
         &["report", "run", "tables"],
     ]),
     ("gate", &[

@@ -155,6 +155,12 @@ impl Judge<'_> {
         Some(format!("the nearest name in the bag is `{}`", near??))
     }
 
+    /// The findings of all checks but the first ones.
+    fn found_since(&mut self, before: usize) -> impl Iterator<Item = &mut Finding> {
+        let checks = self.checks[before..].iter_mut();
+        checks.flat_map(|check| &mut check.findings)
+    }
+
     /// Adds the findings of one fact.
     fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
         self.checks.push(Checked {

@@ -43,10 +43,7 @@ impl Judge<'_> {
                 self.note(&rule.id, rule.at, found);
             }
         }
-        for finding in self.checks[before..]
-            .iter_mut()
-            .flat_map(|c| &mut c.findings)
-        {
+        for finding in self.found_since(before) {
             finding
                 .details
                 .push(format!("rule {}", words::visible(&rule.id)));

@@ -28,10 +28,7 @@ impl Judge<'_> {
             self.note(&title, named.at, found);
             self.topic_facts(&title, &named.name, facts);
         }
-        for finding in self.checks[before..]
-            .iter_mut()
-            .flat_map(|c| &mut c.findings)
-        {
+        for finding in self.found_since(before) {
             finding.accept = Some(name.to_owned());
         }
     }

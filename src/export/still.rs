@@ -1,4 +1,4 @@
-//! Images as PNG and WebP: one per window, or the strip.
+//! Drawings as SVG, PNG and WebP: one per window, or the strip.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
@@ -7,6 +7,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Single, Started, Written, single};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
+use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::write_file;
@@ -15,9 +16,10 @@ use crate::export::target::Target;
 /// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
 const PAPER: f64 = 300.0 / 96.0;
 
-/// The two formats of still images.
-#[derive(Clone, Copy)]
+/// The formats of still drawings.
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StillKind {
+    Svg,
     Png,
     WebP,
 }
@@ -51,7 +53,7 @@ pub(crate) fn start_poster<'a>(sequence: &'a Sequence<'a>, target: &Target) -> S
     }))
 }
 
-/// Begins the images, one per window or one of the strip.
+/// Begins the drawings, one per window; without `{n}` the single window or the strip.
 ///
 /// # Errors
 /// As [`single`].
@@ -60,7 +62,9 @@ pub(crate) fn start<'a>(
     target: &Target,
     kind: StillKind,
 ) -> Started<'a> {
-    let strip = match single(sequence, target, true)? {
+    // Several windows in one SVG are an animation, unless they are asked for as one drawing.
+    let may_be_strip = kind != StillKind::Svg || sequence.options.is_one_drawing();
+    let strip = match single(sequence, target, may_be_strip)? {
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
     };
@@ -75,11 +79,24 @@ pub(crate) fn start<'a>(
     }))
 }
 
+impl Images<'_> {
+    /// The one drawing, encoded.
+    fn alone(&self, scene: &Scene) -> Result<Vec<u8>> {
+        if self.kind == StillKind::Svg {
+            return Ok(svg::write(scene).into_bytes());
+        }
+        let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
+        let scale = self.sequence.options.scale * paper;
+        encoded(self.kind, &self.sequence.painter.paint(scene, scale)?)
+    }
+}
+
 impl Encoder for Images<'_> {
     fn needs(&self) -> Needs {
-        match self.strip {
-            Some(_) => Needs::Nothing,
-            None => Needs::Pixels,
+        match (self.strip, self.kind) {
+            (Some(_), _) => Needs::Nothing,
+            (None, StillKind::Svg) => Needs::Scene,
+            (None, _) => Needs::Pixels,
         }
     }
 
@@ -89,6 +106,7 @@ impl Encoder for Images<'_> {
                 0 => packed(StillKind::Png, frame),
                 _ => Ok(Packet::Nothing),
             },
+            (StillKind::Svg, _) => |frame| Ok(Packet::Bytes(svg::write(frame.scene).into_bytes())),
             (StillKind::Png, _) => |frame| packed(StillKind::Png, frame),
             (StillKind::WebP, _) => |frame| packed(StillKind::WebP, frame),
         }
@@ -105,10 +123,7 @@ impl Encoder for Images<'_> {
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
         if let Some(scene) = self.strip {
-            let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
-            let scale = self.sequence.options.scale * paper;
-            let pixels = self.sequence.painter.paint(scene, scale)?;
-            let bytes = encoded(self.kind, &pixels)?;
+            let bytes = self.alone(scene)?;
             self.written.add(write_file(&self.target, &bytes)?);
         }
         Ok(self.written)
@@ -128,8 +143,8 @@ fn encoded(kind: StillKind, pixels: &Pixels) -> Result<Vec<u8>> {
     let (width, height, color) = (pixels.width, pixels.height, ExtendedColorType::Rgb8);
     let mut out = Vec::new();
     match kind {
-        // Ten times as fast as the default, for a quarter more bytes.
-        StillKind::Png => {
+        // Ten times as fast as the default, for a quarter more bytes. Nothing asks for the pixels of an SVG.
+        StillKind::Png | StillKind::Svg => {
             PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
                 .write_image(&rgb, width, height, color)
         }
