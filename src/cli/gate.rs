@@ -45,14 +45,7 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
 }
 
 fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
-    let one = |path: &PathBuf| {
-        let inputs = Inputs {
-            bags: vec![path.clone()],
-            offset: Vec::new(),
-            verify: false,
-        };
-        judged(&inputs, &args.time(), &args.graph)
-    };
+    let one = |path: &PathBuf| judged(std::slice::from_ref(path), &args.time(), &args.graph);
     let (mut reports, mut pictures) = (Vec::new(), Vec::new());
     for output in &args.outputs {
         let ending = output.to_string_lossy().to_ascii_lowercase();
@@ -142,14 +135,10 @@ fn against(
 /// Writes an expectation that all of these healthy runs meet.
 pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     applies::check_baseline(given)?;
-    let runs = args.bags.iter().map(|bag| {
-        let inputs = Inputs {
-            bags: vec![bag.clone()],
-            offset: Vec::new(),
-            verify: false,
-        };
-        judged(&inputs, &args.time, &args.graph)
-    });
+    let runs = args
+        .bags
+        .iter()
+        .map(|bag| judged(std::slice::from_ref(bag), &args.time, &args.graph));
     let job = Baseline {
         runs: runs.collect::<Result<_>>()?,
         update: args.update.clone(),
@@ -200,7 +189,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
         return Err(Error::usage("`--expect` is missing", "name a graph.yaml"));
     };
     let job = Check {
-        reading: judged(&args.inputs(), &args.time, &args.graph)?,
+        reading: judged(&args.bags, &args.time, &args.graph)?,
         tracked: tracked(&expect),
         expect,
         reports: args
@@ -293,14 +282,19 @@ fn unknown_kind(word: &str) -> Error {
 }
 
 /// The reading for a check. Missions in JSON have their own windows.
-fn judged(inputs: &Inputs, time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
+fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
+    let inputs = Inputs {
+        bags: bags.to_vec(),
+        offset: Vec::new(),
+        verify: false,
+    };
     let time = TimeArgs {
         period: time.period,
         start: time.start,
         end: time.end,
         ..TimeArgs::default()
     };
-    reading(inputs, &time, &ChangeArgs::default(), graph)
+    reading(&inputs, &time, &ChangeArgs::default(), graph)
 }
 
 fn typed(bags: &[PathBuf]) -> Vec<String> {

@@ -25,6 +25,7 @@ use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Window;
 
 pub(crate) use changes::{explain, places};
+pub(crate) use from_changes::described;
 pub(crate) use make::{LedgerInput, make, sorted};
 
 /// The most reconfigurations of a mission: the limit of automatic windows.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::GraphArgs;
 use super::values::{length, moment, share, size};
-use super::{GraphArgs, Inputs};
 use crate::base::time::Moment;
 use crate::gate;
 use crate::graph::diff::RATE_CHANGE;
@@ -138,17 +138,6 @@ pub(crate) struct GateTime {
     /// End time, in the same forms as `--start`.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) end: Option<Moment>,
-}
-
-impl CheckArgs {
-    /// The bags, as the other commands take them.
-    pub(crate) fn inputs(&self) -> Inputs {
-        Inputs {
-            bags: self.bags.clone(),
-            offset: Vec::new(),
-            verify: false,
-        }
-    }
 }
 
 pub(crate) const DIFF_HELP: &str = "Exit codes: 0 equal, 1 different, 2 not compared (usage error, unreadable bag), 3 equal but data was skipped \

@@ -6,7 +6,7 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
 use crate::graph::{Element, NodeId, Topic};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry};
+use crate::mission::ledger::{Detail, Entry, described};
 
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
@@ -143,28 +143,7 @@ struct WindowChange {
 
 impl WindowChange {
     fn new(window: usize, change: &Change) -> Self {
-        let (what, time, detail) = match change {
-            Change::Added { what, time } | Change::Removed { what, time } => {
-                (*what, *time, Detail::None)
-            }
-            Change::Rate {
-                what,
-                from_hz,
-                to_hz,
-            } => {
-                let (from_hz, to_hz) = (*from_hz, *to_hz);
-                (*what, None, Detail::Rates { from_hz, to_hz })
-            }
-            Change::HandedOver { topic, from, to } => {
-                let (from, to) = (from.clone(), to.clone());
-                (Element::Topic(*topic), None, Detail::Senders { from, to })
-            }
-            Change::Restarted { node, time } => (Element::Node(*node), Some(*time), Detail::None),
-            Change::Value { what, from, to, .. } => {
-                let (from, to) = (from.clone(), to.clone());
-                (*what, None, Detail::Values { from, to })
-            }
-        };
+        let (_, what, time, detail) = described(change);
         Self {
             window,
             kind: change.word(),

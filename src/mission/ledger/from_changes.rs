@@ -121,6 +121,8 @@ impl<'a> WindowTurns<'a> {
 
     fn entry(&self, at: usize, change: &Change) -> Entry {
         let (kind, what, time, detail) = described(change);
+        // The last sign of life is not the end.
+        let time = time.filter(|_| !matches!(change, Change::Removed { .. }));
         let time = time.filter(|t| self.window.span.contains(*t));
         let whole = self.whole(change).filter(|whole| *whole != at);
         let Span { start, end } = self.window.span;
@@ -222,26 +224,18 @@ impl<'a> WindowTurns<'a> {
     }
 }
 
-fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
+/// The event that a change is, its element, its time as far as it is known, and its values.
+pub(crate) fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
+    let is_node = |what: &Element| matches!(what, Element::Node(_));
     match change {
-        Change::Added { what, time } => {
-            let is_node = matches!(what, Element::Node(_));
-            let kind = if is_node {
-                Kind::Started
-            } else {
-                Kind::Appeared
-            };
-            (kind, *what, *time, Detail::None)
+        Change::Added { what, time } if is_node(what) => {
+            (Kind::Started, *what, *time, Detail::None)
         }
-        Change::Removed { what, .. } => {
-            let is_node = matches!(what, Element::Node(_));
-            let kind = if is_node {
-                Kind::Stopped
-            } else {
-                Kind::Vanished
-            };
-            (kind, *what, None, Detail::None)
+        Change::Added { what, time } => (Kind::Appeared, *what, *time, Detail::None),
+        Change::Removed { what, time } if is_node(what) => {
+            (Kind::Stopped, *what, *time, Detail::None)
         }
+        Change::Removed { what, time } => (Kind::Vanished, *what, *time, Detail::None),
         Change::Rate {
             what,
             from_hz,
@@ -255,12 +249,10 @@ fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
             let detail = Detail::Senders { from, to };
             (Kind::HandedOver, Element::Topic(*topic), None, detail)
         }
-        Change::Restarted { node, time } => (
-            Kind::Restarted,
-            Element::Node(*node),
-            Some(*time),
-            Detail::None,
-        ),
+        Change::Restarted { node, time } => {
+            let node = Element::Node(*node);
+            (Kind::Restarted, node, Some(*time), Detail::None)
+        }
         Change::Value {
             kind,
             what,
