@@ -13,6 +13,9 @@ mod ring;
 mod routes;
 mod spacing;
 
+pub(crate) use layered::parts::parts;
+pub(crate) use pack::shelves;
+
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::worded;
@@ -111,9 +114,10 @@ pub struct Plan {
 
 worded! {
     /// The direction in which the edges run.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Orientation {
         /// From left to right.
+        #[default]
         LeftRight = "LR",
         /// From top to bottom.
         TopBottom = "TB",
@@ -144,7 +148,7 @@ pub struct Route {
 }
 
 /// Everything placed; the top left corner of the whole is (0, 0).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
     /// The direction in which the edges run.
     pub orientation: Orientation,
@@ -299,20 +303,6 @@ impl Plan {
 }
 
 impl Layout {
-    /// The layout of an empty plan.
-    pub fn empty() -> Self {
-        Self {
-            orientation: Orientation::LeftRight,
-            size: Size::default(),
-            boxes: Vec::new(),
-            routes: Vec::new(),
-            clusters: Vec::new(),
-            remarks: Vec::new(),
-        }
-    }
-}
-
-impl Layout {
     /// Every label that has a place.
     fn labels(&self, plan: &Plan) -> impl Iterator<Item = Rect> {
         let both = self.routes.iter().zip(&plan.links);
@@ -350,7 +340,7 @@ impl Route {
     }
 
     /// This route with every point moved.
-    fn mapped(&self, f: impl Fn(Point) -> Point) -> Self {
+    pub(crate) fn mapped(&self, f: impl Fn(Point) -> Point) -> Self {
         Self {
             start: f(self.start),
             curves: self.curves.iter().map(|curve| curve.map(&f)).collect(),
@@ -359,16 +349,14 @@ impl Route {
     }
 
     /// This route moved by `by`.
-    fn moved(&self, by: Point) -> Self {
+    pub(crate) fn moved(&self, by: Point) -> Self {
         self.mapped(|p| Point::new(p.x + by.x, p.y + by.y))
     }
 
     /// About its length: that of the straight lines between the points that its pieces join.
     fn length(&self) -> f64 {
         let ends = self.curves.iter().map(|curve| curve[2]);
-        let far = |(length, from): (f64, Point), to: Point| {
-            (length + libm::hypot(to.x - from.x, to.y - from.y), to)
-        };
+        let far = |(length, from): (f64, Point), to: Point| (length + from.distance(to), to);
         ends.fold((0.0, self.start), far).0
     }
 
@@ -409,13 +397,13 @@ fn sane_size(size: Size) -> Size {
 /// Vertices that belong together, by links or by a shared namespace. Everything in it is given by places in `vertices`;
 /// cluster `i + 1` is `clusters[i]` of the plan, and 0 is the outside.
 #[derive(Clone, Debug, Default)]
-struct Component {
+pub(crate) struct Component {
     /// The places of its vertices in the plan, growing.
-    vertices: Vec<usize>,
+    pub(crate) vertices: Vec<usize>,
     /// The places of its links in the plan, growing.
-    links: Vec<usize>,
+    pub(crate) links: Vec<usize>,
     /// The places of its clusters in the plan, growing.
-    clusters: Vec<usize>,
+    pub(crate) clusters: Vec<usize>,
     /// The ends of each link.
     ends: Vec<(usize, usize)>,
     /// The innermost cluster of each vertex.

@@ -16,6 +16,20 @@ impl Point {
     pub const fn new(x: f64, y: f64) -> Self {
         Self { x, y }
     }
+
+    /// How far another point is.
+    pub fn distance(self, other: Self) -> f64 {
+        libm::hypot(self.x - other.x, self.y - other.y)
+    }
+
+    /// The point at this part of the way to another.
+    #[must_use]
+    pub fn towards(self, other: Self, part: f64) -> Self {
+        Self::new(
+            self.x + (other.x - self.x) * part,
+            self.y + (other.y - self.y) * part,
+        )
+    }
 }
 
 /// A width and a height, both ≥ 0.
@@ -31,6 +45,12 @@ impl Size {
     /// `w` by `h`.
     pub const fn new(w: f64, h: f64) -> Self {
         Self { w, h }
+    }
+
+    /// `by` times as large.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        Self::new(self.w * by, self.h * by)
     }
 }
 
@@ -63,6 +83,12 @@ impl Rect {
         )
     }
 
+    /// The smallest rectangle around points; `None` without any.
+    pub fn of_points(points: impl IntoIterator<Item = Point>) -> Option<Self> {
+        let points = points.into_iter().map(|p| Self::new(p.x, p.y, 0.0, 0.0));
+        points.reduce(|a, b| a.union(&b))
+    }
+
     /// The right edge.
     pub fn right(&self) -> f64 {
         self.x + self.w
@@ -92,6 +118,12 @@ impl Rect {
         Self::new(self.x + by.x, self.y + by.y, self.w, self.h)
     }
 
+    /// This rectangle in a drawing `by` times as large.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        Self::new(self.x * by, self.y * by, self.w * by, self.h * by)
+    }
+
     /// Grown by `by` on every side (shrunk if negative).
     #[must_use]
     pub fn grown(&self, by: f64) -> Self {
@@ -112,24 +144,25 @@ impl Rect {
         Self::new(x, y, right - x, bottom - y)
     }
 }
+
+/// The point at `t` of a cubic Bézier curve, by its four points.
+pub(crate) fn on_cubic([p, a, b, q]: [Point; 4], t: f64) -> Point {
+    let u = 1.0 - t;
+    let mix = |p: f64, a: f64, b: f64, q: f64| {
+        u * u * u * p + 3.0 * u * u * t * a + 3.0 * u * t * t * b + t * t * t * q
+    };
+    Point::new(mix(p.x, a.x, b.x, q.x), mix(p.y, a.y, b.y, q.y))
+}
+
 /// The points of a path of cubic Bézier curves, each with its two controls and its end: the start, and then `pieces`
 /// points along each curve, the last of them its end.
 pub(crate) fn polyline(start: Point, curves: &[[Point; 3]], pieces: u32) -> Vec<Point> {
     let mut points = vec![start];
     let mut here = start;
-    for [a, b, end] in curves {
-        for piece in 1..=pieces {
-            let t = f64::from(piece) / f64::from(pieces);
-            let u = 1.0 - t;
-            let mix = |p: f64, q: f64, r: f64, s: f64| {
-                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
-            };
-            points.push(Point::new(
-                mix(here.x, a.x, b.x, end.x),
-                mix(here.y, a.y, b.y, end.y),
-            ));
-        }
-        here = *end;
+    for &[a, b, end] in curves {
+        let parts = (1..=pieces).map(|piece| f64::from(piece) / f64::from(pieces));
+        points.extend(parts.map(|t| on_cubic([here, a, b, end], t)));
+        here = end;
     }
     points
 }

@@ -188,7 +188,7 @@ impl<'a> Board<'a> {
             .view
             .frames
             .iter()
-            .map(|f| scaled(self.head(f.span), self.scale));
+            .map(|f| self.head(f.span).scaled(self.scale));
         Overview {
             scene,
             heads: heads.collect(),
@@ -280,7 +280,7 @@ impl<'a> Board<'a> {
         });
         let mut groups = self.painted(canvas);
         let mut head = Group::named("playhead");
-        let form = Form::Rect(scaled(self.head(span), self.scale), 2.0);
+        let form = Form::Rect(self.head(span).scaled(self.scale), 2.0);
         head.shape(Shape::line(
             form,
             Stroke::solid(self.style.timeline.head, 1.5),
@@ -391,10 +391,6 @@ fn between(from: i64, to: i64, phase: f64) -> Stamp {
     } else {
         from.saturating_add(part)
     })
-}
-
-fn scaled(r: Rect, by: f64) -> Rect {
-    Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
 }
 
 /// The number of messages that the topic of a row carried.

@@ -16,7 +16,6 @@ pub(crate) mod marks;
 pub(crate) mod notes;
 mod page;
 mod panel;
-mod parts;
 mod place;
 pub(crate) mod rows;
 mod signs;

@@ -134,6 +134,39 @@ pub struct Text {
     pub text: String,
 }
 
+impl Step {
+    /// The same step with every point moved.
+    #[must_use]
+    pub fn mapped(&self, f: impl Fn(Point) -> Point) -> Self {
+        match self {
+            Self::Move(p) => Self::Move(f(*p)),
+            Self::Line(p) => Self::Line(f(*p)),
+            Self::Curve(points) => Self::Curve(points.map(f)),
+            Self::Close => Self::Close,
+        }
+    }
+
+    /// The points that shape it.
+    pub fn points(&self) -> &[Point] {
+        match self {
+            Self::Move(p) | Self::Line(p) => std::slice::from_ref(p),
+            Self::Curve(points) => points,
+            Self::Close => &[],
+        }
+    }
+}
+
+impl Anchor {
+    /// The part of a text of this width that stands before its point.
+    pub fn before(self, width: f64) -> f64 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => width / 2.0,
+            Self::End => width,
+        }
+    }
+}
+
 impl Shape {
     /// A shape without a line around.
     pub fn filled(form: Form, fill: Color) -> Self {
@@ -161,6 +194,15 @@ impl Stroke {
             color,
             width,
             dash: Vec::new(),
+        }
+    }
+
+    /// A line of these lengths of line, gap, line, gap, …
+    pub fn dashed(color: Color, width: f64, dash: &[f64]) -> Self {
+        Self {
+            color,
+            width,
+            dash: dash.to_vec(),
         }
     }
 

@@ -7,7 +7,7 @@ use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time;
 use crate::base::words;
 use crate::draw::picture::{Measured, PageOptions, Picture};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
+use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Stroke, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::{self, Engine, Layout};
@@ -322,14 +322,11 @@ fn piece_bounds(piece: &Piece) -> Option<Rect> {
     match piece {
         Piece::Shape(shape) => match &shape.form {
             Form::Rect(rect, _) | Form::Ellipse(rect) => Some(*rect),
-            Form::Path(steps) => {
-                let points = steps.iter().filter_map(|step| match step {
-                    Step::Move(p) | Step::Line(p) | Step::Curve([_, _, p]) => Some(*p),
-                    Step::Close => None,
-                });
-                let boxes = points.map(|p| Rect::new(p.x, p.y, 0.0, 0.0));
-                boxes.reduce(|a, b| a.union(&b))
-            }
+            Form::Path(steps) => Rect::of_points(
+                steps
+                    .iter()
+                    .filter_map(|step| step.points().last().copied()),
+            ),
         },
         Piece::Text(text) => Some(Rect::new(
             text.at.x,
@@ -343,20 +340,11 @@ fn piece_bounds(piece: &Piece) -> Option<Rect> {
 /// A group `by` times as large, its page's corner at `to`.
 fn moved(group: &Group, by: f64, to: Point) -> Group {
     let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
-    let rect = |r: Rect| {
-        let corner = point(Point::new(r.x, r.y));
-        Rect::new(corner.x, corner.y, r.w * by, r.h * by)
-    };
-    let step = |step: &Step| match step {
-        Step::Move(p) => Step::Move(point(*p)),
-        Step::Line(p) => Step::Line(point(*p)),
-        Step::Curve(points) => Step::Curve(points.map(point)),
-        Step::Close => Step::Close,
-    };
+    let rect = |r: &Rect| r.scaled(by).moved(to);
     let form = |form: &Form| match form {
-        Form::Rect(r, radius) => Form::Rect(rect(*r), radius * by),
-        Form::Ellipse(r) => Form::Ellipse(rect(*r)),
-        Form::Path(steps) => Form::Path(steps.iter().map(step).collect()),
+        Form::Rect(r, radius) => Form::Rect(rect(r), radius * by),
+        Form::Ellipse(r) => Form::Ellipse(rect(r)),
+        Form::Path(steps) => Form::Path(steps.iter().map(|step| step.mapped(point)).collect()),
     };
     let piece = |piece: &Piece| match piece {
         Piece::Shape(shape) => Piece::Shape(Shape {

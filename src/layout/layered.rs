@@ -61,7 +61,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
     });
     let best = labelled.reduce(|best, next| if next.0 > best.0 { next } else { best });
-    let mut best = best.map_or_else(Layout::empty, |best| best.1);
+    let mut best = best.map_or_else(Layout::default, |best| best.1);
     labels::make_room(plan, &mut best);
     best
 }
@@ -247,6 +247,7 @@ fn rankings(part: &Component, options: &LayoutOptions) -> Vec<Vec<usize>> {
 }
 
 /// One part placed and routed, its top left corner at (0, 0).
+#[derive(Default)]
 pub(crate) struct PlacedPart {
     pub(crate) size: Size,
     pub(crate) crossings: u64,
@@ -326,7 +327,7 @@ fn best_block(
         }
     }
     let Some(best) = best.map(|(quality, _, block)| (quality, block)) else {
-        return PlacedPart::empty();
+        return PlacedPart::default();
     };
     if links > MANY {
         return best.1;
@@ -353,54 +354,45 @@ fn block(
     let room = Spacing::new(plan, options, part, layers, orientation);
     let across = place::place(layers, &ordering.rows, &room.apart(&ordering.rows));
     let columns = room.columns(&ordering.rows, &across);
-    let outline: Vec<_> = part
-        .vertices
-        .iter()
-        .map(|&v| plan.vertices[v].outline)
-        .collect();
-    let sheet = routes::RoutingPlane {
-        layers,
-        size: &room.size,
-        outline: &outline,
-        across: &across,
-        columns: &columns,
-    };
-    let boxes: Vec<Rect> = (0..layers.vertices)
-        .map(|v| Rect::around(sheet.centre(v), room.size[v]))
-        .collect();
-    let clusters = room.frames(&boxes, &across, &columns);
-    let mut routes = sheet.routes(&part.ends);
-    for (route, chain) in routes.iter_mut().zip(&layers.chains) {
+    let mut placed = routed(plan, part, &room, &across, &columns);
+    placed.crossings = ordering.crossings;
+    placed.clusters = room.frames(&placed.boxes, &across, &columns);
+    for (route, chain) in placed.routes.iter_mut().zip(&layers.chains) {
         route.label = room.label_of(chain, &across, &columns);
     }
+    placed.on_page(orientation)
+}
+
+/// The boxes and the routes of a part whose layers stand at these places, x along and y across.
+pub(crate) fn routed(
+    plan: &Plan,
+    part: &Component,
+    room: &Spacing<'_>,
+    across: &[f64],
+    columns: &[(f64, f64)],
+) -> PlacedPart {
+    let outlines = part.vertices.iter().map(|&v| plan.vertices[v].outline);
+    let plane = routes::RoutingPlane {
+        layers: room.layers,
+        size: &room.size,
+        outline: &outlines.collect::<Vec<_>>(),
+        across,
+        columns,
+    };
+    let boxes = 0..room.layers.vertices;
     PlacedPart {
-        size: Size::default(),
-        crossings: ordering.crossings,
-        boxes,
-        routes,
-        clusters,
+        boxes: boxes
+            .map(|v| Rect::around(plane.centre(v), room.size[v]))
+            .collect(),
+        routes: plane.routes(&part.ends),
+        ..PlacedPart::default()
     }
-    .on_page(orientation)
 }
 
 impl PlacedPart {
-    fn empty() -> Self {
-        Self {
-            size: Size::default(),
-            crossings: 0,
-            boxes: Vec::new(),
-            routes: Vec::new(),
-            clusters: Vec::new(),
-        }
-    }
-
     /// This block, so far with x along and y across, turned to the page and moved to (0, 0).
     pub(crate) fn on_page(self, orientation: Orientation) -> Self {
-        let reach = self
-            .routes
-            .iter()
-            .flat_map(Route::points)
-            .map(|p| Rect::new(p.x, p.y, 0.0, 0.0));
+        let reach = Rect::of_points(self.routes.iter().flat_map(Route::points));
         let rects = self.boxes.iter().chain(&self.clusters).copied();
         let whole = rects
             .chain(reach)
@@ -448,7 +440,7 @@ pub(crate) fn assembled(
         boxes: vec![Rect::default(); plan.vertices.len()],
         routes: vec![Route::default(); plan.links.len()],
         clusters: vec![Rect::default(); plan.clusters.len()],
-        remarks: Vec::new(),
+        ..Layout::default()
     };
     for ((part, block), corner) in parts.iter().zip(blocks).zip(corners) {
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {

@@ -39,6 +39,19 @@ pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
     layers
 }
 
+/// The innermost cluster around two clusters, by the one around each.
+pub(crate) fn common(parent: &[usize], mut a: usize, mut b: usize) -> usize {
+    while a != b {
+        // Parents have smaller numbers than their children.
+        if a > b {
+            a = parent[a];
+        } else {
+            b = parent[b];
+        }
+    }
+    a
+}
+
 /// The number of items that the layers would have.
 pub(crate) fn items(part: &Component, rank: &[usize]) -> usize {
     let bends = part
@@ -86,7 +99,7 @@ impl Layers {
     /// Leads an edge from its earlier end to its later one, with a bend in every layer between; returns the items it
     /// passes.
     fn chain(&mut self, from: usize, to: usize, lane: Lane) -> Vec<usize> {
-        let shared = self.shared_home(from, to);
+        let shared = common(&self.parent, self.home[from], self.home[to]);
         let mut chain = vec![from];
         for rank in self.rank[from] + 1..self.rank[to] {
             let home = match lane {
@@ -103,20 +116,6 @@ impl Layers {
         self.link(chain[chain.len() - 1], to);
         chain.push(to);
         chain
-    }
-
-    /// The innermost cluster around both.
-    fn shared_home(&self, a: usize, b: usize) -> usize {
-        let (mut a, mut b) = (self.home[a], self.home[b]);
-        while a != b {
-            // Parents have smaller numbers than their children.
-            if a > b {
-                a = self.parent[a];
-            } else {
-                b = self.parent[b];
-            }
-        }
-        a
     }
 
     /// The innermost cluster around an end, but inside `around`, that spans a layer.

@@ -14,10 +14,9 @@ use ::layout::std_shapes::shapes::{Element, ShapeKind};
 use ::layout::topo::layout::VisualGraph;
 use ::layout::topo::placer::Placer;
 
-use super::layered::{PlacedPart, assembled};
+use super::layered::{PlacedPart, assembled, routed};
 use super::layered::{acyclic, labels, order, parts, rank};
 use super::layers::{Lane, cut};
-use super::routes;
 use super::spacing::{Spacing, turned};
 use super::{
     Component, Engine, LayerItem, LayerRows, Layers, Layout, LayoutOptions, Orientation, Plan,
@@ -116,30 +115,12 @@ fn block(
         .iter()
         .map(|row| column(row, &layers, &room, &places))
         .collect();
-    let outline: Vec<_> = part
-        .vertices
-        .iter()
-        .map(|&v| plan.vertices[v].outline)
-        .collect();
-    let sheet = routes::RoutingPlane {
-        layers: &layers,
-        size: &room.size,
-        outline: &outline,
-        across: &across,
-        columns: &columns,
-    };
-    let boxes: Vec<Rect> = (0..n)
-        .map(|v| Rect::around(sheet.centre(v), room.size[v]))
-        .collect();
-    let clear = (0..n).all(|v| boxes[..v].iter().all(|other| !other.overlaps(&boxes[v])));
-    let routes = sheet.routes(&part.ends);
-    clear.then(|| {
+    let placed = routed(plan, part, &room, &across, &columns);
+    let is_clear = |(v, own): (usize, &Rect)| placed.boxes[..v].iter().all(|b| !b.overlaps(own));
+    placed.boxes.iter().enumerate().all(is_clear).then(|| {
         PlacedPart {
-            size: Size::default(),
             crossings,
-            boxes,
-            routes,
-            clusters: Vec::new(),
+            ..placed
         }
         .on_page(orientation)
     })

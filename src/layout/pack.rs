@@ -13,7 +13,7 @@ pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
             shelves(
                 sizes,
                 widest.max(ideal * (0.8 + 0.05 * f64::from(step))),
-                gap,
+                (gap, gap),
             )
         })
         .map(|(places, whole)| (fit(whole, page), places, whole))
@@ -29,19 +29,21 @@ pub(crate) fn fit(whole: Size, page: Size) -> f64 {
     (page.w / whole.w.max(1.0)).min(page.h / whole.h.max(1.0))
 }
 
-fn shelves(sizes: &[Size], width: f64, gap: f64) -> (Vec<Point>, Size) {
+/// The corners of blocks on shelves of this width, the highest blocks first, and the size of all; `gap` is the room
+/// between blocks side by side, and between shelves.
+pub(crate) fn shelves(sizes: &[Size], width: f64, gap: (f64, f64)) -> (Vec<Point>, Size) {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[b].h.total_cmp(&sizes[a].h).then(a.cmp(&b)));
     let mut places = vec![Point::default(); sizes.len()];
     let (mut x, mut y, mut shelf, mut whole) = (0.0, 0.0, 0.0_f64, Size::default());
     for i in order {
         if x > 0.0 && x + sizes[i].w > width {
-            (x, y) = (0.0, y + shelf + gap);
+            (x, y) = (0.0, y + shelf + gap.1);
             shelf = 0.0;
         }
         places[i] = Point::new(x, y);
         whole = Size::new(whole.w.max(x + sizes[i].w), whole.h.max(y + sizes[i].h));
-        x += sizes[i].w + gap;
+        x += sizes[i].w + gap.0;
         shelf = shelf.max(sizes[i].h);
     }
     (places, whole)

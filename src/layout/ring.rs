@@ -174,16 +174,12 @@ fn border(is_inside: impl Fn(f64) -> bool) -> f64 {
     outside
 }
 
-fn mixed(a: Point, b: Point, t: f64) -> Point {
-    Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t)
-}
-
 /// The two parts of a curve: up to `at`, and from there on.
 fn split(curve: &[Point; 4], at: f64) -> [[Point; 4]; 2] {
     let [a, b, c, d] = *curve;
-    let (ab, bc, cd) = (mixed(a, b, at), mixed(b, c, at), mixed(c, d, at));
-    let (abc, bcd) = (mixed(ab, bc, at), mixed(bc, cd, at));
-    let middle = mixed(abc, bcd, at);
+    let (ab, bc, cd) = (a.towards(b, at), b.towards(c, at), c.towards(d, at));
+    let (abc, bcd) = (ab.towards(bc, at), bc.towards(cd, at));
+    let middle = abc.towards(bcd, at);
     [[a, ab, abc, middle], [middle, bcd, cd, d]]
 }
 
@@ -199,8 +195,7 @@ fn part(curve: &[Point; 4], start: f64, end: f64) -> [Point; 4] {
 
 /// Everything moved so that its top left corner is (0, 0), labels included.
 fn moved_to_corner(mut layout: Layout, plan: &Plan) -> Layout {
-    let point = |p: Point| Rect::new(p.x, p.y, 0.0, 0.0);
-    let routes = layout.routes.iter().flat_map(Route::points).map(point);
+    let routes = Rect::of_points(layout.routes.iter().flat_map(Route::points));
     let all = layout
         .boxes
         .iter()

@@ -37,7 +37,7 @@ fn label_bend(plan: &Plan, layers: &Layers, chain: &[usize]) -> Option<usize> {
 
 /// The sizes of one part, seen in one orientation.
 pub(crate) struct Spacing<'a> {
-    layers: &'a Layers,
+    pub(crate) layers: &'a Layers,
     orientation: Orientation,
     /// The size of each vertex.
     pub(crate) size: Vec<Size>,

@@ -127,7 +127,7 @@ pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
         view: view(mission, &drawing.view).0,
         options: drawing.view.clone(),
         page: drawing.page.clone(),
-        layout: Layout::empty(),
+        layout: Layout::default(),
         notices: Notices::new(),
     }
 }
@@ -138,7 +138,7 @@ pub(super) fn unseen(drawing: &Drawing) -> Composed {
         view: View::default(),
         options: drawing.view.clone(),
         page: drawing.page.clone(),
-        layout: Layout::empty(),
+        layout: Layout::default(),
         notices: Notices::new(),
     }
 }

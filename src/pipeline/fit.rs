@@ -360,7 +360,7 @@ impl Fitting<'_> {
             view: self.best.view,
             options: self.options,
             page: self.page,
-            layout: self.best.layout.unwrap_or_else(Layout::empty),
+            layout: self.best.layout.unwrap_or_default(),
             notices,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::visible;
-use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text};
+use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 use crate::mission::EntryId;
@@ -225,13 +225,13 @@ impl<'a> PaperCanvas<'a> {
 
     /// Draws a filled rectangle.
     pub(crate) fn fill(&mut self, rect: Rect, color: Color) {
-        let form = Form::Rect(self.scaled(rect), 0.0);
+        let form = Form::Rect(rect.scaled(self.scale), 0.0);
         self.shape(Shape::filled(form, color));
     }
 
     /// Draws a rectangle with round corners, a line around and a filling.
     pub(crate) fn frame(&mut self, rect: Rect, radius: f64, fill: Color, stroke: &Stroke) {
-        let form = Form::Rect(self.scaled(rect), radius * self.scale);
+        let form = Form::Rect(rect.scaled(self.scale), radius * self.scale);
         let stroke = stroke.scaled(self.scale);
         self.shape(Shape { form, fill, stroke });
     }
@@ -239,7 +239,7 @@ impl<'a> PaperCanvas<'a> {
     /// Draws a disc with a line around.
     pub(crate) fn disc(&mut self, at: Point, radius: f64, fill: Color, stroke: &Stroke) {
         let rect = Rect::around(at, Size::new(2.0 * radius, 2.0 * radius));
-        let form = Form::Ellipse(self.scaled(rect));
+        let form = Form::Ellipse(rect.scaled(self.scale));
         let stroke = stroke.scaled(self.scale);
         self.shape(Shape { form, fill, stroke });
     }
@@ -251,22 +251,17 @@ impl<'a> PaperCanvas<'a> {
 
     /// Draws a closed shape without a line around.
     pub(crate) fn polygon(&mut self, points: &[Point], color: Color) {
-        let first = points.iter().take(1).map(|p| Step::Move(*p));
-        let rest = points.iter().skip(1).map(|p| Step::Line(*p));
-        let steps: Vec<Step> = first.chain(rest).chain([Step::Close]).collect();
-        self.path(&steps, color, &Stroke::default());
+        let points = points
+            .iter()
+            .map(|p| Point::new(p.x * self.scale, p.y * self.scale));
+        let form = polygon(&points.collect::<Vec<_>>());
+        self.shape(Shape::filled(form, color));
     }
 
     /// Draws a path.
     pub(crate) fn path(&mut self, steps: &[Step], fill: Color, stroke: &Stroke) {
-        let at = |p: &Point| Point::new(p.x * self.scale, p.y * self.scale);
-        let step = |step: &Step| match step {
-            Step::Move(p) => Step::Move(at(p)),
-            Step::Line(p) => Step::Line(at(p)),
-            Step::Curve([a, b, c]) => Step::Curve([at(a), at(b), at(c)]),
-            Step::Close => Step::Close,
-        };
-        let form = Form::Path(steps.iter().map(step).collect());
+        let at = |p: Point| Point::new(p.x * self.scale, p.y * self.scale);
+        let form = Form::Path(steps.iter().map(|step| step.mapped(at)).collect());
         let stroke = stroke.scaled(self.scale);
         self.shape(Shape { form, fill, stroke });
     }
@@ -274,7 +269,7 @@ impl<'a> PaperCanvas<'a> {
     /// Draws a filled head of an arrow that ends at `tip`, coming from `from`.
     pub(crate) fn head(&mut self, from: Point, tip: Point, length: f64, color: Color) {
         let (dx, dy) = (tip.x - from.x, tip.y - from.y);
-        let far = libm::hypot(dx, dy).max(1e-9);
+        let far = tip.distance(from).max(1e-9);
         let (dx, dy) = (dx / far * length, dy / far * length);
         let base = Point::new(tip.x - dx, tip.y - dy);
         let side = |by: f64| Point::new(base.x - dy * by, base.y + dx * by);
@@ -285,11 +280,6 @@ impl<'a> PaperCanvas<'a> {
         if let Some(group) = self.group() {
             group.shape(shape);
         }
-    }
-
-    fn scaled(&self, r: Rect) -> Rect {
-        let by = self.scale;
-        Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
     }
 
     /// The groups, for a page that the caller makes.

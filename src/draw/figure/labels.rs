@@ -151,7 +151,7 @@ fn stations() -> impl Iterator<Item = (f64, f64)> {
 fn along(points: &[Point], part: f64) -> Option<(Point, Point)> {
     let mut left = length(points) * part;
     for pair in points.windows(2) {
-        let long = distance(pair[0], pair[1]);
+        let long = pair[0].distance(pair[1]);
         if long >= left && long > 0.0 {
             let (dx, dy) = (
                 (pair[1].x - pair[0].x) / long,
@@ -178,10 +178,6 @@ fn crosses(points: &[Point], rect: &Rect) -> bool {
     })
 }
 
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(a.x - b.x, a.y - b.y)
-}
-
 fn length(points: &[Point]) -> f64 {
-    points.windows(2).map(|w| distance(w[0], w[1])).sum()
+    points.windows(2).map(|w| w[0].distance(w[1])).sum()
 }

@@ -32,20 +32,32 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
             (3.2, bar),
             "sends (height: share of the row’s most)",
         ),
-        (silent, (3.2, thin), "silent"),
+        (silent, (3.2, |c, x, y| line(c, x, y, &[])), "silent"),
         (
             all_lives().any(|l| l.is_inferred),
-            (3.2, dashed),
+            (3.2, |c, x, y| line(c, x, y, &[0.55, 0.5])),
             "alive by inference",
         ),
-        (has(Sign::Start), (0.6, tick), "starts"),
-        (has(Sign::End), (1.2, end), "ends"),
+        (
+            has(Sign::Start),
+            (0.6, |c, x, y| start(c, x + 0.3, y)),
+            "starts",
+        ),
+        (
+            has(Sign::End),
+            (1.2, |c, x, y| cross(c, x + 0.6, y)),
+            "ends",
+        ),
         (
             !lives.marks.handovers.is_empty(),
             (3.2, arrow),
             "topic changes hands",
         ),
-        (has(Sign::Dot), (1.0, circle), "changes otherwise"),
+        (
+            has(Sign::Dot),
+            (1.0, |c, x, y| dot(c, x + 0.5, y)),
+            "changes otherwise",
+        ),
     ];
     let drawn = all.into_iter().filter(|(is, ..)| *is);
     let item = |(_, sign, words): (bool, InlineSign, &str)| {
@@ -60,30 +72,9 @@ fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.fill(Rect::new(x + 1.6, y - 0.4, 1.6, 0.8), ink::BAR);
 }
 
-fn thin(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let stroke = Stroke::solid(ink::LINE, 0.28);
+fn line(canvas: &mut PaperCanvas<'_>, x: f64, y: f64, dash: &[f64]) {
+    let stroke = Stroke::dashed(ink::LINE, 0.28, dash);
     canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
-}
-
-fn dashed(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let stroke = Stroke {
-        color: ink::LINE,
-        width: 0.28,
-        dash: vec![0.55, 0.5],
-    };
-    canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
-}
-
-fn tick(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    start(canvas, x + 0.3, y);
-}
-
-fn end(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    cross(canvas, x + 0.6, y);
-}
-
-fn circle(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    dot(canvas, x + 0.5, y);
 }
 
 fn arrow(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {

@@ -162,11 +162,7 @@ impl<'a> LivesFigure<'a> {
             }
             for phase in &phases[1..] {
                 let x = place.axis.x(phase.span.start);
-                let dashed = Stroke {
-                    color: ink::RULE,
-                    width: HAIRLINE,
-                    dash: vec![0.7, 0.6],
-                };
+                let dashed = Stroke::dashed(ink::RULE, HAIRLINE, &[0.7, 0.6]);
                 let from = Point::new(x, place.top + band::HEIGHT);
                 canvas.line(from, Point::new(x, bottom), &dashed);
             }
@@ -360,16 +356,8 @@ fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) 
 }
 
 fn thin(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, life: &TrackLife) {
-    let dash = if life.is_inferred {
-        vec![0.55, 0.5]
-    } else {
-        Vec::new()
-    };
-    let stroke = Stroke {
-        color: ink::LINE,
-        width: 0.28,
-        dash,
-    };
+    let dash: &[f64] = if life.is_inferred { &[0.55, 0.5] } else { &[] };
+    let stroke = Stroke::dashed(ink::LINE, 0.28, dash);
     let (from, to) = (place.axis.x(life.span.start), place.axis.x(life.span.end));
     canvas.line(Point::new(from, y), Point::new(to, y), &stroke);
 }

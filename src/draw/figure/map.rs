@@ -10,7 +10,7 @@ use super::groups::{NodeGroup, depths, groups, phases_of};
 use super::marks::Marks;
 use super::notes::{flow, sentence};
 use super::page::{FITTING, FigureSheet, TOLD, filter_that_fits, nothing};
-use super::place::{PlacedPanel, place, rooms};
+use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
 use super::{MOST_HEIGHT, RowKind};
@@ -19,7 +19,7 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
-use crate::layout::{Cluster, Link, Outline, Plan, Vertex, engine};
+use crate::layout::{Cluster, Outline, Plan, Vertex};
 
 /// The height of a map of nodes, in millimetres, from which on groups are drawn instead where these fit.
 const HIGH: f64 = 130.0;
@@ -325,11 +325,6 @@ fn finished(
     (looks, vertices, spaces, talks): (Vec<MapBox>, Vec<Vertex>, Vec<String>, Vec<Talk>),
     most: usize,
 ) -> Option<MapDrawing> {
-    let link = |t: &Talk| Link {
-        from: t.from,
-        to: t.to,
-        label: None,
-    };
     let title = |name: &String| Cluster {
         parent: None,
         title: Size::new(canvas.width(name, Type::Head), canvas.cap(Type::Head) + 0.9),
@@ -337,15 +332,13 @@ fn finished(
     };
     let plan = Plan {
         vertices,
-        links: talks.iter().map(link).collect(),
+        links: talks.iter().map(Talk::link).collect(),
         clusters: spaces.iter().map(title).collect(),
         ..Plan::default()
     };
     let labels: Vec<Vec<Vec<String>>> =
         talks.iter().map(|t| t.labels(sheet.source, most)).collect();
-    let rooms: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
-    let engine = engine("layered").ok()?;
-    let placed = place(&plan, &rooms, sheet.options.width_mm - 0.4, engine)?;
+    let placed = place(canvas, &plan, &labels, sheet.options.width_mm - 0.4)?;
     let aside = (sheet.options.width_mm - placed.size.w) / 2.0;
     Some(MapDrawing {
         looks,
@@ -423,9 +416,8 @@ fn paint(
     }
     canvas.begin("arrows");
     for (at, talk) in drawn.talks.iter().enumerate() {
-        let width = (0.14 + 0.12 * libm::log10(1.0 + talk.hz())).max(HAIRLINE);
         let dash: &[f64] = if talk.is_inferred { &[0.9, 0.6] } else { &[] };
-        placed.arrow(canvas, at, ink::LINE, width, dash);
+        placed.arrow(canvas, at, ink::LINE, talk.pen(), dash);
     }
     canvas.begin("topics");
     for (at, lines) in drawn.labels.iter().enumerate() {
@@ -461,11 +453,7 @@ fn pill(canvas: &mut PaperCanvas<'_>, rect: Rect, name: &str, phases: &str) {
 }
 
 fn list(canvas: &mut PaperCanvas<'_>, rect: Rect, all: &[(String, String)]) {
-    let stroke = Stroke {
-        color: ink::RULE,
-        width: HAIRLINE,
-        dash: vec![0.7, 0.6],
-    };
+    let stroke = Stroke::dashed(ink::RULE, HAIRLINE, &[0.7, 0.6]);
     canvas.frame(rect, 0.4, ink::PAPER, &stroke);
     let line = canvas.sizes.pitch() * 0.9;
     for (k, (name, phases)) in all.iter().enumerate() {

@@ -69,7 +69,7 @@ pub(crate) struct Panel {
     pub(crate) looks: Vec<PanelBox>,
     pub(crate) talks: Vec<(Talk, Fate)>,
     pub(crate) labels: Vec<Vec<Vec<String>>>,
-    pub(crate) placed: Option<PlacedPanel>,
+    pub(crate) placed: PlacedPanel,
     pub(crate) notes: Vec<(Color, String)>,
     pub(crate) height: f64,
     /// The height of the notes in millimetres.
@@ -124,9 +124,9 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
     canvas.text(x + at, y, Type::Name, ink::TEXT, &words);
     let top = rect.bottom() - INSIDE * 0.8 - panel.foot + 0.3;
     flow_at(canvas, Point::new(x, top), width, &items(&panel.notes));
-    let Some(placed) = &panel.placed else { return };
-    let aside = x + 0.4 + ((width - 1.2 - placed.size.w) / 2.0).max(0.0);
-    let placed = placed
+    let aside = x + 0.4 + ((width - 1.2 - panel.placed.size.w) / 2.0).max(0.0);
+    let placed = panel
+        .placed
         .clone()
         .moved(aside, rect.y + INSIDE * 0.8 + canvas.sizes.pitch() + 0.6);
     for (at, (talk, fate)) in panel.talks.iter().enumerate() {
@@ -140,8 +140,7 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
         } else {
             &[]
         };
-        let width = (0.14 + 0.12 * libm::log10(1.0 + talk.hz())).max(HAIRLINE);
-        placed.arrow(canvas, at, color, width, dash);
+        placed.arrow(canvas, at, color, talk.pen(), dash);
     }
     for (at, lines) in panel.labels.iter().enumerate() {
         placed.label(canvas, at, lines);
@@ -154,13 +153,12 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
 
 fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     let (fill, color, dash, width) = match look.fate {
-        Fate::Began => (ink::ADDED_FILL, ink::ADDED, Vec::new(), 0.38),
-        Fate::Ended => (ink::PAPER, ink::REMOVED, vec![1.1, 0.7], 0.38),
-        Fate::ChangedHands => (ink::CHANGED_FILL, ink::CHANGED, Vec::new(), 0.3),
-        Fate::Neighbour => (ink::TINT, ink::RULE, Vec::new(), HAIRLINE),
+        Fate::Began => (ink::ADDED_FILL, ink::ADDED, &[][..], 0.38),
+        Fate::Ended => (ink::PAPER, ink::REMOVED, &[1.1, 0.7][..], 0.38),
+        Fate::ChangedHands => (ink::CHANGED_FILL, ink::CHANGED, &[][..], 0.3),
+        Fate::Neighbour => (ink::TINT, ink::RULE, &[][..], HAIRLINE),
     };
-    let stroke = Stroke { color, width, dash };
-    canvas.frame(rect, 0.6, fill, &stroke);
+    canvas.frame(rect, 0.6, fill, &Stroke::dashed(color, width, dash));
     if look.fate == Fate::ChangedHands {
         // A double frame, to be distinguishable in grey print.
         let inner = Stroke::solid(ink::CHANGED, HAIRLINE);

@@ -3,11 +3,13 @@
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::labels::{self, Room, Spot};
-use super::parts::{MapPart, PARTED, parts, shelves};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
-use crate::layout::{Engine, Layout, LayoutOptions, Orientation, Plan, Route, lay_out};
+use crate::layout::{
+    Component, Engine, Layout, LayoutOptions, Orientation, Plan, Route, engine, lay_out, parts,
+    shelves,
+};
 
 /// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
 /// tightest comes first: where it is too wide, all are.
@@ -19,6 +21,8 @@ const HOPELESS: f64 = 1.25;
 const SHORTEST: f64 = 3.4;
 /// The height of the page that the engine is to fill, in widths: low.
 const ASPECT: f64 = 0.45;
+/// The room between parts in millimetres: side by side, and between shelves.
+const PARTED: (f64, f64) = (3.0, 3.0 * 0.7);
 /// The number of pieces in which a curve is measured.
 const PIECES: u32 = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
@@ -40,16 +44,21 @@ pub(crate) struct PlacedPanel {
 /// are wider. Parts without links between them are laid out each by itself and put side by side. `labels` holds, per
 /// link, the sizes of the texts that may be written on it, the best first.
 pub(crate) fn place(
+    canvas: &PaperCanvas<'_>,
     plan: &Plan,
-    labels: &[Vec<Size>],
+    labels: &[Vec<Vec<String>>],
     width: f64,
-    engine: &Searcher,
 ) -> Option<PlacedPanel> {
+    let labels: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
+    let engine = engine("layered").ok()?;
     let wanted = labels.iter().filter(|l| !l.is_empty()).count();
     let parts = parts(plan);
     let tried: Vec<Vec<PlacedPanel>> = parts
         .iter()
-        .map(|part| candidates(&part.plan(plan), &part.labels(labels), width, engine))
+        .map(|part| {
+            let own = part.links.iter().map(|at| labels[*at].clone());
+            candidates(&part.plan(plan), &own.collect::<Vec<_>>(), width, engine)
+        })
         .collect();
     let mut best: Option<Arrangement> = None;
     for chosen in choices(&tried, width)? {
@@ -58,7 +67,7 @@ pub(crate) fn place(
             .zip(&tried)
             .map(|(at, all)| all[*at].size)
             .collect();
-        let (corners, size) = shelves(&sizes, width);
+        let (corners, size) = shelves(&sizes, width, PARTED);
         let parts = || chosen.iter().zip(&tried).map(|(at, all)| &all[*at]);
         let lost: usize = parts().map(|p| p.left_out).sum();
         let excess = lost.saturating_sub(wanted / TENTH);
@@ -100,7 +109,7 @@ fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
     };
     let mut ways = Vec::new();
     for at in 0..tried[largest].len() {
-        let beside = width - tried[largest][at].size.w - PARTED;
+        let beside = width - tried[largest][at].size.w - PARTED.0;
         for most in [beside, width] {
             let way = tried.iter().enumerate().map(|(part, all)| {
                 if part == largest {
@@ -200,10 +209,10 @@ fn tightened(
 fn scaled(plan: &Plan, by: f64) -> Plan {
     let mut plan = plan.clone();
     for vertex in &mut plan.vertices {
-        vertex.size = Size::new(vertex.size.w * by, vertex.size.h * by);
+        vertex.size = vertex.size.scaled(by);
     }
     for cluster in &mut plan.clusters {
-        cluster.title = Size::new(cluster.title.w * by, cluster.title.h * by);
+        cluster.title = cluster.title.scaled(by);
     }
     plan
 }
@@ -235,7 +244,7 @@ impl PlacedPanel {
     }
 
     /// Adds the places of a part.
-    fn take(&mut self, part: &MapPart, placed: Self) {
+    fn take(&mut self, part: &Component, placed: Self) {
         for (at, rect) in part.vertices.iter().zip(placed.boxes) {
             self.boxes[*at] = rect;
         }
@@ -275,16 +284,18 @@ impl PlacedPanel {
             .routes
             .iter()
             .map(|route| Route {
-                start: point(route.start),
-                curves: route.curves.iter().map(|c| c.map(point)).collect(),
                 label: None,
+                ..route.mapped(point)
             })
             .collect();
         let mut placed = Self {
             size: Size::new(layout.size.w / tightness, layout.size.h / tightness),
             boxes: layout.boxes.iter().map(rect).collect(),
             clusters: layout.clusters.iter().map(rect).collect(),
-            routes: curves.iter().map(sampled).collect(),
+            routes: curves
+                .iter()
+                .map(|route| polyline(route.start, &route.curves, PIECES))
+                .collect(),
             curves,
             labels: vec![None; labels.len()],
             left_out: 0,
@@ -333,23 +344,16 @@ impl PlacedPanel {
 
     /// The drawing moved by `dx`, `dy`.
     pub(crate) fn moved(mut self, dx: f64, dy: f64) -> Self {
-        let point = |p: Point| Point::new(p.x + dx, p.y + dy);
+        let by = Point::new(dx, dy);
         for rect in self.boxes.iter_mut().chain(&mut self.clusters) {
-            (rect.x, rect.y) = (rect.x + dx, rect.y + dy);
+            *rect = rect.moved(by);
         }
         for route in &mut self.curves {
-            route.start = point(route.start);
-            for curve in &mut route.curves {
-                *curve = curve.map(point);
-            }
+            *route = route.moved(by);
         }
-        for route in &mut self.routes {
-            for p in route {
-                *p = point(*p);
-            }
-        }
-        for (label, _) in self.labels.iter_mut().flatten() {
-            *label = point(*label);
+        let labels = self.labels.iter_mut().flatten().map(|(label, _)| label);
+        for p in self.routes.iter_mut().flatten().chain(labels) {
+            (p.x, p.y) = (p.x + dx, p.y + dy);
         }
         self
     }
@@ -366,17 +370,13 @@ impl PlacedPanel {
         let Some(route) = self.curves.get(at).filter(|r| !r.curves.is_empty()) else {
             return;
         };
-        let stroke = Stroke {
-            color,
-            width,
-            dash: dash.to_vec(),
-        };
+        let stroke = Stroke::dashed(color, width, dash);
         let mut steps = vec![Step::Move(route.start)];
         steps.extend(route.curves.iter().map(|c| Step::Curve(*c)));
         canvas.path(&steps, Color::NONE, &stroke);
         let points = &self.routes[at];
         if let Some(tip) = points.last() {
-            let behind = points.iter().rev().find(|p| distance(**p, *tip) > 0.8);
+            let behind = points.iter().rev().find(|p| p.distance(*tip) > 0.8);
             canvas.head(*behind.unwrap_or(&route.start), *tip, 1.2 + width, color);
         }
     }
@@ -402,19 +402,11 @@ impl PlacedPanel {
 }
 
 /// The room that each alternative of a label takes.
-pub(crate) fn rooms(canvas: &PaperCanvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
+fn rooms(canvas: &PaperCanvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
     let room = |lines: &Vec<String>| {
         let widths = lines.iter().map(|l| canvas.width(l, Type::Small));
         let widest = widths.fold(0.0, f64::max);
         Size::new(widest + 0.3, canvas.sizes.line() * lines.len() as f64)
     };
     alternatives.iter().map(room).collect()
-}
-
-fn sampled(route: &Route) -> Vec<Point> {
-    polyline(route.start, &route.curves, PIECES)
-}
-
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(a.x - b.x, a.y - b.y)
 }

@@ -15,7 +15,7 @@ use super::marks::{Marks, Sign};
 use super::notes::{Unbroken, flow, sentence};
 use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
 use super::panel::{Fate, INSIDE, Panel, PanelBox, items, paint};
-use super::place::{PlacedPanel, place, rooms};
+use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
 use super::{MOST_HEIGHT, RowKind};
@@ -24,7 +24,7 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::Scene;
-use crate::layout::{Link, Outline, Plan, Vertex, engine};
+use crate::layout::{Outline, Plan, Vertex};
 use crate::mission::EntryId;
 use crate::mission::phases::{Configuration, configurations};
 
@@ -215,45 +215,52 @@ impl<'s> StepSource<'s> {
                 look
             })
             .collect();
-        let phase = &source.phases[k];
-        let at = clock(phase.span.start.since(source.span().start));
-        let mut notes = Vec::new();
-        for (topic, from, to, _) in &handed {
-            let text = format!(
-                "{}: {} → {}",
-                last_part(source.topic(*topic)),
-                last_part(from),
-                last_part(to)
-            );
-            notes.push((ink::CHANGED, text));
-        }
         let drawn: BTreeSet<usize> = boxes.iter().flat_map(|(_, m)| m.iter().copied()).collect();
         let there = before.union(after).filter_map(place_of);
         let undrawn = there.filter(|at| !drawn.contains(at)).count();
         let labels: Vec<Vec<Vec<String>>> =
             talks.iter().map(|(t, _)| t.labels(source, 1)).collect();
         let placed = self.placed(&canvas, &looks, &talks, &labels)?;
+        let mut panel = Panel {
+            home: home.map_or_else(String::new, |space| format!("in {space}")),
+            undrawn,
+            ..self.drawn(k, format!("{k} → {}", k + 1), looks, placed)
+        };
+        (panel.talks, panel.labels) = (talks, labels);
+        panel.entries.sort_unstable();
+        panel.entries.dedup();
+        Some(panel)
+    }
+
+    /// The panel of phase `k` under a number, with these boxes at their places, and without arrows.
+    fn drawn(&self, k: usize, number: String, looks: Vec<PanelBox>, placed: PlacedPanel) -> Panel {
+        let source = self.sheet.source;
+        let handed = if k > 0 { self.handed(k) } else { Vec::new() };
+        let mut entries: Vec<EntryId> = looks.iter().flat_map(|l| &l.entries).copied().collect();
+        entries.extend(handed.iter().map(|h| h.3));
+        let notes: Vec<_> = handed
+            .iter()
+            .map(|(topic, from, to, _)| {
+                let [topic, from, to] = [source.topic(*topic), from, to].map(last_part);
+                (ink::CHANGED, format!("{topic}: {from} → {to}"))
+            })
+            .collect();
         let inside = self.panel_width() - 2.0 * INSIDE;
         let foot = flow(&mut self.sheet.canvas(), inside, 0.0, &items(&notes));
-        let heading = (
-            format!("{k} → {}", k + 1),
-            format!("{at} {}", title(source, k)),
-        );
-        let entries = looks.iter().flat_map(|look| &look.entries).copied();
-        let entries: BTreeSet<EntryId> = entries.chain(handed.iter().map(|h| h.3)).collect();
-        Some(Panel {
-            entries: entries.into_iter().collect(),
-            heading,
-            home: home.map_or_else(String::new, |space| format!("in {space}")),
+        let start = source.phases[k].span.start.since(source.span().start);
+        Panel {
+            entries,
+            heading: (number, format!("{} {}", clock(start), title(source, k))),
+            home: String::new(),
             looks,
-            talks,
-            labels,
-            height: INSIDE * 1.6 + canvas.sizes.pitch() + 0.6 + placed.size.h + 0.8 + foot,
+            talks: Vec::new(),
+            labels: Vec::new(),
+            height: INSIDE * 1.6 + self.sheet.sizes.pitch() + 0.6 + placed.size.h + 0.8 + foot,
             foot,
-            undrawn,
-            placed: Some(placed),
+            undrawn: 0,
+            placed,
             notes,
-        })
+        }
     }
 
     /// The changed nodes: one by one if they are few, else by groups.
@@ -431,21 +438,14 @@ impl<'s> StepSource<'s> {
             outline: Outline::Box,
             cluster: None,
         };
-        let link = |(talk, _): &(Talk, Fate)| Link {
-            from: talk.from,
-            to: talk.to,
-            label: None,
-        };
         let plan = Plan {
             vertices: looks.iter().map(vertex).collect(),
-            links: talks.iter().map(link).collect(),
-            clusters: Vec::new(),
+            links: talks.iter().map(|(talk, _)| talk.link()).collect(),
             ..Plan::default()
         };
-        let rooms: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
         // Badges stand out of their boxes.
         let width = self.panel_width() - 2.0 * INSIDE - 1.6;
-        place(&plan, &rooms, width, engine("layered").ok()?)
+        place(canvas, &plan, labels, width)
     }
 
     /// All panels in rows, in order of time, and notes of what repeats and what is left out.
@@ -473,11 +473,7 @@ impl<'s> StepSource<'s> {
             let text = "+ solid: began. − dashed: ended. Double: a topic was taken over. Thin: who is linked to them.";
             items.push(sentence(ink::QUIET, text));
         }
-        let lost: usize = panels
-            .iter()
-            .filter_map(|p| p.placed.as_ref())
-            .map(|p| p.left_out)
-            .sum();
+        let lost: usize = panels.iter().map(|p| p.placed.left_out).sum();
         if lost > 0 {
             let text = format!("{} left out.", words::count(lost, "topic name"));
             items.push(sentence(ink::QUIET, text));

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::canvas::HAIRLINE;
 use super::source::FigureSource;
 use super::tracks::{Steps, Track, mean};
 use crate::base::name::last_part;
@@ -9,6 +10,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, TopicId};
+use crate::layout::Link;
 
 /// All topics from one box to another.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,9 +24,19 @@ pub(crate) struct Talk {
 }
 
 impl Talk {
-    /// The rate of all topics.
-    pub(crate) fn hz(&self) -> f64 {
-        self.topics.iter().map(|(_, hz)| hz).sum()
+    /// The width of its line in millimetres, by the rate of all topics.
+    pub(crate) fn pen(&self) -> f64 {
+        let hz: f64 = self.topics.iter().map(|(_, hz)| hz).sum();
+        (0.14 + 0.12 * libm::log10(1.0 + hz)).max(HAIRLINE)
+    }
+
+    /// Its arrow without the label, which is placed afterwards.
+    pub(crate) fn link(&self) -> Link {
+        Link {
+            from: self.from,
+            to: self.to,
+            label: None,
+        }
     }
 
     /// The texts that a label may have, the best first, each as lines: the fastest `most` topics and the number of the

@@ -7,6 +7,8 @@ mod names;
 mod plain;
 mod rqt;
 
+use std::fmt::Write as _;
+
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::Style;
@@ -15,7 +17,7 @@ use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{ItemKind, Mark, SeenWindow, Showing, Shown, View};
+use crate::view::{Arrow, Item, ItemKind, Mark, SeenWindow, Showing, Shown, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -25,6 +27,11 @@ const SLACK: f64 = 1.15;
 const HEIGHT: f64 = 36.0;
 /// The height of a line of text.
 const LINE: f64 = 15.0;
+
+/// What a profile writes behind the bracket of a namespace, given by its place and the indent; and between those of an
+/// item.
+type SpaceText<'a> = &'a dyn Fn(usize, &str) -> String;
+type ItemText<'a> = &'a dyn Fn(usize, &Item, &Shown) -> String;
 
 /// A view with the parts that every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
 #[derive(Clone, Debug)]
@@ -80,6 +87,35 @@ impl<'a> DotView<'a> {
         words.join(" ")
     }
 
+    /// Writes the namespaces and items that stand directly in a namespace, given by its place, with the attributes that a
+    /// profile has for them. Namespaces nest 16 deep at most.
+    fn members(
+        &self,
+        out: &mut String,
+        seen: &SeenWindow,
+        (home, inhabited, indent): (Option<usize>, &[bool], &str),
+        profile: (SpaceText<'_>, ItemText<'_>),
+    ) {
+        for (at, space) in self.view.namespaces.iter().enumerate() {
+            if space.parent != home || !inhabited[at] {
+                continue;
+            }
+            let (id, text) = (&self.ids.namespaces[at], profile.0(at, indent));
+            let _ = writeln!(out, "{indent}subgraph {id} {{{text}");
+            let inside = (Some(at), inhabited, &*format!("{indent} "));
+            self.members(out, seen, inside, profile);
+            let _ = writeln!(out, "{indent}}}");
+        }
+        for shown in &seen.items {
+            let at = shown.id as usize;
+            let item = self.view.items.get(at);
+            if let Some(item) = item.filter(|item| item.cluster == home) {
+                let (id, text) = (&self.ids.items[at], profile.1(at, item, shown));
+                let _ = writeln!(out, "{indent}{id} [{text}];");
+            }
+        }
+    }
+
     /// The namespaces that hold an item that is seen, by place.
     fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let mut inhabited = vec![false; self.view.namespaces.len()];
@@ -114,6 +150,14 @@ fn line(shown: &Shown) -> &'static str {
         (Some(Mark::Removed), ..) | (_, Degree::Inferred, _) => "dashed",
         (_, Degree::Declared, _) | (.., State::Silent | State::Declared) => "dotted",
         _ => "solid",
+    }
+}
+
+/// The label of an arrow in a window, lines parted by a newline: the topic between two nodes, and the rate.
+fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
+    match (arrow.carries(shown), rate(shown)) {
+        (Some(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
+        (topic, rate) => topic.or(rate),
     }
 }
 
@@ -152,7 +196,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
     let mut widest: Vec<Option<f64>> = vec![None; view.arrows.len()];
     for shown in view.arrows_shown.iter().flat_map(Showing::looks) {
         let arrow = view.arrows.get(shown.id as usize);
-        let label = arrow.and_then(|arrow| rqt::label(arrow, shown));
+        let label = arrow.and_then(|arrow| label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.id as usize)) {
             let lines = label.lines().map(width).fold(0.0, f64::max);
             *most = Some(most.unwrap_or(0.0).max(lines));

@@ -15,7 +15,7 @@ use krilla::text::{Font, GlyphId, KrillaGlyph};
 use krilla::{Document, SerializeSettings};
 
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{self, Anchor, Form, Group, Piece, Scene, Shape, Step, Text};
+use crate::draw::scene::{self, Form, Group, Piece, Scene, Shape, Step, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Fonts;
 
@@ -175,12 +175,7 @@ impl PdfPen<'_> {
 
     fn text(&self, surface: &mut Surface<'_>, text: &Text) {
         let width = self.fonts.width(&text.text, text.size, text.weight);
-        let back = match text.anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => width / 2.0,
-            Anchor::End => width,
-        };
-        let start = Point::new(text.at.x - back, text.at.y);
+        let start = Point::new(text.at.x - text.anchor.before(width), text.at.y);
         if let Some((color, width)) = text.halo {
             // As an outline, so that the words are found once and not twice.
             surface.set_fill(None);

@@ -142,14 +142,13 @@ struct PathSteps<'a>(&'a [Step]);
 impl Display for PathSteps<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for step in self.0 {
-            let (letter, points) = match step {
-                Step::Move(p) => ("M", std::slice::from_ref(p)),
-                Step::Line(p) => ("L", std::slice::from_ref(p)),
-                Step::Curve(points) => ("C", points.as_slice()),
-                Step::Close => ("Z", [].as_slice()),
-            };
-            f.write_str(letter)?;
-            for (at, p) in points.iter().enumerate() {
+            f.write_str(match step {
+                Step::Move(_) => "M",
+                Step::Line(_) => "L",
+                Step::Curve(_) => "C",
+                Step::Close => "Z",
+            })?;
+            for (at, p) in step.points().iter().enumerate() {
                 let gap = if at > 0 { " " } else { "" };
                 write!(f, "{gap}{} {}", tenth(p.x), tenth(p.y))?;
             }

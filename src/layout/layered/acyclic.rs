@@ -3,6 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::rank::neighbours;
+
 /// The edges to reverse when each edge in turn is reversed if and only if it closes a cycle with those before it.
 pub(crate) fn in_order(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let mut after: Vec<Vec<usize>> = vec![Vec::new(); n];
@@ -88,11 +90,7 @@ pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
 }
 
 fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
-    let (mut after, mut before) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-    for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
-        after[from].push(to);
-        before[to].push(from);
-    }
+    let (before, after) = neighbours(n, edges);
     let mut outgoing: Vec<usize> = after.iter().map(Vec::len).collect();
     let mut incoming: Vec<usize> = before.iter().map(Vec::len).collect();
     let (mut first, mut last) = (Vec::new(), Vec::new());

@@ -1,6 +1,8 @@
 //! Folds crowded layers: where few subscribers are known, most nodes would stand in one layer and most topics in the
 //! next; sources move to later layers, more of them if that suits the page.
 
+use super::rank::neighbours;
+
 /// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
 ///
 /// A source is a vertex without predecessors; it may move as far back as its longest path allows. `home` is the cluster
@@ -72,11 +74,7 @@ struct Adjacency {
 impl Adjacency {
     fn new(rank: &[usize], edges: &[(usize, usize)]) -> Self {
         let n = rank.len();
-        let (mut before, mut after) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-        for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
-            after[from].push(to);
-            before[to].push(from);
-        }
+        let (before, after) = neighbours(n, edges);
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by_key(|&v| (rank[v], v));
         let mut depth = vec![0; n];

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Rect, Size, on_cubic};
 use crate::layout::{Layout, Plan, Route};
 
 /// The places at which a label is tried, as parts of the edge's length, best first.
@@ -90,15 +90,6 @@ pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
     }
 }
 
-fn between(a: Point, b: Point) -> Rect {
-    Rect::new(
-        a.x.min(b.x),
-        a.y.min(b.y),
-        (a.x - b.x).abs(),
-        (a.y - b.y).abs(),
-    )
-}
-
 /// A route as a chain of short straight pieces.
 struct Segments {
     points: Vec<Point>,
@@ -121,7 +112,7 @@ impl Segments {
         let mut at = vec![0.0];
         for piece in points.windows(2) {
             let last = at[at.len() - 1];
-            at.push(last + libm::hypot(piece[1].x - piece[0].x, piece[1].y - piece[0].y));
+            at.push(last + piece[0].distance(piece[1]));
         }
         Self { points, at }
     }
@@ -139,8 +130,7 @@ impl Segments {
             .position(|pair| pair[0] <= goal && goal <= pair[1] && pair[0] < pair[1])?;
         let (a, b) = (self.points[i], self.points[i + 1]);
         let t = (goal - self.at[i]) / (self.at[i + 1] - self.at[i]);
-        let point = Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t);
-        Some((point, (b.x - a.x).abs() > (b.y - a.y).abs()))
+        Some((a.towards(b, t), (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
     /// The best middle for a label of this size, if any is free; a strict one is on no other edge.
@@ -189,23 +179,6 @@ impl Segments {
     }
 }
 
-/// The point at `t` of a cubic, by its four points.
-fn on_cubic(points: [Point; 4], t: f64) -> Point {
-    let rest = 1.0 - t;
-    let weights = [
-        rest * rest * rest,
-        3.0 * rest * rest * t,
-        3.0 * rest * t * t,
-        t * t * t,
-    ];
-    points
-        .iter()
-        .zip(weights)
-        .fold(Point::default(), |sum, (point, weight)| {
-            Point::new(sum.x + weight * point.x, sum.y + weight * point.y)
-        })
-}
-
 /// Rectangles with a number each, found by place.
 struct Obstacles {
     cell: f64,
@@ -231,7 +204,6 @@ impl Obstacles {
     /// The rectangles around a straight line, in parts if it is long.
     fn insert_line(&mut self, a: Point, b: Point, number: usize) {
         let parts = libm::ceil((b.x - a.x).abs().max((b.y - a.y).abs()) / (LONG * self.cell));
-        let at = |part: f64| Point::new(a.x + (b.x - a.x) * part, a.y + (b.y - a.y) * part);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -242,7 +214,8 @@ impl Obstacles {
                 f64::from(k) / parts.max(1.0),
                 f64::from(k + 1) / parts.max(1.0),
             );
-            self.insert(between(at(from), at(to)), number);
+            let ends = [a.towards(b, from), a.towards(b, to)];
+            self.insert(Rect::of_points(ends).unwrap_or_default(), number);
         }
     }
 
@@ -331,7 +304,7 @@ mod tests {
             size: Size::new(second.right(), second.bottom()),
             boxes: vec![Rect::new(0.0, 0.0, 80.0, 30.0), second],
             routes,
-            ..Layout::empty()
+            ..Layout::default()
         }
     }
 

@@ -5,11 +5,7 @@ const PASSES: usize = 30;
 
 /// A rank for each of `n` vertices, counted from 0 and growing along every edge. The edges must not form a cycle.
 pub(crate) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
-    let (mut after, mut before) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-    for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
-        after[from].push(to);
-        before[to].push(from);
-    }
+    let (before, after) = neighbours(n, edges);
     let (mut rank, order) = longest_paths(&after, &before);
     for pass in 0..PASSES {
         let slide = |v: usize, rank: &mut Vec<usize>| slide(v, &after, &before, rank);
@@ -24,6 +20,16 @@ pub(crate) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     }
     let least = rank.iter().min().copied().unwrap_or(0);
     rank.iter().map(|r| r - least).collect()
+}
+
+/// The vertices before and after each of `n` vertices, in the order of the edges and without itself.
+pub(crate) fn neighbours(n: usize, edges: &[(usize, usize)]) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
+    let (mut before, mut after) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+    for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
+        after[from].push(to);
+        before[to].push(from);
+    }
+    (before, after)
 }
 
 /// These edges with some reversed.

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::base::geometry::{Point, Rect};
+use crate::layout::layers::common;
 use crate::layout::{Cluster, Component, Layout, Link, Plan, Route};
 
 use super::PlacedPart;
@@ -85,12 +86,17 @@ impl PlacedPart {
             boxes: vec![Rect::default(); part.vertices.len()],
             routes: vec![Route::default(); part.links.len()],
             clusters: vec![Rect::default(); part.clusters.len()],
-            ..Self::empty()
+            ..Self::default()
         }
     }
 }
 
 impl Component {
+    /// All of it as a plan of its own.
+    pub(crate) fn plan(&self, whole: &Plan) -> Plan {
+        Subplan::new(whole, self, 0, |_| true).plan
+    }
+
     /// A cluster and those around it, the innermost first, without the outside.
     pub(crate) fn around(&self, cluster: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::successors(Some(cluster), |&c| Some(self.parent[c])).take_while(|&c| c != 0)
@@ -98,13 +104,8 @@ impl Component {
 
     /// The innermost cluster around everything; 0 if there is none.
     pub(crate) fn root(&self) -> usize {
-        let Some((&first, rest)) = self.home.split_first() else {
-            return 0;
-        };
-        let shared = |a: usize, b: usize| {
-            let around: BTreeSet<usize> = self.around(b).collect();
-            self.around(a).find(|c| around.contains(c)).unwrap_or(0)
-        };
-        rest.iter().fold(first, |root, &home| shared(root, home))
+        let homes = self.home.iter().copied();
+        let root = homes.reduce(|root, home| common(&self.parent, root, home));
+        root.unwrap_or(0)
     }
 }

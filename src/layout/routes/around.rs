@@ -69,8 +69,8 @@ fn rounded(way: &[Point]) -> Route {
         let (before, after) = (towards(corner, at), towards(corner, next));
         route.curves.push(straight(at, before));
         route.curves.push([
-            mixed(before, corner, 2.0 / 3.0),
-            mixed(after, corner, 2.0 / 3.0),
+            before.towards(corner, 2.0 / 3.0),
+            after.towards(corner, 2.0 / 3.0),
             after,
         ]);
         at = after;
@@ -81,16 +81,12 @@ fn rounded(way: &[Point]) -> Route {
 
 /// The point at which the turn around a corner begins on the way to another point: half the way at most.
 fn towards(corner: Point, other: Point) -> Point {
-    let length = libm::hypot(other.x - corner.x, other.y - corner.y).max(1e-9);
-    mixed(corner, other, (BEND / length).min(0.5))
-}
-
-fn mixed(p: Point, q: Point, t: f64) -> Point {
-    Point::new(p.x + (q.x - p.x) * t, p.y + (q.y - p.y) * t)
+    let length = corner.distance(other).max(1e-9);
+    corner.towards(other, (BEND / length).min(0.5))
 }
 
 fn straight(p: Point, q: Point) -> [Point; 3] {
-    [mixed(p, q, 1.0 / 3.0), mixed(p, q, 2.0 / 3.0), q]
+    [p.towards(q, 1.0 / 3.0), p.towards(q, 2.0 / 3.0), q]
 }
 
 /// A vertex with its place.
@@ -131,13 +127,13 @@ fn leaves(rect: &Rect, outline: Outline, inside: Point, outside: Point) -> Point
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = f64::midpoint(low, high);
-        if outline.holds(rect, mixed(inside, outside, middle)) {
+        if outline.holds(rect, inside.towards(outside, middle)) {
             low = middle;
         } else {
             high = middle;
         }
     }
-    mixed(inside, outside, high)
+    inside.towards(outside, high)
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
@@ -151,7 +147,7 @@ fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Poi
         };
     // The same side for edges there and back.
     let step = if from.v < to.v { step } else { -step };
-    let length = libm::hypot(end.x - start.x, end.y - start.y).max(1e-9);
+    let length = start.distance(end).max(1e-9);
     let aside = Point::new(
         (start.y - end.y) / length * step,
         (end.x - start.x) / length * step,
@@ -260,13 +256,12 @@ impl Map {
         }
         let mut points = vec![a, b];
         points.extend(&self.corners);
-        let far = |p: Point, q: Point| libm::hypot(p.x - q.x, p.y - q.y);
         let mut best = vec![f64::INFINITY; points.len()];
         let mut from = vec![0; points.len()];
         let mut done = vec![false; points.len()];
         best[0] = 0.0;
         // Lengths are not negative, so their bits sort like them.
-        let mut queue = BinaryHeap::from([(Reverse(far(a, b).to_bits()), 0)]);
+        let mut queue = BinaryHeap::from([(Reverse(a.distance(b).to_bits()), 0)]);
         while let Some((_, at)) = queue.pop() {
             if at == 1 {
                 return Some(traced(&points, &from));
@@ -275,13 +270,13 @@ impl Map {
                 continue;
             }
             for next in 1..points.len() {
-                let length = best[at] + far(points[at], points[next]);
+                let length = best[at] + points[at].distance(points[next]);
                 if done[next] || length >= best[next] || !self.clear(points[at], points[next], own)
                 {
                     continue;
                 }
                 (best[next], from[next]) = (length, at);
-                queue.push((Reverse((length + far(points[next], b)).to_bits()), next));
+                queue.push((Reverse((length + points[next].distance(b)).to_bits()), next));
             }
         }
         None

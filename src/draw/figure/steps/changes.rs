@@ -5,15 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::StepSource;
 use crate::base::error::{Error, Result};
-use crate::base::name::last_part;
 use crate::draw::figure::MOST_HEIGHT;
-use crate::draw::figure::band::{clock, title};
-use crate::draw::figure::canvas::{PX_PER_MM, ink};
+use crate::draw::figure::canvas::PX_PER_MM;
 use crate::draw::figure::groups::groups;
 use crate::draw::figure::marks::Sign;
-use crate::draw::figure::notes::flow;
 use crate::draw::figure::page::FigureSheet;
-use crate::draw::figure::panel::{Fate, INSIDE, Panel, PanelBox, items};
+use crate::draw::figure::panel::{Fate, Panel, PanelBox};
 use crate::draw::figure::place::PlacedPanel;
 use crate::draw::figure::talks::Talk;
 use crate::draw::scene::Scene;
@@ -170,7 +167,7 @@ impl<'u, 's> Union<'u, 's> {
         labels: &[Vec<Vec<String>>],
         placed: &PlacedPanel,
     ) -> Panel {
-        let (studio, source) = (self.studio, self.studio.sheet.source);
+        let studio = self.studio;
         let turned = |sign| match k {
             0 => BTreeMap::new(),
             _ => studio.turned(k, sign),
@@ -217,40 +214,16 @@ impl<'u, 's> Union<'u, 's> {
             Some(look)
         });
         let looks: Vec<PanelBox> = looks.collect();
-        let handed = if k > 0 { studio.handed(k) } else { Vec::new() };
-        let notes: Vec<_> = handed
-            .iter()
-            .map(|(topic, from, to, _)| {
-                let [topic, from, to] = [source.topic(*topic), from, to].map(last_part);
-                (ink::CHANGED, format!("{topic}: {from} → {to}"))
-            })
-            .collect();
-        let inside = studio.panel_width() - 2.0 * INSIDE;
-        let foot = flow(&mut studio.sheet.canvas(), inside, 0.0, &items(&notes));
-        let pitch = studio.sheet.canvas().sizes.pitch();
-        let start = source.phases[k].span.start.since(source.span().start);
         let names = studio.found[k].names.len();
         let boxed = drawn.iter().flat_map(|at| &self.boxes[*at].1);
-        let mut entries: Vec<_> = looks.iter().flat_map(|l| &l.entries).copied().collect();
-        entries.extend(handed.iter().map(|h| h.3));
         Panel {
-            entries,
-            heading: (
-                (k + 1).to_string(),
-                format!("{} {}", clock(start), title(source, k)),
-            ),
-            home: String::new(),
-            looks,
             talks: arrows
                 .iter()
                 .map(|(at, fate)| (links[*at].0.clone(), *fate))
                 .collect(),
             labels: shown.iter().map(|at| labels[*at].clone()).collect(),
-            height: INSIDE * 1.6 + pitch + 0.6 + placed.size.h + 0.8 + foot,
-            foot,
             undrawn: names.saturating_sub(boxed.filter(|at| is_there(at)).count()),
-            placed: Some(placed.only(&drawn, &shown)),
-            notes,
+            ..studio.drawn(k, (k + 1).to_string(), looks, placed.only(&drawn, &shown))
         }
     }
 }

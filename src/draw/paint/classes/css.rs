@@ -179,12 +179,7 @@ fn paint(fill: Color, stroke: Color, width: f64, dash: &[f64]) -> String {
 }
 
 fn dash_rule(width: f64, dash: &[f64]) -> String {
-    let stroke = Stroke {
-        color: Color::NONE,
-        width,
-        dash: dash.to_vec(),
-    };
-    let cap = if stroke.is_round() {
+    let cap = if Stroke::dashed(Color::NONE, width, dash).is_round() {
         ";stroke-linecap:round"
     } else {
         ""

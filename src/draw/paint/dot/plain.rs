@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::names::quoted;
-use super::{DotView, line, pen_width, rate};
+use super::{DotView, label, line, pen_width};
 use crate::draw::style::Body;
 use crate::graph::State;
 use crate::view::{Arrow, Item, ItemKind, SeenWindow, Shown};
@@ -26,7 +26,19 @@ pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> St
         " edge [fontsize=10, fontname=\"{FONTS}\", color=\"{}\", fontcolor=\"{}\", arrowsize=0.7];",
         style.edge.stroke, style.edge.text,
     );
-    members(drawing, seen, &mut out, None, &drawing.inhabited(seen), 1);
+    let cluster = &style.cluster;
+    let space = |at: usize, indent: &str| {
+        format!(
+            "\n{indent} graph [label={}, labeljust=l, style=\"rounded,filled\", fillcolor=\"{}\", color=\"{}\", fontcolor=\"{}\", fontsize=12];",
+            quoted(&drawing.view.namespaces[at].name),
+            cluster.fill,
+            cluster.stroke,
+            cluster.text,
+        )
+    };
+    let item = |_, item: &Item, shown: &Shown| node(drawing, item, shown);
+    let whole = (None, &*drawing.inhabited(seen), " ");
+    drawing.members(&mut out, seen, whole, (&space, &item));
     for shown in &seen.arrows {
         if let Some(arrow) = drawing.view.arrows.get(shown.id as usize) {
             edge(drawing, &mut out, arrow, shown);
@@ -34,47 +46,6 @@ pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> St
     }
     out.push_str("}\n");
     out
-}
-
-/// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
-fn members(
-    drawing: &DotView<'_>,
-    seen: &SeenWindow,
-    out: &mut String,
-    home: Option<usize>,
-    inhabited: &[bool],
-    depth: usize,
-) {
-    let indent = " ".repeat(depth);
-    let cluster = &drawing.style.cluster;
-    for (at, space) in drawing.view.namespaces.iter().enumerate() {
-        if space.parent != home || inhabited.get(at) != Some(&true) {
-            continue;
-        }
-        let _ = writeln!(
-            out,
-            "{indent}subgraph {} {{\n{indent} graph [label={}, labeljust=l, style=\"rounded,filled\", fillcolor=\"{}\", color=\"{}\", fontcolor=\"{}\", fontsize=12];",
-            drawing.ids.namespaces[at],
-            quoted(&space.name),
-            cluster.fill,
-            cluster.stroke,
-            cluster.text,
-        );
-        members(drawing, seen, out, Some(at), inhabited, depth + 1);
-        let _ = writeln!(out, "{indent}}}");
-    }
-    for shown in &seen.items {
-        let at = shown.id as usize;
-        if let Some(item) = drawing
-            .view
-            .items
-            .get(at)
-            .filter(|item| item.cluster == home)
-        {
-            let id = &drawing.ids.items[at];
-            let _ = writeln!(out, "{indent}{id} [{}];", node(drawing, item, shown));
-        }
-    }
 }
 
 fn node(drawing: &DotView<'_>, item: &Item, shown: &Shown) -> String {
@@ -119,11 +90,7 @@ fn edge(drawing: &DotView<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
         line(shown),
         pen_width(shown)
     );
-    let label = match (arrow.carries(shown), rate(shown)) {
-        (Some(topic), Some(rate)) => format!("{topic}\n{rate}"),
-        (topic, rate) => topic.or(rate).unwrap_or_default(),
-    };
-    if !label.is_empty() {
+    if let Some(label) = label(arrow, shown) {
         let _ = write!(out, ", label={}", quoted(&label));
     }
     if let Some(colour) = drawing.colour(shown) {

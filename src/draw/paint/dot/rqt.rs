@@ -7,7 +7,7 @@
 use std::fmt::Write as _;
 
 use super::names::{escape_name, quoted};
-use super::{DotView, line, pen_width, rate};
+use super::{DotView, label, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
 use crate::graph::Element;
 use crate::layout::{Layout, Route};
@@ -19,26 +19,20 @@ const HEAD: f64 = 10.0;
 const MARGIN: f64 = 8.0;
 const POINTS_PER_INCH: f64 = 72.0;
 
-/// The label of an arrow in a window, lines parted by a newline: the topic between two nodes, and the rate.
-pub(super) fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
-    match (arrow.carries(shown), rate(shown)) {
-        (Some(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
-        (topic, rate) => topic.or(rate),
-    }
-}
-
 pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, seen: &SeenWindow) -> String {
-    let writer = RqtWriter {
-        drawing,
-        layout,
-        seen,
-    };
+    let writer = RqtWriter { drawing, layout };
     let size = layout.size;
     let bb = format!("0,0,{},{}", number(size.w), number(size.h));
     let mut out = format!(
         "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
     );
-    writer.members(&mut out, None, &drawing.inhabited(seen), 1);
+    let space = |at: usize, _: &str| {
+        let name = &drawing.view.namespaces[at].name;
+        format!(" graph [{}];", writer.cluster(at, name))
+    };
+    let item = |at: usize, item: &Item, shown: &Shown| writer.item(item, layout.boxes[at], shown);
+    let whole = (None, &*drawing.inhabited(seen), " ");
+    drawing.members(&mut out, seen, whole, (&space, &item));
     for shown in &seen.arrows {
         writer.arrow(&mut out, shown);
     }
@@ -49,40 +43,9 @@ pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, seen: &SeenWindow) -
 struct RqtWriter<'a> {
     drawing: &'a DotView<'a>,
     layout: &'a Layout,
-    seen: &'a SeenWindow,
 }
 
 impl RqtWriter<'_> {
-    /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
-    fn members(&self, out: &mut String, home: Option<usize>, inhabited: &[bool], depth: usize) {
-        let indent = " ".repeat(depth);
-        for (at, space) in self.drawing.view.namespaces.iter().enumerate() {
-            if space.parent != home || inhabited.get(at) != Some(&true) {
-                continue;
-            }
-            let id = &self.drawing.ids.namespaces[at];
-            let _ = writeln!(
-                out,
-                "{indent}subgraph {id} {{ graph [{}];",
-                self.cluster(at, &space.name)
-            );
-            self.members(out, Some(at), inhabited, depth + 1);
-            let _ = writeln!(out, "{indent}}}");
-        }
-        for shown in &self.seen.items {
-            let at = shown.id as usize;
-            let (Some(item), Some(place)) =
-                (self.drawing.view.items.get(at), self.layout.boxes.get(at))
-            else {
-                continue;
-            };
-            if item.cluster == home {
-                let id = &self.drawing.ids.items[at];
-                let _ = writeln!(out, "{indent}{id} [{}];", self.item(item, *place, shown));
-            }
-        }
-    }
-
     fn cluster(&self, at: usize, name: &str) -> String {
         let place = self.layout.clusters.get(at).copied().unwrap_or_default();
         let title = self
@@ -244,11 +207,8 @@ impl RqtWriter<'_> {
         }
         let last = points.len() - 1;
         let tip = points[last];
-        let before = points[..last]
-            .iter()
-            .rev()
-            .find(|p| distance(**p, tip) > 0.5);
-        if let Some(length) = before.map(|p| distance(*p, tip)) {
+        let before = points[..last].iter().rev().find(|p| p.distance(tip) > 0.5);
+        if let Some(length) = before.map(|p| p.distance(tip)) {
             let before = before.copied().unwrap_or(tip);
             let part = (HEAD / length).min(0.5);
             let (dx, dy) = ((before.x - tip.x) * part, (before.y - tip.y) * part);
@@ -265,10 +225,6 @@ impl RqtWriter<'_> {
     fn up(&self, y: f64) -> f64 {
         self.layout.size.h - y
     }
-}
-
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(a.x - b.x, a.y - b.y)
 }
 
 /// About the middle of a route, for a label that the layout left without a place.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::base::geometry::{Point, Rect, Size};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Step, Text};
+use crate::draw::scene::{Form, Group, Piece, Shape, Step, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Fonts;
 
@@ -100,12 +100,8 @@ impl Tiles {
             Form::Rect(rect, _) | Form::Ellipse(rect) => self.add(rect.grown(reach)),
             Form::Path(steps) if shape.fill == Color::NONE => self.add_line(steps, reach),
             Form::Path(steps) => {
-                let points = steps.iter().flat_map(|step| match step {
-                    Step::Move(p) | Step::Line(p) => std::slice::from_ref(p),
-                    Step::Curve(points) => points,
-                    Step::Close => &[],
-                });
-                if let Some(area) = around(points) {
+                let points = steps.iter().flat_map(Step::points).copied();
+                if let Some(area) = Rect::of_points(points) {
                     self.add(area.grown(reach));
                 }
             }
@@ -139,7 +135,7 @@ impl Tiles {
 
     /// Adds the tiles of a curve, which lies inside the box of its controls: it is halved until that box is small.
     fn add_curve(&mut self, curve: [Point; 4], reach: f64, depth: u8) {
-        let Some(area) = around(curve.iter()) else {
+        let Some(area) = Rect::of_points(curve) else {
             return;
         };
         if depth == 0 || (area.w < SIDE && area.h < SIDE) {
@@ -170,19 +166,9 @@ fn between(a: Point, b: Point) -> Point {
     Point::new(f64::midpoint(a.x, b.x), f64::midpoint(a.y, b.y))
 }
 
-fn around<'a>(mut points: impl Iterator<Item = &'a Point>) -> Option<Rect> {
-    let first = points.next()?;
-    let start = Rect::new(first.x, first.y, 0.0, 0.0);
-    Some(points.fold(start, |area, p| area.union(&Rect::new(p.x, p.y, 0.0, 0.0))))
-}
-
 fn text_box(text: &Text, fonts: &Fonts) -> Rect {
     let width = fonts.width(&text.text, text.size, text.weight);
-    let left = match text.anchor {
-        Anchor::Start => text.at.x,
-        Anchor::Middle => text.at.x - width / 2.0,
-        Anchor::End => text.at.x - width,
-    };
+    let left = text.at.x - text.anchor.before(width);
     let halo = text.halo.map_or(0.0, |(_, width)| width);
     // Higher and lower than any letter of ours; half an em aside for letters that lean out.
     Rect::new(left, text.at.y - 1.3 * text.size, width, 1.8 * text.size)
