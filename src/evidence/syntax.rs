@@ -58,6 +58,11 @@ impl Parsed {
     pub(crate) fn text(&self, node: Node<'_>) -> &str {
         self.text.get(node.byte_range()).unwrap_or_default()
     }
+
+    /// The text of a field of an element; empty without one.
+    pub(crate) fn field(&self, node: Node<'_>, name: &str) -> &str {
+        node.child_by_field_name(name).map_or("", |n| self.text(n))
+    }
 }
 
 /// The line on which an element begins, ≥ 1.
@@ -70,6 +75,12 @@ pub(crate) fn children(node: Node<'_>) -> Vec<Node<'_>> {
     let mut cursor = node.walk();
     let all = node.named_children(&mut cursor);
     all.filter(|child| !child.is_extra()).collect()
+}
+
+/// The arguments of a call.
+pub(crate) fn arguments(call: Node<'_>) -> Vec<Node<'_>> {
+    let list = call.child_by_field_name("arguments");
+    list.map(children).unwrap_or_default()
 }
 
 /// Visits an element and all inside it, in order, without recursion; `visit` returns whether to go inside.

@@ -103,7 +103,7 @@ impl<'a> CppReader<'a> {
     }
 
     fn field(&self, node: Node<'a>, name: &str) -> &'a str {
-        node.child_by_field_name(name).map_or("", |n| self.text(n))
+        self.parsed.field(node, name)
     }
 
     fn class(&mut self) -> &mut Class {

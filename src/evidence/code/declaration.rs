@@ -2,13 +2,27 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::words;
+use crate::base::words::{self, worded};
+use crate::evidence::claim::Name;
+use crate::evidence::proof::ElementKey;
 
-/// The role of a node on a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Role {
-    Publishes,
-    Subscribes,
+worded! {
+    /// The role of a node on a topic.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub(crate) enum Role {
+        Publishes = "publishes",
+        Subscribes = "subscribes",
+    }
+}
+
+impl Role {
+    /// The edge of a node in this role.
+    pub(super) fn edge(self, node: Name, topic: Name) -> ElementKey {
+        match self {
+            Self::Publishes => ElementKey::Publish(node, topic),
+            Self::Subscribes => ElementKey::Subscribe(topic, node),
+        }
+    }
 }
 
 /// The kind of object that a call creates.
@@ -93,62 +107,49 @@ impl Call {
     /// The resulting publishers and subscribers.
     pub(super) fn declarations(&self) -> Vec<Declaration> {
         use Role::{Publishes, Subscribes};
-        let one = |role, below: &str, change: &dyn Fn(&str) -> String| {
-            let topic = self.topic.as_ref().map(|topic| format!("{topic}{below}"));
-            self.declaration(role, topic, self.types.iter().map(|t| change(t)).collect())
+        let below = |suffix: &str| self.topic.as_ref().map(|topic| format!("{topic}{suffix}"));
+        let one = |role, suffix: &str, ending: &str| {
+            let types = self.types.iter().map(|t| format!("{t}{ending}"));
+            self.declaration(role, below(suffix), types.collect())
         };
-        let same = |t: &str| t.to_owned();
-        let fixed =
-            |role, below: &str, type_name: &str| one(role, below, &|_| type_name.to_owned());
-        let image = |role, below: &str, name: &str| {
-            let topic = self.topic.as_ref().map(|topic| format!("{topic}{below}"));
-            self.declaration(role, topic, vec![format!("sensor_msgs/{name}")])
+        let fixed = |role, suffix: &str, name: &str| {
+            let types = self.types.iter().map(|_| name.to_owned());
+            self.declaration(role, below(suffix), types.collect())
+        };
+        let image = |role, suffix: &str, name: &str| {
+            self.declaration(role, below(suffix), vec![format!("sensor_msgs/{name}")])
         };
         let transform = |role, topic: &str| {
-            self.declaration(
-                role,
-                Some(topic.to_owned()),
-                vec!["tf2_msgs/TFMessage".to_owned()],
-            )
+            let types = vec!["tf2_msgs/TFMessage".to_owned()];
+            self.declaration(role, Some(topic.to_owned()), types)
         };
-        let info = || {
-            let topic = self
-                .topic
-                .as_ref()
-                .map(|topic| match topic.rsplit_once('/') {
-                    Some((folder, _)) => format!("{folder}/camera_info"),
-                    None => "camera_info".to_owned(),
-                });
-            move |role| {
-                self.declaration(
-                    role,
-                    topic.clone(),
-                    vec!["sensor_msgs/CameraInfo".to_owned()],
-                )
-            }
+        let info = |role| {
+            let beside = |topic: &String| match topic.rsplit_once('/') {
+                Some((folder, _)) => format!("{folder}/camera_info"),
+                None => "camera_info".to_owned(),
+            };
+            let types = vec!["sensor_msgs/CameraInfo".to_owned()];
+            self.declaration(role, self.topic.as_ref().map(beside), types)
         };
         // The roles on an action's outgoing (feedback, result, status) and incoming (goal, cancel) topics.
         let action1 = |tells, told| {
-            let suffix = |word: &'static str| move |t: &str| format!("{t}{word}");
             vec![
-                one(tells, "/feedback", &suffix("Feedback")),
-                one(tells, "/result", &suffix("Result")),
+                one(tells, "/feedback", "Feedback"),
+                one(tells, "/result", "Result"),
                 fixed(tells, "/status", "actionlib_msgs/GoalStatusArray"),
-                one(told, "/goal", &suffix("Goal")),
+                one(told, "/goal", "Goal"),
                 fixed(told, "/cancel", "actionlib_msgs/GoalID"),
             ]
         };
         let action2 = |tells| {
             vec![
-                one(tells, "/_action/feedback", &|t| {
-                    format!("{t}_FeedbackMessage")
-                }),
+                one(tells, "/_action/feedback", "_FeedbackMessage"),
                 fixed(tells, "/_action/status", "action_msgs/GoalStatusArray"),
             ]
         };
         match self.made {
-            Made::Publisher => vec![one(Publishes, "", &same)],
-            Made::Subscriber | Made::Moment => vec![one(Subscribes, "", &same)],
+            Made::Publisher => vec![one(Publishes, "", "")],
+            Made::Subscriber | Made::Moment => vec![one(Subscribes, "", "")],
             Made::ImagePublisher => vec![
                 image(Publishes, "", "Image"),
                 image(Publishes, "/compressed", "CompressedImage"),
@@ -157,9 +158,9 @@ impl Call {
             Made::CameraPublisher => vec![
                 image(Publishes, "", "Image"),
                 image(Publishes, "/compressed", "CompressedImage"),
-                info()(Publishes),
+                info(Publishes),
             ],
-            Made::CameraSubscriber => vec![image(Subscribes, "", "Image"), info()(Subscribes)],
+            Made::CameraSubscriber => vec![image(Subscribes, "", "Image"), info(Subscribes)],
             Made::ActionServer1 => action1(Publishes, Subscribes),
             Made::ActionClient1 => action1(Subscribes, Publishes),
             Made::ActionServer2 => action2(Publishes),

@@ -81,7 +81,7 @@ pub(crate) fn conclude(
     notices.push(summary(code, found.drawn, inferred, &undrawn));
     let mut lines: Vec<String> = undrawn
         .iter()
-        .map(|(reason, text)| format!("{text}: {}", reason.words()))
+        .map(|(reason, text)| format!("{text}: {}", reason.word()))
         .collect();
     lines.extend(found.remarks);
     if !found.without.is_empty() && !code.instances.is_empty() {
@@ -164,7 +164,7 @@ fn summary(
         }
         let reasons: Vec<String> = reasons
             .iter()
-            .map(|(r, n)| format!("{n}: {}", r.words()))
+            .map(|(r, n)| format!("{n}: {}", r.word()))
             .collect();
         text.extend([
             "; ",
@@ -191,11 +191,7 @@ fn remarks_on(instance: &Instance, node: &str, recorded: &RecordedTopics) -> Vec
         let types = declaration.types.join(" or ");
         match recorded.topics.get(&name) {
             None => {
-                let does = if declaration.role == Role::Publishes {
-                    "publishes"
-                } else {
-                    "subscribes"
-                };
+                let does = declaration.role.word();
                 Some(format!(
                     "{node} {does} {name} by its code ({place}), which is not recorded: record it too"
                 ))
@@ -358,10 +354,7 @@ fn draw(
     (node, words): (Name, &BTreeSet<&str>),
     found: &Match<'_>,
 ) -> bool {
-    let what = match found.role {
-        Role::Publishes => ElementKey::Publish(node, found.topic),
-        Role::Subscribes => ElementKey::Subscribe(found.topic, node),
-    };
+    let what = found.role.edge(node, found.topic);
     let has_room = found.role == Role::Subscribes || has_room(known, recorded, found.topic);
     if recorded.proved.contains(&what) || !has_room || known.denies(what) {
         return false;

@@ -12,42 +12,28 @@ use super::declaration::Role;
 use super::matching::{Match, RecordedTopics, matches, resolved, row};
 use super::workspace::{FileDeclaration, Instance};
 use crate::base::name::last_part;
-use crate::base::words::count;
+use crate::base::words::{count, worded};
 use crate::evidence::claim::{Degree, Name};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
-/// The reason why a declaration is not drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum NotDrawn {
-    SeveralPlaces,
-    /// The other topics of its node fit another declaration too, so it may not have run.
-    Disputed,
-    KnownPublisher,
-    /// Messages of this type are published by one well-known program.
-    OwnedType,
-    OtherLaunchFile,
-    /// A launch file of the same system starts the recorded nodes without this one.
-    Alternative,
-    FewTopics,
-    WouldHaveLogged,
-    /// Nothing contradicts it, but the bag does not name the node and `--infer source` is not given.
-    NotNamed,
-}
-
-impl NotDrawn {
-    pub(super) fn words(self) -> &'static str {
-        match self {
-            Self::SeveralPlaces => "several places can be meant",
-            Self::Disputed => "what its node publishes may come from elsewhere",
-            Self::KnownPublisher => "its publishers are known",
-            Self::OwnedType => "its type is another program's own",
-            Self::OtherLaunchFile => "another launch file fits better",
-            Self::Alternative => "a launch file that fits too does without its node",
-            Self::FewTopics => "most of its node's topics are not in the bag",
-            Self::WouldHaveLogged => "its node would have logged",
-            Self::NotNamed => "the bag does not name its node; `--infer source` draws it",
-        }
+worded! {
+    /// The reason why a declaration is not drawn.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub(super) enum NotDrawn {
+        SeveralPlaces = "several places can be meant",
+        /// The other topics of its node fit another declaration too, so it may not have run.
+        Disputed = "what its node publishes may come from elsewhere",
+        KnownPublisher = "its publishers are known",
+        /// Messages of this type are published by one well-known program.
+        OwnedType = "its type is another program's own",
+        OtherLaunchFile = "another launch file fits better",
+        /// A launch file of the same system starts the recorded nodes without this one.
+        Alternative = "a launch file that fits too does without its node",
+        FewTopics = "most of its node's topics are not in the bag",
+        WouldHaveLogged = "its node would have logged",
+        /// Nothing contradicts it, but the bag does not name the node and `--infer source` is not given.
+        NotNamed = "the bag does not name its node; `--infer source` draws it",
     }
 }
 
@@ -326,11 +312,7 @@ fn reason(
 /// Adds the node, with a question mark, and its edge.
 fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
-    let topic = candidate.found.topic;
-    let edge = match candidate.found.role {
-        Role::Publishes => ElementKey::Publish(node, topic),
-        Role::Subscribes => ElementKey::Subscribe(topic, node),
-    };
+    let edge = candidate.found.role.edge(node, candidate.found.topic);
     let text = format!(
         "the only place in {} that may do so: {}; the bag does not say that it ran",
         count(code.packages, "package"),
@@ -350,10 +332,7 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
 
 /// `/talker publishes /chatter (p/talker.py:5  create_publisher(String, 'chatter', 10))`
 fn words(known: &Conclusions<'_>, candidate: &Candidate<'_>) -> String {
-    let does = match candidate.found.role {
-        Role::Publishes => "publishes",
-        Role::Subscribes => "subscribes",
-    };
+    let does = candidate.found.role.word();
     let placed = candidate.found.placed;
     format!(
         "{} {does} {} ({}:{}  {})",

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::declaration::{Call, Class, FileCode, Made, short, type_of};
 use super::texts::{DEEPEST, LONGEST, TextValues, most_work};
-use crate::evidence::syntax::{Language, Node, Parsed, children, line, walk};
+use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
 
 /// Reads a file; empty if it is too deeply nested.
 pub(super) fn read(text: &str) -> FileCode {
@@ -85,9 +85,7 @@ impl<'a> PythonReader<'a> {
             "class_definition" => self.define(node),
             "import_statement" => self.import(node, ""),
             "import_from_statement" => {
-                let module = node
-                    .child_by_field_name("module_name")
-                    .map_or("", |n| self.text(n));
+                let module = self.parsed.field(node, "module_name");
                 self.import(node, module);
             }
             "assignment" => {
@@ -127,7 +125,7 @@ impl<'a> PythonReader<'a> {
                 .to_owned()
         };
         self.classes.push(Class {
-            name: field("name").map_or("", |n| self.text(n)).to_owned(),
+            name: self.parsed.field(node, "name").to_owned(),
             bases: bases
                 .into_iter()
                 .filter(|b| b.kind() != "keyword_argument")
@@ -195,11 +193,7 @@ impl<'a> PythonReader<'a> {
                 topic: self.topic(&given),
                 types: self.types(&given),
                 line: line(node),
-                text: short(&format!(
-                    "{name}{}",
-                    node.child_by_field_name("arguments")
-                        .map_or("", |n| self.text(n))
-                )),
+                text: short(&format!("{name}{}", self.parsed.field(node, "arguments"))),
             };
             self.class().declarations.extend(call.declarations());
         }
@@ -229,11 +223,7 @@ impl<'a> PythonReader<'a> {
         let Some(function) = call.child_by_field_name("function") else {
             return ("", "");
         };
-        let field = |name| {
-            function
-                .child_by_field_name(name)
-                .map_or("", |n| self.text(n))
-        };
+        let field = |name| self.parsed.field(function, name);
         match function.kind() {
             "identifier" => (self.text(function), ""),
             "attribute" => (field("attribute"), field("object")),
@@ -243,8 +233,7 @@ impl<'a> PythonReader<'a> {
 
     fn arguments(&self, call: Node<'a>) -> CallArguments<'a> {
         let mut given = CallArguments::default();
-        let list = call.child_by_field_name("arguments");
-        for argument in list.map(children).unwrap_or_default() {
+        for argument in arguments(call) {
             let field = |name| argument.child_by_field_name(name);
             match (argument.kind(), field("name"), field("value")) {
                 ("keyword_argument", Some(name), Some(value)) => {

@@ -2,7 +2,8 @@
 
 use super::CppReader;
 use super::made::Callee;
-use crate::evidence::syntax::{Node, children, line};
+use super::names::unscoped;
+use crate::evidence::syntax::{Node, arguments, children, line};
 
 impl<'a> CppReader<'a> {
     /// First pass: classes, names of types, and values of variables.
@@ -57,11 +58,7 @@ impl<'a> CppReader<'a> {
         let bases = bases.into_iter().filter(|b| b.kind() != "access_specifier");
         let last = |base: Node<'a>| {
             let name = self.text(base).split('<').next().unwrap_or_default();
-            name.rsplit("::")
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
+            unscoped(name).trim().to_owned()
         };
         let bases: Vec<String> = bases.map(last).collect();
         let class = self.class();
@@ -139,11 +136,7 @@ impl<'a> CppReader<'a> {
     }
 
     pub(super) fn callback(&mut self, node: Node<'a>) {
-        let name = self
-            .field(node, "declarator")
-            .rsplit("::")
-            .next()
-            .unwrap_or_default();
+        let name = unscoped(self.field(node, "declarator"));
         if let Some(kind) = first_parameter(node) {
             self.callbacks.entry(name.to_owned()).or_insert(kind);
         }
@@ -152,10 +145,7 @@ impl<'a> CppReader<'a> {
     /// `declare_parameter("topic", "default")`, `nh.param("topic", variable, "default")`
     pub(super) fn parameter(&mut self, node: Node<'a>) {
         let callee = Callee::of(self.parsed, node);
-        let given = node
-            .child_by_field_name("arguments")
-            .map(children)
-            .unwrap_or_default();
+        let given = arguments(node);
         match (callee.name, &given[..]) {
             ("declare_parameter", [name, value, ..]) => {
                 if let Some(name) = self.string(*name) {

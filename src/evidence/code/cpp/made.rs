@@ -1,6 +1,7 @@
 //! The functions and classes of the client libraries that create publishers and subscribers.
 
 use super::super::declaration::Made;
+use super::names::unscoped;
 use crate::evidence::syntax::{Node, Parsed};
 
 /// The parts of a called name: `object.name<template>(…)`, `scope::name<template>(…)`.
@@ -22,35 +23,26 @@ impl<'a> Callee<'a> {
             return callee;
         };
         if function.kind() == "field_expression" {
-            callee.object = function
-                .child_by_field_name("argument")
-                .map_or("", |n| parsed.text(n));
+            callee.object = parsed.field(function, "argument");
         }
-        // Nested names: `a::b::c<T>`, `object.c<T>`.
+        // Names inside names: `a::b::c<T>`, `object.c<T>`.
         for _ in 0..8 {
             let field = |name| function.child_by_field_name(name);
-            function = match function.kind() {
-                "field_expression" => match field("field") {
-                    Some(inner) => inner,
-                    None => break,
-                },
+            let inner = match function.kind() {
+                "field_expression" => field("field"),
                 "qualified_identifier" => {
-                    callee.scope = field("scope").map_or("", |n| parsed.text(n));
-                    match field("name") {
-                        Some(inner) => inner,
-                        None => break,
-                    }
+                    callee.scope = parsed.field(function, "scope");
+                    field("name")
                 }
                 "template_function" | "template_method" => {
-                    let arguments = field("arguments").and_then(|list| list.named_child(0));
-                    callee.template = arguments.map_or("", |n| parsed.text(n));
-                    match field("name") {
-                        Some(inner) => inner,
-                        None => break,
-                    }
+                    let first = field("arguments").and_then(|list| list.named_child(0));
+                    callee.template = first.map_or("", |n| parsed.text(n));
+                    field("name")
                 }
-                _ => break,
+                _ => None,
             };
+            let Some(inner) = inner else { break };
+            function = inner;
         }
         callee.name = parsed.text(function);
         callee
@@ -86,7 +78,7 @@ pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
         .trim()
         .rsplit_once("::")
         .unwrap_or(("", before.trim()));
-    match (scope.rsplit("::").next().unwrap_or_default(), name) {
+    match (unscoped(scope), name) {
         ("message_filters", "Subscriber") => Some((Made::Subscriber, inner)),
         ("realtime_tools", "RealtimePublisher") => Some((Made::Publisher, inner)),
         ("actionlib", "SimpleActionServer" | "ActionServer") => Some((Made::ActionServer1, inner)),

@@ -103,6 +103,11 @@ impl Aliases {
     }
 }
 
+/// A name without the scopes before it.
+pub(super) fn unscoped(name: &str) -> &str {
+    name.rsplit("::").next().unwrap_or_default()
+}
+
 /// A type without `const`, references and leading colons.
 fn bare(name: &str) -> &str {
     let name = name.trim().trim_end_matches(['&', '*', ' ']);

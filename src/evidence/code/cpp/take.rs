@@ -4,7 +4,8 @@ use super::super::declaration::{Call, Made, short};
 use super::CppReader;
 use super::look::first_parameter;
 use super::made::{self, Callee, by_constructor, by_function, is_recorder};
-use crate::evidence::syntax::{Node, children, line, walk};
+use super::names::unscoped;
+use crate::evidence::syntax::{Node, arguments, children, line, walk};
 
 impl<'a> CppReader<'a> {
     /// Second pass: calls and variables that create publishers, subscribers and nodes.
@@ -48,10 +49,7 @@ impl<'a> CppReader<'a> {
 
     pub(super) fn call(&mut self, node: Node<'a>) {
         let callee = Callee::of(self.parsed, node);
-        let given = node
-            .child_by_field_name("arguments")
-            .map(children)
-            .unwrap_or_default();
+        let given = arguments(node);
         if let ("init", "ros", [_, _, name, ..]) = (callee.name, callee.scope, &given[..]) {
             let name = self.string(*name);
             self.class().node_names.extend(name);
@@ -63,12 +61,7 @@ impl<'a> CppReader<'a> {
         {
             self.class().node_names.extend(first);
         } else if let ("make_shared" | "make_unique", Some(name)) = (callee.name, first) {
-            let class = callee
-                .template
-                .rsplit("::")
-                .next()
-                .unwrap_or_default()
-                .to_owned();
+            let class = unscoped(callee.template).to_owned();
             self.class().mentions.insert(class, Some(name));
         }
         // A filter is constructed without a topic and subscribes later.
@@ -106,12 +99,7 @@ impl<'a> CppReader<'a> {
             self.constructed(node, kind, given);
             return;
         }
-        let last = self
-            .text(name)
-            .rsplit("::")
-            .next()
-            .unwrap_or_default()
-            .to_owned();
+        let last = unscoped(self.text(name)).to_owned();
         let first = given.named_child(0).and_then(|n| self.string(n));
         let class = self.class();
         let is_base = class.bases.contains(&last) || class.name == last || last.ends_with("Node");

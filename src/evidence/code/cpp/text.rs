@@ -3,7 +3,7 @@
 use super::super::texts::{DEEPEST, LONGEST, most_work};
 use super::CppReader;
 use super::made::Callee;
-use crate::evidence::syntax::{Node, children};
+use crate::evidence::syntax::{Node, arguments, children};
 
 impl<'a> CppReader<'a> {
     pub(super) fn literal(&self, node: Node<'a>) -> String {
@@ -47,10 +47,7 @@ impl<'a> CppReader<'a> {
             }
             "call_expression" => {
                 let callee = Callee::of(self.parsed, node);
-                let given = node
-                    .child_by_field_name("arguments")
-                    .map(children)
-                    .unwrap_or_default();
+                let given = arguments(node);
                 match callee.name {
                     "string" | "as_string" | "c_str" if given.is_empty() => again(
                         node.child_by_field_name("function")?
