@@ -320,6 +320,11 @@ impl Layout {
     }
 }
 
+/// Grows what is around several rectangles by one more.
+fn include(around: &mut Option<Rect>, rect: Rect) {
+    *around = Some(around.map_or(rect, |all| all.union(&rect)));
+}
+
 impl Cluster {
     /// Its frame around what stands in it: the title stands at the top left.
     fn frame(&self, inside: Rect, padding: f64) -> Rect {
@@ -470,11 +475,9 @@ impl Layers {
             home: vec![0; n],
             up: self.up[..n].to_vec(),
             down: self.down[..n].to_vec(),
-            chains: Vec::new(),
             parent: vec![0],
-            span: Vec::new(),
-            borders: Vec::new(),
             ranks: self.ranks,
+            ..Self::default()
         }
     }
 

@@ -124,14 +124,11 @@ impl<'a> Board<'a> {
 
     /// Remarks for the user; lower case, no period.
     pub(crate) fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
-        if self.left_out > 0 {
-            let many = words::count(self.left_out, "topic");
-            remarks.push(format!(
-                "{many} with the fewest messages do not fit; show them with `--topic-filter` or a larger `--size`"
-            ));
-        }
-        remarks
+        let many = words::count(self.left_out, "topic");
+        let remark = format!(
+            "{many} with the fewest messages do not fit; show them with `--topic-filter` or a larger `--size`"
+        );
+        (self.left_out > 0).then_some(remark).into_iter().collect()
     }
 
     /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is the part of the way that its head

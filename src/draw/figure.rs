@@ -35,6 +35,7 @@ use crate::view::NameFilter;
 use canvas::Sizes;
 pub(crate) use course::Course;
 use source::FigureSource;
+pub(crate) use tex::file as latex;
 
 worded! {
     /// The kind of figure.
@@ -160,9 +161,4 @@ pub(crate) fn figure(
         scene,
         remarks,
     })
-}
-
-/// A `LaTeX` file that shows the figure of this file name.
-pub(crate) fn latex(figure: &Figure, picture: &str, options: &FigureOptions) -> String {
-    tex::file(figure, picture, options)
 }

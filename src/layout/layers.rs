@@ -21,11 +21,10 @@ pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
         home: part.home.clone(),
         up: vec![Vec::new(); n],
         down: vec![Vec::new(); n],
-        chains: Vec::new(),
         parent: part.parent.clone(),
         span: spans(part, rank),
-        borders: Vec::new(),
         ranks: rank.iter().max().map_or(0, |r| r + 1),
+        ..Layers::default()
     };
     for &(from, to) in &part.ends {
         let chain = match rank[from].cmp(&rank[to]) {

@@ -1,6 +1,6 @@
 //! A layout that keeps the places of an earlier one: known boxes stay, new ones are placed beside them.
 
-use super::{Layout, Orientation, Plan};
+use super::{Layout, Orientation, Plan, include};
 use crate::base::geometry::{Point, Rect, Size};
 
 /// The room around boxes, and inside the frames of clusters.
@@ -157,12 +157,9 @@ impl PinnedBoxes<'_> {
     /// A frame around each cluster that has members.
     fn frames(&self) -> Vec<Rect> {
         let mut content: Vec<Option<Rect>> = vec![None; self.plan.clusters.len()];
-        let add = |content: &mut Option<Rect>, rect: Rect| {
-            *content = Some(content.map_or(rect, |all| all.union(&rect)));
-        };
         for (at, vertex) in self.boxes.iter().zip(&self.plan.vertices) {
             if let (Some(at), Some(c)) = (at, vertex.cluster) {
-                add(&mut content[c], *at);
+                include(&mut content[c], *at);
             }
         }
         let mut frames = vec![Rect::default(); content.len()];
@@ -173,7 +170,7 @@ impl PinnedBoxes<'_> {
             let frame = cluster.frame(inside, PADDING);
             frames[c] = frame;
             if let Some(parent) = cluster.parent {
-                add(&mut content[parent], frame);
+                include(&mut content[parent], frame);
             }
         }
         frames

@@ -5,7 +5,9 @@
 use std::collections::BTreeMap;
 
 use crate::base::geometry::{Point, Rect, Size};
-use crate::layout::{Component, LayerItem, LayerRows, Layers, LayoutOptions, Orientation, Plan};
+use crate::layout::{
+    Component, LayerItem, LayerRows, Layers, LayoutOptions, Orientation, Plan, include,
+};
 
 /// The room between boxes side by side, between edges side by side, and between an edge and anything else.
 const BOX_GAP: f64 = 12.0;
@@ -345,18 +347,15 @@ impl<'a> Spacing<'a> {
         columns: &[(f64, f64)],
     ) -> Vec<Rect> {
         let mut content: Vec<Option<Rect>> = vec![None; self.layers.parent.len()];
-        let add = |content: &mut Option<Rect>, rect: Rect| {
-            *content = Some(content.map_or(rect, |all| all.union(&rect)));
-        };
         for (v, rect) in boxes.iter().enumerate() {
             let room = self.loop_room(v);
             let rect = Rect::new(rect.x, rect.y - room, rect.w, rect.h + 2.0 * room);
-            add(&mut content[self.layers.home[v]], rect);
+            include(&mut content[self.layers.home[v]], rect);
         }
         for (&bend, size) in &self.worded {
             let (start, end) = columns[self.layers.rank[bend]];
             let middle = Point::new(f64::midpoint(start, end), self.beside(bend, across));
-            add(
+            include(
                 &mut content[self.layers.home[bend]],
                 Rect::around(middle, *size),
             );
@@ -369,7 +368,7 @@ impl<'a> Spacing<'a> {
                 across,
                 columns,
             );
-            add(&mut content[self.layers.parent[cluster]], frames[cluster]);
+            include(&mut content[self.layers.parent[cluster]], frames[cluster]);
         }
         frames.split_off(1)
     }

@@ -107,11 +107,11 @@ impl<'a> PaperCanvas<'a> {
     /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about
     /// them is its title.
     pub(crate) fn begin_mark(&mut self, class: &str, entries: &[EntryId], title: String) {
-        let mut group = Group::named(&format!("{class}-{}", self.groups.len()));
-        class.clone_into(&mut group.class);
-        group.data = entry_data(entries);
-        group.title = title;
-        self.groups.push(group);
+        let id = format!("{class}-{}", self.groups.len());
+        self.open(&id, class, entry_data(entries));
+        if let Some(group) = self.group() {
+            group.title = title;
+        }
     }
 
     /// Begins the group of a box: the names of its members, and the events of the log about them.
@@ -120,20 +120,25 @@ impl<'a> PaperCanvas<'a> {
         names: impl Iterator<Item = &'n str>,
         entries: &[EntryId],
     ) {
-        let mut group = Group::named(&format!("node-{}", self.groups.len()));
-        "node".clone_into(&mut group.class);
+        let id = format!("node-{}", self.groups.len());
         let names: Vec<String> = names.map(|name| visible(name).into_owned()).collect();
-        group.data = vec![("name", names.join(" "))];
-        group.data.extend(entry_data(entries));
-        self.groups.push(group);
+        let name = vec![("name", names.join(" "))];
+        self.open(&id, "node", [name, entry_data(entries)].concat());
     }
 
     /// Begins the group of a step: its number, counted from 1, and the events of the log in it.
     pub(crate) fn begin_step(&mut self, number: usize, entries: &[EntryId]) {
-        let mut group = Group::named(&format!("step-{number}"));
-        group.data = vec![("step", number.to_string())];
-        group.data.extend(entry_data(entries));
-        self.groups.push(group);
+        let id = format!("step-{number}");
+        let step = vec![("step", number.to_string())];
+        self.open(&id, &id, [step, entry_data(entries)].concat());
+    }
+
+    fn open(&mut self, id: &str, class: &str, data: Vec<(&'static str, String)>) {
+        self.groups.push(Group {
+            class: class.to_owned(),
+            data,
+            ..Group::named(id)
+        });
     }
 
     fn group(&mut self) -> Option<&mut Group> {

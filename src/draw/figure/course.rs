@@ -236,7 +236,7 @@ pub struct LifeLines {
 }
 
 /// A row of the life lines: a node, a topic, or the title of the namespace of those that follow.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LifeLine {
     pub(crate) label: String,
     /// Whether it stands below the title of its namespace.
@@ -270,10 +270,7 @@ fn line(lives: &LivesFigure<'_>, row: &FigureRow) -> Option<LifeLine> {
     match row {
         FigureRow::Space(name) => Some(LifeLine {
             label: name.clone(),
-            is_inside: false,
-            what: None,
-            lives: Vec::new(),
-            bars: Vec::new(),
+            ..LifeLine::default()
         }),
         FigureRow::Track(at, label, is_inside) => {
             let track = lives.tracks.get(*at)?;

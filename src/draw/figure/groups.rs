@@ -53,16 +53,15 @@ pub(crate) fn cut(space: &str, depth: usize) -> &str {
 /// The groups of some tracks, by the first `depth` parts of their namespace and by their phases.
 pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<NodeGroup> {
     let phases = phases_of(source, tracks);
-    let mut all: BTreeMap<(&str, Vec<usize>), Vec<usize>> = BTreeMap::new();
-    for (at, (track, phases)) in tracks.iter().zip(&phases).enumerate() {
+    let mut all: BTreeMap<(&str, BTreeSet<usize>), Vec<usize>> = BTreeMap::new();
+    for (at, (track, phases)) in tracks.iter().zip(phases).enumerate() {
         let space = cut(namespace(&track.name), depth);
-        let key = (space, phases.iter().copied().collect());
-        all.entry(key).or_default().push(at);
+        all.entry((space, phases)).or_default().push(at);
     }
     all.into_iter()
         .map(|((space, phases), members)| NodeGroup {
             space: space.to_owned(),
-            phases: phases.into_iter().collect(),
+            phases,
             members,
         })
         .collect()

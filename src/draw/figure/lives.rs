@@ -9,7 +9,7 @@
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::marks::{Marks, Sign, relative};
+use super::marks::{Letter, Marks, Sign, relative};
 use super::rows::{FigureRow, folded_label, rows};
 use super::signs::{cross, dot, put_letter, start};
 use super::source::FigureSource;
@@ -77,12 +77,14 @@ impl<'a> LivesFigure<'a> {
 
     /// The height of band, rows and axis in millimetres.
     pub(crate) fn height(&self, canvas: &PaperCanvas<'_>) -> f64 {
-        let band = if self.source.phases.is_empty() {
-            0.0
-        } else {
-            band::HEIGHT + 0.9
-        };
-        band + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4 + canvas.sizes.line() + 1.2
+        let rows = self.rows.len() as f64 * canvas.sizes.pitch();
+        self.band() + rows + 0.4 + canvas.sizes.line() + 1.2
+    }
+
+    /// The height of the band with the room below it; nothing without phases.
+    fn band(&self) -> f64 {
+        let has_band = !self.source.phases.is_empty();
+        if has_band { band::HEIGHT + 0.9 } else { 0.0 }
     }
 
     /// The width of the column of names: that of the widest, at most 36 % of `width`.
@@ -102,8 +104,7 @@ impl<'a> LivesFigure<'a> {
 
     /// The y at which the rows begin.
     pub(crate) fn top(&self, place: &RowPlace) -> f64 {
-        let has_band = !self.source.phases.is_empty();
-        place.top + if has_band { band::HEIGHT + 0.9 } else { 0.0 }
+        place.top + self.band()
     }
 
     /// The y at which the rows end, at the axis.
@@ -134,14 +135,10 @@ impl<'a> LivesFigure<'a> {
                 taken.push((place.axis.x(sign.at), y, y));
             }
         }
-        for (k, letter) in self.marks.letters.iter().enumerate() {
-            if let Some(y) = y_of(letter.mark.track) {
-                canvas.begin_mark(
-                    "letter",
-                    &[letter.mark.entry],
-                    self.sentence(letter.mark.entry),
-                );
-                put_letter(canvas, place, (letter.mark.at, y), k, &mut taken);
+        for (k, Letter { mark, .. }) in self.marks.letters.iter().enumerate() {
+            if let Some(y) = y_of(mark.track) {
+                canvas.begin_mark("letter", &[mark.entry], self.sentence(mark.entry));
+                put_letter(canvas, place, (mark.at, y), k, &mut taken);
             }
         }
         canvas.begin("axis");
@@ -306,17 +303,12 @@ impl<'a> LivesFigure<'a> {
             canvas.disc(Point::new(x, from), 0.55, ink::CHANGED, &Stroke::default());
             canvas.head(Point::new(x, from), tip, 1.3, ink::CHANGED);
             taken.push((x, low, high));
-            let pair = (
-                handover.from.min(handover.to),
-                handover.from.max(handover.to),
-            );
+            let (a, b) = (handover.from, handover.to);
+            let pair = (a.min(b), a.max(b));
             if !told.contains(&(pair, &handover.topic)) {
                 told.push((pair, &handover.topic));
-                let text = canvas.cut(
-                    &handover.topic,
-                    Type::Small,
-                    place.axis.right - place.axis.left,
-                );
+                let most = place.axis.right - place.axis.left;
+                let text = canvas.cut(&handover.topic, Type::Small, most);
                 let wide = canvas.width(&text, Type::Small);
                 let left = (x + 0.6).min(place.axis.right - wide);
                 // Between two rows, so that it covers no mark of theirs.

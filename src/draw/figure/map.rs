@@ -147,11 +147,9 @@ fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>)
         Some(groups) => of_groups(sheet, &canvas, tracks, groups),
         None => of_pills(sheet, &canvas, tracks),
     }?;
-    let many = drawn.labels.len();
-    let left_out = drawn.placed.left_out;
     paint(&mut canvas, sheet, tracks, &drawn);
     let end = drawn.placed.size.h + 0.2;
-    let told = (groups.is_some(), left_out, many);
+    let told = (groups.is_some(), drawn.placed.left_out, drawn.labels.len());
     let y = below(&mut canvas, sheet, end, told, &drawn.alone);
     Some(canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Map")))
 }

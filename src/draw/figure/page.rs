@@ -104,12 +104,8 @@ impl<'a> FigureSheet<'a> {
         }
         y = flow(&mut canvas, width, y, &letter_items(lives));
         if !self.options.is_bare {
-            y = flow(
-                &mut canvas,
-                width,
-                y,
-                &lives_notes(lives, place.talk.is_some()),
-            );
+            let notes = lives_notes(lives, place.talk.is_some());
+            y = flow(&mut canvas, width, y, &notes);
             y = flow(&mut canvas, width, y + 0.15, &legend::items(lives));
         }
         let what = if lives.is_of_topics() {

@@ -185,16 +185,9 @@ fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
 fn badge(canvas: &mut PaperCanvas<'_>, at: Point, fate: Fate, color: Color) {
     canvas.disc(at, 0.75, color, &Stroke::default());
     let sign = Stroke::solid(ink::PAPER, 0.26);
-    canvas.line(
-        Point::new(at.x - 0.42, at.y),
-        Point::new(at.x + 0.42, at.y),
-        &sign,
-    );
+    let (x, y, half) = (at.x, at.y, 0.42);
+    canvas.line(Point::new(x - half, y), Point::new(x + half, y), &sign);
     if fate == Fate::Began {
-        canvas.line(
-            Point::new(at.x, at.y - 0.42),
-            Point::new(at.x, at.y + 0.42),
-            &sign,
-        );
+        canvas.line(Point::new(x, y - half), Point::new(x, y + half), &sign);
     }
 }

@@ -7,8 +7,8 @@ use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
 use crate::layout::{
-    Component, Engine, Layout, LayoutOptions, Orientation, Plan, Route, engine, lay_out, parts,
-    shelves,
+    Cluster, Component, Engine, Layout, LayoutOptions, Orientation, Plan, Route, engine, lay_out,
+    parts, shelves,
 };
 
 /// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
@@ -288,8 +288,8 @@ impl PlacedPanel {
                 ..route.mapped(point)
             })
             .collect();
+        let size = Size::new(layout.size.w / tightness, layout.size.h / tightness);
         let mut placed = Self {
-            size: Size::new(layout.size.w / tightness, layout.size.h / tightness),
             boxes: layout.boxes.iter().map(rect).collect(),
             clusters: layout.clusters.iter().map(rect).collect(),
             routes: curves
@@ -297,21 +297,14 @@ impl PlacedPanel {
                 .map(|route| polyline(route.start, &route.curves, PIECES))
                 .collect(),
             curves,
-            labels: vec![None; labels.len()],
-            left_out: 0,
-            unclear: 0,
+            ..Self::empty(plan, labels.len(), size)
         };
         let titles: Vec<Rect> = placed
             .clusters
             .iter()
             .zip(&plan.clusters)
-            .map(|(frame, cluster)| {
-                Rect::new(
-                    frame.x,
-                    frame.y,
-                    cluster.title.w + 1.0,
-                    cluster.title.h + 0.6,
-                )
+            .map(|(frame, Cluster { title, .. })| {
+                Rect::new(frame.x, frame.y, title.w + 1.0, title.h + 0.6)
             })
             .collect();
         placed.set_labels(labels, titles, width);

@@ -278,10 +278,7 @@ impl<'s> StepSource<'s> {
             }
             let mut spaces: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
             for at in *own {
-                spaces
-                    .entry(cut(namespace(&self.tracks[*at].name), self.depth))
-                    .or_default()
-                    .push(*at);
+                spaces.entry(self.space(*at)).or_default().push(*at);
             }
             all.extend(spaces.into_values().map(|members| (*fate, members)));
         }

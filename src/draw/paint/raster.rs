@@ -197,10 +197,7 @@ impl PixelSheet {
 
     /// Draws the whole scene over the former pixels.
     fn cover(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>]) {
-        let background = opaque(scene.background);
-        for pixel in self.pixels.rgba.chunks_exact_mut(4) {
-            pixel.copy_from_slice(&background);
-        }
+        fill(&mut self.pixels.rgba, scene.background);
         for group in drawn {
             self.draw(group);
         }
@@ -208,6 +205,14 @@ impl PixelSheet {
 
     fn draw(&mut self, group: &RasterGroup) {
         group.drawn.lay(self.scale, &mut self.pixels);
+    }
+}
+
+/// Gives all pixels a background.
+fn fill(rgba: &mut [u8], background: Color) {
+    let background = opaque(background);
+    for pixel in rgba.chunks_exact_mut(4) {
+        pixel.copy_from_slice(&background);
     }
 }
 

@@ -180,14 +180,9 @@ fn write_text(xml: &mut Xml, text: &Text) {
     if text.weight == Weight::SemiBold {
         xml.attribute("font-weight", 600);
     }
-    match text.anchor {
-        Anchor::Start => {}
-        Anchor::Middle => {
-            xml.attribute("text-anchor", "middle");
-        }
-        Anchor::End => {
-            xml.attribute("text-anchor", "end");
-        }
+    if text.anchor != Anchor::Start {
+        let is_end = text.anchor == Anchor::End;
+        xml.attribute("text-anchor", if is_end { "end" } else { "middle" });
     }
     xml.attribute("fill", text.color);
     if let Some((color, width)) = text.halo.filter(|(c, _)| *c != Color::NONE) {

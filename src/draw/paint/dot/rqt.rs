@@ -207,12 +207,9 @@ impl RqtWriter<'_> {
         }
         let last = points.len() - 1;
         let tip = points[last];
-        let before = points[..last].iter().rev().find(|p| p.distance(tip) > 0.5);
-        if let Some(length) = before.map(|p| p.distance(tip)) {
-            let before = before.copied().unwrap_or(tip);
-            let part = (HEAD / length).min(0.5);
-            let (dx, dy) = ((before.x - tip.x) * part, (before.y - tip.y) * part);
-            points[last] = Point::new(tip.x + dx, tip.y + dy);
+        let mut behind = points[..last].iter().rev();
+        if let Some(before) = behind.find(|p| p.distance(tip) > 0.5) {
+            points[last] = tip.towards(*before, (HEAD / before.distance(tip)).min(0.5));
         }
         let points: Vec<String> = points.iter().map(|p| self.point(*p)).collect();
         format!("e,{} {}", self.point(tip), points.join(" "))

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::tiles::{SIDE, Tiles};
-use super::{Painter, PixelSheet, Pixels, RasterGroup, opaque};
+use super::{Painter, PixelSheet, Pixels, RasterGroup, fill};
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
@@ -168,11 +168,8 @@ impl PixelSheet {
     }
 
     fn clear(&mut self, tiles: &Tiles, scene: &Scene) {
-        let background = opaque(scene.background);
         for row in self.rows(tiles) {
-            for pixel in self.pixels.rgba[row].chunks_exact_mut(4) {
-                pixel.copy_from_slice(&background);
-            }
+            fill(&mut self.pixels.rgba[row], scene.background);
         }
     }
 
