@@ -77,6 +77,11 @@ pub fn last_part(name: &str) -> &str {
     }
 }
 
+/// Whether a node stands for publishers that nothing names: `/scan ?`, `/scan ? ×2`. No name of ROS holds a blank.
+pub(crate) fn is_unnamed(node: &str) -> bool {
+    node.contains(" ?")
+}
+
 /// Whether a node of this name plays bags: `/play_` and a number (ROS 1), `/rosbag2_player`.
 pub fn is_player(node: &str) -> bool {
     let last = last_part(node);

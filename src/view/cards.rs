@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::names::is_plumbing;
 use super::showing::{Showing, ShowingWriter};
 use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
-use crate::base::name::namespace;
+use crate::base::name::{is_unnamed, namespace};
 
 /// A topic that is a row in a box: of which no other end is known, or one of the plumbing.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,8 @@ impl Drawn {
         }
         keep(&mut self.arrows, |at| !gone.contains(&at));
         keep(&mut self.arrows_shown, |at| !gone.contains(&at));
-        self.drop_items(&mut rows);
+        let never = self.hide_unnamed(&rows);
+        self.drop_items(&mut rows, &never);
         rows.sort_by(|a, b| {
             let key = |row: &CardRow| (row.owner, [!row.ways[0], !row.ways[1]], row.is_plumbing);
             key(a)
@@ -170,6 +171,39 @@ impl Drawn {
         }
     }
 
+    /// Hides a box that stands for publishers without a name in the windows in which none of its topics is there, those of
+    /// the plumbing aside: it would be an empty box. Returns those that are never there.
+    fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<u32> {
+        let mut never = BTreeSet::new();
+        for (showing, at) in self.items_shown.iter_mut().zip(0_u32..) {
+            let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
+            let is_unnamed = is_unnamed(&self.items[at as usize].name);
+            if !is_unnamed || self.arrows.iter().any(is_linked) {
+                continue;
+            }
+            let own = rows
+                .iter()
+                .filter(|row| row.owner == at && !row.is_plumbing);
+            let own: Vec<&Showing> = own.map(|row| &row.shown).collect();
+            let turns = own
+                .iter()
+                .flat_map(|shown| shown.runs())
+                .chain(showing.runs());
+            let turns: BTreeSet<u32> = turns.map(|run| run.0).collect();
+            let mut writer = ShowingWriter::default();
+            for window in turns {
+                let is_there = own.iter().any(|shown| shown.at(window as usize).is_some());
+                let look = showing.at(window as usize).filter(|_| is_there);
+                writer.show(window, look.cloned());
+            }
+            *showing = writer.finish();
+            if showing.looks().is_empty() {
+                never.insert(at);
+            }
+        }
+        never
+    }
+
     /// Makes the two arrows of a box that both sends and receives a topic one line, with a head at each end that is
     /// used.
     pub(super) fn join_twins(&mut self) {
@@ -206,14 +240,16 @@ impl Drawn {
         }
     }
 
-    /// Takes the topics of these rows out of the boxes, and numbers everything anew.
-    fn drop_items(&mut self, rows: &mut [CardRow]) {
+    /// Takes the topics of these rows and the boxes that are never there out of the boxes, and numbers everything anew.
+    fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
         let gone: BTreeSet<_> = rows
             .iter()
             .map(|row| (row.item.kind, row.item.name.clone()))
             .collect();
-        let stays: Vec<bool> = (self.items.iter())
-            .map(|item| !gone.contains(&(item.kind, item.name.clone())))
+        let stays: Vec<bool> = (self.items.iter().zip(0_u32..))
+            .map(|(item, at)| {
+                !never.contains(&at) && !gone.contains(&(item.kind, item.name.clone()))
+            })
             .collect();
         let mut next = 0;
         let place = |stays: &bool| {
@@ -227,6 +263,7 @@ impl Drawn {
             arrow.from = places[arrow.from as usize];
             arrow.to = places[arrow.to as usize];
         }
+        rows.retain(|row| !never.contains(&row.owner));
         for row in rows {
             row.owner = places[row.owner as usize];
         }
