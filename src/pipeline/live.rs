@@ -165,6 +165,7 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Se
 struct Watched {
     file: GraphFile<BufWriter<File>>,
     /// The topics whose messages are recorded.
+    #[cfg_attr(not(feature = "live"), expect(dead_code, reason = "a master has none"))]
     topics: BTreeSet<String>,
     graph: LiveGraph,
     /// The last graph written since the connection was established.

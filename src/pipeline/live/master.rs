@@ -33,6 +33,7 @@ pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
             let [name, kind] = pair_of(pair)?.map(|part| text(part).to_owned());
             graph.types.insert(name, kind);
         }
+        graph.check()?;
         watched.graph = graph;
         watched.beat()?;
         std::thread::sleep(BEAT);
