@@ -254,10 +254,11 @@ fn output(folder: &Path, args: &[&str]) -> Output {
     bagreel(folder, args).output().unwrap()
 }
 
-/// A line of the log without time, rates, and length of a silence, which are more precise at the end.
+/// A line of the log without time, rates, and length of a silence, which are more precise at the end, as is whether the
+/// first message of a topic is a beginning.
 fn what(line: &str) -> &str {
     let (_, words) = line.trim_start().split_once("  ").unwrap();
-    let end = [" silent", " from ", " → "]
+    let end = [" silent", " from ", " → ", " first message", " appeared"]
         .iter()
         .filter_map(|at| words.find(at))
         .min();
