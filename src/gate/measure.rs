@@ -92,7 +92,10 @@ mod tests {
         };
         assert_eq!(shown(0, "..0.2s").as_deref(), Some("..200 ms"));
         assert_eq!(shown(0, "5ms..1m").as_deref(), Some("5 ms..1 min"));
-        assert_eq!(shown(1, "1kB/s..5MB/s").as_deref(), Some("1.0 kB/s..5.0 MB/s"));
+        assert_eq!(
+            shown(1, "1kB/s..5MB/s").as_deref(),
+            Some("1.0 kB/s..5.0 MB/s")
+        );
         assert_eq!(shown(2, "..0").as_deref(), Some("..0"));
         for (at, text) in [
             (0, "0.2s"),

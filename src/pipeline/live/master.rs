@@ -48,11 +48,12 @@ fn ask(place: &str, method: &str) -> io::Result<String> {
         "<?xml version=\"1.0\"?><methodCall><methodName>{method}</methodName><params><param><value><string>{OWN_NODE}</string>\
          </value></param></params></methodCall>"
     );
-    write!(
-        stream,
-        "POST /RPC2 HTTP/1.0\r\nHost: {place}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\n\r\n{body}",
+    let head = format!(
+        "POST /RPC2 HTTP/1.0\r\nHost: {place}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\n\r\n",
         body.len()
-    )?;
+    );
+    // At once: a server that answers the first part and closes would cut off the rest.
+    stream.write_all((head + &body).as_bytes())?;
     let mut answer = String::new();
     stream.take(MOST_ANSWER).read_to_string(&mut answer)?;
     let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_default();
