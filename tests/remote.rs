@@ -48,9 +48,9 @@ struct State {
 enum Versions {
     #[default]
     Told,
-    /// With an ETag, but ignoring `If-Match`.
+    /// With an `ETag`, but ignoring `If-Match`.
     Careless,
-    /// With a weak ETag, which `If-Match` must not compare.
+    /// With a weak `ETag`, which `If-Match` must not compare.
     Weak,
     /// By modification time.
     Dated,

@@ -52,8 +52,6 @@ impl Sink for Clip<'_> {
         }
     }
 
-    /// A reader with a range lumps together only messages inside it.
-
     fn message(&mut self, message: Message<'_>) {
         if self.range.is_none_or(|r| r.contains(message.time)) {
             self.sink.message(message);

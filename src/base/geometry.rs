@@ -146,12 +146,12 @@ impl Rect {
 }
 
 /// The point at `t` of a cubic Bézier curve, by its four points.
-pub(crate) fn on_cubic([p, a, b, q]: [Point; 4], t: f64) -> Point {
+pub(crate) fn on_cubic(points: [Point; 4], t: f64) -> Point {
     let u = 1.0 - t;
-    let mix = |p: f64, a: f64, b: f64, q: f64| {
-        u * u * u * p + 3.0 * u * u * t * a + 3.0 * u * t * t * b + t * t * t * q
+    let mix = |[start, near, far, end]: [f64; 4]| {
+        u * u * u * start + 3.0 * u * u * t * near + 3.0 * u * t * t * far + t * t * t * end
     };
-    Point::new(mix(p.x, a.x, b.x, q.x), mix(p.y, a.y, b.y, q.y))
+    Point::new(mix(points.map(|p| p.x)), mix(points.map(|p| p.y)))
 }
 
 /// The points of a path of cubic Bézier curves, each with its two controls and its end: the start, and then `pieces`

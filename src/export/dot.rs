@@ -17,10 +17,10 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         Profile::Plain => drawing,
     };
     let target = target.clone();
-    at_end(move || {
+    Ok(at_end(move || {
         let text = |seen: &_, index| drawing.write(seen, &title(sequence, index));
         text_per_window(sequence.view, &target, text, |_, _, _| None)
-    })
+    }))
 }
 
 /// The bags' names, and the window with its time.

@@ -180,8 +180,10 @@ impl<W: FnOnce() -> Result<Written> + Send> Encoder for AtEnd<W> {
 }
 
 /// Begins an output that takes no frames.
-pub(crate) fn at_end<'a>(write: impl FnOnce() -> Result<Written> + Send + 'a) -> Started<'a> {
-    Ok(Box::new(AtEnd(write)))
+pub(crate) fn at_end<'a>(
+    write: impl FnOnce() -> Result<Written> + Send + 'a,
+) -> Box<dyn Encoder + 'a> {
+    Box::new(AtEnd(write))
 }
 
 /// Begins an output of one file that takes no frames; `write` returns remarks for the user.
@@ -195,13 +197,13 @@ pub(crate) fn one_file<'a>(
 ) -> Started<'a> {
     target.must_be_one(reason)?;
     let target = target.clone();
-    at_end(move || {
+    Ok(at_end(move || {
         let mut written = Written::to(&target);
         let mut sink = OutputSink::create(&target, None)?;
         written.remarks = write(&mut sink).map_err(sink.error())?;
         written.add(sink.commit()?);
         Ok(written)
-    })
+    }))
 }
 
 /// Begins an output of one text.

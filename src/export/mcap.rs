@@ -111,7 +111,8 @@ impl<'a> Ends<'a> {
             .of
             .iter()
             .filter(|(id, _)| is_there(Element::Node(**id)));
-        let topics = (0..elements.topics.len() as u32).filter(|id| is_there(Element::Topic(*id)));
+        let topics = (0..).zip(&elements.topics).map(|(id, _)| id);
+        let topics = topics.filter(|id| is_there(Element::Topic(*id)));
         let mut alone: BTreeSet<u32> = topics.collect();
         let topic = |id: u32| elements.topics.get(id as usize);
         let mut there = Vec::new();

@@ -15,6 +15,7 @@ use crate::base::table::{Batch, TableCell};
 use crate::export::sequence::Sequence;
 use crate::export::sink::OutputSink;
 use crate::export::target::{Target, is_special};
+#[cfg(feature = "arrow")]
 use crate::mission::Mission;
 use mission::{RowTaker, TABLES, Table};
 pub(crate) use writer::TableFormat;
@@ -53,7 +54,7 @@ pub(crate) fn start<'a>(
 ) -> Started<'a> {
     check(target)?;
     let target = target.clone();
-    at_end(move || {
+    Ok(at_end(move || {
         let each = TABLES.iter().zip(files(&target, format.word()));
         let has_runs = sequence.options.has_runs;
         let write = |(table, file): (&Table, Target)| {
@@ -70,7 +71,7 @@ pub(crate) fn start<'a>(
             written.add(sink.commit()?);
         }
         Ok(written)
-    })
+    }))
 }
 
 /// All complete tables of a mission by name.

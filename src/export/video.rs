@@ -133,14 +133,11 @@ impl Video<'_> {
         // No version and no time in the file, so output is deterministic.
         command.args("-fflags +bitexact -flags:v +bitexact -map_metadata -1".split(' '));
         command.args(self.kind.arguments.split(' '));
-        match sink.handle()? {
-            Some(file) => {
-                command.arg("/dev/stdout").stdout(file);
-            }
-            None => {
-                let piped = self.kind.piped.split_whitespace();
-                command.args(piped).arg("pipe:1");
-            }
+        if let Some(file) = sink.handle()? {
+            command.arg("/dev/stdout").stdout(file);
+        } else {
+            let piped = self.kind.piped.split_whitespace();
+            command.args(piped).arg("pipe:1");
         }
         // We handle interrupts on the terminal: ffmpeg ends with its pipe.
         #[cfg(unix)]

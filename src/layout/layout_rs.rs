@@ -115,15 +115,13 @@ fn block(
         .iter()
         .map(|row| column(row, &layers, &room, &places))
         .collect();
-    let placed = routed(plan, part, &room, &across, &columns);
-    let is_clear = |(v, own): (usize, &Rect)| placed.boxes[..v].iter().all(|b| !b.overlaps(own));
-    placed.boxes.iter().enumerate().all(is_clear).then(|| {
-        PlacedPart {
-            crossings,
-            ..placed
-        }
-        .on_page(orientation)
-    })
+    let part = routed(plan, part, &room, &across, &columns);
+    let is_clear = |(v, own): (usize, &Rect)| part.boxes[..v].iter().all(|b| !b.overlaps(own));
+    part.boxes
+        .iter()
+        .enumerate()
+        .all(is_clear)
+        .then(|| PlacedPart { crossings, ..part }.on_page(orientation))
 }
 
 /// The middle of each item: along, across.

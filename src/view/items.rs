@@ -188,14 +188,10 @@ impl Viewed {
             self.set_apart(mission, options, (&nodes, &mut topics));
         }
         let mut members: BTreeMap<&ItemKey, Vec<Element>> = BTreeMap::new();
-        for (key, id) in nodes.iter().zip(0..) {
+        let own = nodes.iter().zip((0..).map(Element::Node));
+        for (key, what) in own.chain(topics.iter().zip((0..).map(Element::Topic))) {
             if let Some(key) = key {
-                members.entry(key).or_default().push(Element::Node(id));
-            }
-        }
-        for (key, id) in topics.iter().zip(0..) {
-            if let Some(key) = key {
-                members.entry(key).or_default().push(Element::Topic(id));
+                members.entry(key).or_default().push(what);
             }
         }
         let [node_words, topic_words] = &self.is_in_words;

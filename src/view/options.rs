@@ -180,6 +180,10 @@ impl Default for Grouping {
 
 /// The choice of what the picture shows of the graph.
 #[derive(Clone, Debug, Default)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "choices that do not depend on each other"
+)]
 #[non_exhaustive]
 pub struct ViewOptions {
     /// The kinds of boxes and arrows.

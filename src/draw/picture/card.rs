@@ -106,12 +106,12 @@ impl Line {
     fn words(&self, is_there: impl Fn(usize) -> bool) -> String {
         let names = self.topics.iter().filter(|(at, _)| is_there(*at));
         let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
-        let (named, rest) = names.split_at(names.len().min(MOST_SILENT));
+        let (first, rest) = names.split_at(names.len().min(MOST_SILENT));
         let rest = match rest.len() {
             0 => String::new(),
             more => format!(", +{more}"),
         };
-        format!("{} {}{rest}", self.sign, named.join(", "))
+        format!("{} {}{rest}", self.sign, first.join(", "))
     }
 }
 

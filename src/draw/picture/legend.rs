@@ -32,14 +32,22 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
     let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
-    let state = |state| {
+    let change = |own, words| (mark(&[own]), LegendSign::Change(own), words);
+    let state = |state, words| {
         let boxes = view.items_shown.iter().chain(&view.arrows_shown);
         let mut looks = boxes.flat_map(Showing::looks);
-        looks.any(|s| s.state == state && s.mark.is_none())
+        let is_there = looks.any(|s| s.state == state && s.mark.is_none());
+        (is_there, LegendSign::Box(state), words)
     };
-    let degree = |degree| {
+    let degree = |degree, words| {
         let mut looks = view.arrows_shown.iter().flat_map(Showing::looks);
-        looks.any(|s| s.degree == degree)
+        let is_there = looks.any(|s| s.degree == degree);
+        (is_there, LegendSign::Line(degree), words)
+    };
+    let (added, removed) = if view.compares {
+        ("only in B", "only in A")
+    } else {
+        ("added", "removed")
     };
     let percent = words::percent(rate_change);
     let all = [
@@ -56,75 +64,23 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
             LegendSign::Row,
             "topic whose other end is unknown",
         ),
-        (
-            mark(&[Mark::Added]),
-            LegendSign::Change(Mark::Added),
-            if view.compares { "only in B" } else { "added" },
-        ),
-        (
-            mark(&[Mark::Removed]),
-            LegendSign::Change(Mark::Removed),
-            if view.compares {
-                "only in A"
-            } else {
-                "removed"
-            },
-        ),
+        change(Mark::Added, added),
+        change(Mark::Removed, removed),
         (
             mark(&[Mark::Faster, Mark::Slower]),
             LegendSign::Change(Mark::Slower),
             &*format!("rate ± {percent} %"),
         ),
-        (
-            mark(&[Mark::HandedOver]),
-            LegendSign::Change(Mark::HandedOver),
-            "handed over",
-        ),
-        (
-            mark(&[Mark::Restarted]),
-            LegendSign::Change(Mark::Restarted),
-            "back",
-        ),
-        (
-            mark(&[Mark::Paused]),
-            LegendSign::Change(Mark::Paused),
-            "fell silent",
-        ),
-        (
-            mark(&[Mark::Changed]),
-            LegendSign::Change(Mark::Changed),
-            "changed",
-        ),
-        (
-            mark(&[Mark::Inside]),
-            LegendSign::Change(Mark::Inside),
-            "changed inside",
-        ),
-        (
-            state(State::Silent),
-            LegendSign::Box(State::Silent),
-            "silent",
-        ),
-        (
-            state(State::Latched),
-            LegendSign::Box(State::Latched),
-            "latched",
-        ),
-        (
-            state(State::Declared),
-            LegendSign::Box(State::Declared),
-            "declared only",
-        ),
-        (
-            degree(Degree::Stated),
-            LegendSign::Line(Degree::Stated),
-            "stated",
-        ),
-        (
-            degree(Degree::Inferred),
-            LegendSign::Line(Degree::Inferred),
-            "inferred",
-        ),
+        change(Mark::HandedOver, "handed over"),
+        change(Mark::Restarted, "back"),
+        change(Mark::Paused, "fell silent"),
+        change(Mark::Changed, "changed"),
+        change(Mark::Inside, "changed inside"),
+        state(State::Silent, "silent"),
+        state(State::Latched, "latched"),
+        state(State::Declared, "declared only"),
+        degree(Degree::Stated, "stated"),
+        degree(Degree::Inferred, "inferred"),
         (
             any(&|s| s.hz.is_some()),
             LegendSign::Width,

@@ -343,7 +343,7 @@ mod tests {
     #[test]
     fn a_copy_recorded_before_its_original_is_detected() {
         let message = |n: u32| {
-            let (at, early) = (i64::from(n) * 100, n % 5 == 0);
+            let (at, early) = (i64::from(n) * 100, n.is_multiple_of(5));
             [(0, at, n), (1, if early { at - 1 } else { at + 1 }, n)]
         };
         let found = walked(&(1..41).flat_map(message).collect::<Vec<_>>());

@@ -11,14 +11,14 @@ use crate::view::SeenWindow;
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let (view, style) = (sequence.view, Style::builtin("light")?);
     let target = target.clone();
-    at_end(move || {
+    Ok(at_end(move || {
         text_per_window(
             view,
             &target,
             |seen, _| chart(view, &style, seen),
             too_large,
         )
-    })
+    }))
 }
 
 /// The numbers of edges and of characters above which Mermaid refuses to draw unless it is configured otherwise (its

@@ -186,7 +186,9 @@ fn runs(mission: &Mission, is_kind: impl Fn(Element) -> bool, take: SeenTaker<'_
                 }
             }
         }
-        open.iter().for_each(|run| take(&run.seen(mission, what)));
+        if let Some(run) = &open {
+            take(&run.seen(mission, what));
+        }
     }
 }
 

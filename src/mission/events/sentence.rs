@@ -53,9 +53,10 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             }
             // Who sends and is not one of them is the mux between them.
             let is_end = |node| from.contains(node) || to.contains(node);
-            let by = match by.iter().any(is_end) {
-                false if !by.is_empty() => format!(", by {}", names(&by)),
-                _ => String::new(),
+            let by = if by.is_empty() || by.iter().any(is_end) {
+                String::new()
+            } else {
+                format!(", by {}", names(&by))
             };
             format!("handed over: {} → {}{by}", names(from), names(to))
         }
@@ -162,7 +163,7 @@ fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     listed("also", alike) + &listed("silent since then:", silent)
 }
 
-/// The subscriber that receives nothing over an edge, and the incompatible QoS policy.
+/// The subscriber that receives nothing over an edge, and the incompatible policy.
 fn starved(what: Element, policy: &str) -> String {
     let whom = match what {
         Element::Publish(_) => "a subscriber gets nothing",

@@ -58,7 +58,7 @@ const COLUMNS: &[ColumnOf<(), SurveyRow>] = columns! {
     "publishes_measured" I64 |(), row| known(row, |info| TableCell::count(info.publishes_by_degree.measured));
     "subscribes_measured" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.measured));
     "subscribes_stated" I64 |(), row| known(row, |info| TableCell::count(info.subscribes_by_degree.stated));
-    "named_nodes" I64 |(), row| known(row, |info| TableCell::count(info.nodes.iter().filter(is_named).count()));
+    "named_nodes" I64 |(), row| known(row, |info| TableCell::count(info.nodes.iter().filter(|node| is_named(node)).count()));
     "unknown_publishers" I64 |(), row| known(row, unknown_publishers);
     "evidence" Text |(), row| known(row, |info| TableCell::text(evidence(info)));
     "error" Text |(), row| TableCell::known(row.error.as_deref(), TableCell::text);
@@ -80,7 +80,7 @@ fn of_bag<'a>(row: &'a SurveyRow, cell: fn(&'a BagInfo) -> TableCell<'a>) -> Tab
 }
 
 /// Whether a node is a named node of the robot.
-fn is_named(node: &&NodeInfo) -> bool {
+fn is_named(node: &NodeInfo) -> bool {
     let mut evidence = node.evidence.iter();
     let is_guess = evidence.all(|word| Evidence::of(word).is_guess());
     !is_guess && !is_recorder(&node.name) && !is_player(&node.name)

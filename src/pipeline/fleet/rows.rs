@@ -6,6 +6,7 @@ use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::Stamp;
 
 /// The column of a node's name without its anonymous suffix.
+#[cfg(feature = "arrow")]
 pub(super) const ROLE: &str = "node_role";
 
 pub(super) const COUNTS: &[ColumnOf<(), Count>] = columns! {

@@ -122,9 +122,9 @@ impl Bridge<'_> {
             (&[SERVERS], "removedServices"),
         ] {
             for name in list(message, gone).filter_map(Value::as_str) {
-                sides
-                    .iter()
-                    .for_each(|side| graph.set(*side, name, [].into()));
+                for side in sides {
+                    graph.set(*side, name, [].into());
+                }
             }
         }
         for (side, topics, nodes) in [
