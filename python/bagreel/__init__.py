@@ -127,6 +127,7 @@ def render(
     bags: Bags,
     outputs: Paths,
     *,
+    offset: Iterable[str] = (),
     verify: bool = False,
     format: str | None = None,  # noqa: A002
     period: str | None = None,
@@ -182,7 +183,8 @@ def render(
     """Draws and writes outputs, as `bagreel render` does; the options are those of the command, a list where one may be
     repeated. Returns the files, of which a notebook shows the first. Raises `BagreelError` with what the command said.
     """
-    topology, collapse, expand, link = list(topology), list(collapse), list(expand), list(link)
+    offset, topology = list(offset), list(topology)
+    collapse, expand, link = list(collapse), list(expand), list(link)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("render", bags, output=outputs, **options)
@@ -193,7 +195,7 @@ def figure(
     bags: Bags,
     outputs: Paths,
     *,
-    kind: Literal["lives", "map", "steps"] = "lives",
+    kind: Literal["lives", "map", "steps", "changes"] = "lives",
     width: str | None = None,
     rows: str | None = None,
     steps: str | None = None,
@@ -206,6 +208,7 @@ def figure(
     rate_change: float | None = None,
     ns_filter: str | None = None,
     topic_filter: str | None = None,
+    offset: Iterable[str] = (),
     verify: bool = False,
     roles: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
@@ -216,7 +219,7 @@ def figure(
     """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of who talks to whom, or the
     reconfigurations one by one, as wide as `width` says (88mm).
     """
-    topology = list(topology)
+    offset, topology = list(offset), list(topology)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("figure", bags, output=outputs, **options)
@@ -267,6 +270,7 @@ def events(
     rate_change: float | None = None,
     parts: bool = False,
     all: bool = False,  # noqa: A002
+    offset: Iterable[str] = (),
     start: str | None = None,
     end: str | None = None,
     roles: bool = False,
@@ -277,7 +281,7 @@ def events(
 
     `parts` adds what each entry consists of, `all` housekeeping and the recorder.
     """
-    topology = list(topology)
+    offset, topology = list(offset), list(topology)
     _, text = run("events", bags, format="ndjson", **given(locals(), "bags"))
     return [json.loads(line) for line in text.splitlines()]
 
