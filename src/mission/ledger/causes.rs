@@ -28,6 +28,14 @@ fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
     places
 }
 
+/// Those of entries sorted by time that lie between two times, or near them.
+fn near(drafts: &Drafts, sorted: &[EntryId], from: Stamp, to: Stamp) -> Vec<EntryId> {
+    let (from, to) = (from.plus(-TOGETHER_NS), to.plus(TOGETHER_NS));
+    let first = sorted.partition_point(|id| drafts.get(*id).time < from);
+    let near = sorted[first..].iter().copied();
+    near.take_while(|id| drafts.get(*id).time <= to).collect()
+}
+
 /// A node known only from the messages of one topic that hands it over or takes it over need not have stopped or
 /// started.
 fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
@@ -39,19 +47,19 @@ fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
         else {
             continue;
         };
-        for step in &steps {
-            let other = drafts.get(*step);
+        for step in near(drafts, &steps, entry.time, entry.time) {
+            let other = drafts.get(step);
             let (Some(node), of) = context.elements.ends(other.what) else {
                 continue;
             };
             // A mux has the rate of the sender whose turn it is.
             let is_mux = of == Some(topic) && !from.contains(&node) && !to.contains(&node);
-            if is_mux && is_within(other.time, entry.time, TOGETHER_NS) {
-                drafts.fold(*step, hand);
+            if is_mux {
+                drafts.fold(step, hand);
             }
         }
-        for turn in &turns {
-            let other = drafts.get(*turn);
+        for turn in near(drafts, &turns, entry.earliest, entry.time) {
+            let other = drafts.get(turn);
             let Element::Node(node) = other.what else {
                 continue;
             };
@@ -61,7 +69,7 @@ fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             };
             let is_end = of.contains(&node) && is_within(other.time, at, TOGETHER_NS);
             if is_end && is_only_sender(context, node, topic) {
-                drafts.fold(*turn, hand);
+                drafts.fold(turn, hand);
             }
         }
     }
@@ -242,12 +250,15 @@ fn crowds(context: &LedgerInput<'_>, drafts: &mut Drafts) {
         for places in of.values() {
             for (at, first) in places.iter().enumerate() {
                 let one = drafts.get(*first).clone();
+                if !one.is_headline() {
+                    continue;
+                }
                 let rest = places[at + 1..].iter().copied();
                 let soon =
                     rest.take_while(|id| is_within(drafts.get(*id).time, one.time, CLOSE_NS));
                 let alike: Vec<EntryId> =
                     soon.filter(|id| is_alike(&one, drafts.get(*id))).collect();
-                for id in alike.into_iter().filter(|_| one.is_headline()) {
+                for id in alike {
                     drafts.fold(id, *first);
                 }
             }
