@@ -40,8 +40,8 @@ kinds! {
          all that the bag tells.";
     NodeGone "node-gone":
         "A node ended before the mission did.",
-        "A node that is expected is expected to stay. Its end is told by a rhythm that broke for good, or by something \
-         that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go, \
+        "An expected node is expected to stay. Its end is inferred from a rhythm that broke for good, or stated by a \
+         log or snapshot; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go, \
          `may_end: 1:30..` from then on.";
     NodeRestarted "node-restarted":
         "A node restarted more or less often than allowed.",

@@ -109,9 +109,8 @@ pub(crate) fn nodes_in_words(
     (0..).zip(&changes).map(is_in_words).collect()
 }
 
-/// Whether anything is told of each node, of itself, its connections, or a topic of its own, and whether of itself or
-/// its connections. That it starts in the first
-/// window is no change: it was there before most of the picture.
+/// Whether anything is reported of each node, of itself, its connections, or a topic of its own, and whether of itself or
+/// its connections. A start in the first window is no change: the node was there before most of the picture.
 fn changing_nodes(
     mission: &Mission,
     drawn: &[bool],

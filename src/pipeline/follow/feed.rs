@@ -9,7 +9,7 @@ use crate::base::time::Stamp;
 use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
 use crate::mission::events::{LogFormat, line, quoted};
-use crate::mission::ledger::{Entry, Kind};
+use crate::mission::ledger::{Detail, Entry, Kind};
 
 worded! {
     /// The certainty of a line.
@@ -43,6 +43,7 @@ impl Certainty {
 struct Printed {
     kind: Kind,
     names: (Option<String>, Option<String>),
+    detail: Detail,
     time: Stamp,
     certainty: Certainty,
     line: String,
@@ -77,7 +78,10 @@ impl Feed {
             let names = (names.0.map(str::to_owned), names.1.map(str::to_owned));
             let same = |printed: &&mut Printed| {
                 let is_near = printed.time.since(entry.time).abs() <= TOGETHER_NS;
-                printed.kind == entry.kind && printed.names == names && is_near && !printed.is_there
+                // Numbers become more precise; another state is another event.
+                let is_other = entry.kind == Kind::Lifecycle && printed.detail != entry.detail;
+                let is_alike = printed.kind == entry.kind && printed.names == names && !is_other;
+                is_alike && is_near && !printed.is_there
             };
             if let Some(printed) = self.printed.iter_mut().find(same) {
                 printed.is_there = true;
@@ -95,6 +99,7 @@ impl Feed {
             self.printed.push(Printed {
                 kind: entry.kind,
                 names,
+                detail: entry.detail.clone(),
                 time: entry.time,
                 certainty,
                 line,
