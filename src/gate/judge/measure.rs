@@ -1,5 +1,7 @@
 //! Checks of optional measures of topics: age, bytes and losses of messages, in each window.
 
+use std::collections::BTreeSet;
+
 use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
@@ -21,7 +23,8 @@ impl Judge<'_> {
     ) -> Option<Finding> {
         let name = self.facts.topic(topic);
         let key = measure.key;
-        let windows: Vec<usize> = self.judged(topic, facts).iter().map(|r| r.window).collect();
+        let judged = self.judged(topic, facts);
+        let windows: BTreeSet<usize> = judged.iter().map(|rate| rate.window).collect();
         let rows = self.facts.rows(topic);
         let rows = rows.filter(|(window, _)| windows.contains(&window.index));
         let known: Vec<(Span, f64)> = rows
@@ -36,8 +39,8 @@ impl Judge<'_> {
         if bad.len() as f64 <= known.len() as f64 * (1.0 - facts.percent.unwrap_or(100.0) / 100.0) {
             return None;
         }
-        let off =
-            |value: f64| (value - range.to.unwrap_or(0.0)).max(range.from.unwrap_or(0.0) - value);
+        let (from, to) = (range.from.unwrap_or(0.0), range.to.unwrap_or(f64::INFINITY));
+        let off = |value: f64| (value - to).max(from - value);
         let worst = bad.iter().max_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         let span = Span::new(bad.first()?.0.start, bad.last()?.0.end);
         let (seen, expected) = ((measure.shown)(worst.1), measure.range_shown(range));
