@@ -2,6 +2,7 @@
 
 #![expect(unreachable_pub, reason = "a test binary has no outside")]
 
+pub mod browser;
 pub mod cdr;
 pub mod mcap;
 pub mod mission;
