@@ -761,7 +761,7 @@ fn topology_files_and_headers_are_listed_as_evidence() {
 }
 
 #[test]
-fn publishers_without_messages_in_the_range_are_declared() {
+fn publishers_without_messages_in_the_range_are_left_out() {
     let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json");
@@ -771,10 +771,9 @@ fn publishers_without_messages_in_the_range_are_declared() {
     let mission: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     let nodes = mission["windows"][0]["nodes"].as_array().unwrap();
-    let state = |name: &str| nodes.iter().find(|n| n["name"] == name).unwrap()["state"].clone();
+    let is_there = |name: &str| nodes.iter().any(|node| node["name"] == name);
     // It starts in the fifth minute and is named in the bag's headers.
-    assert_eq!(state("/robot1/dock_controller"), "declared");
-    assert_eq!(state("/robot1/amcl"), "active");
+    assert!(!is_there("/robot1/dock_controller") && is_there("/robot1/amcl"));
     // Conclusions from a node's name still apply to its topic.
     let topics = mission["windows"][0]["topics"].as_array().unwrap();
     let joints = topics.iter().find(|t| t["name"] == "/robot1/joint_states");

@@ -1,19 +1,26 @@
 //! Compares the example mission with an independent reader's counts and with the ground truth.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use bagreel::internals::base::time::Period;
+use bagreel::internals::base::time::{Moment, Period};
 use bagreel::internals::graph::window::Length;
 use bagreel::internals::mission::Mission;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 
 /// The mission in 10-second windows.
 fn mission() -> Mission {
+    part(None, None)
+}
+
+/// The mission between two times.
+fn part(start: Option<&str>, end: Option<&str>) -> Mission {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let length = Period::parse("10").map_or(Length::Auto, Length::Fixed);
     let mut reading = Reading::of([path]);
     reading.division.length = length;
+    reading.division.start = start.and_then(Moment::parse);
+    reading.division.end = end.and_then(Moment::parse);
     read(&reading, &mut Unwatched).unwrap()
 }
 
@@ -82,4 +89,26 @@ fn nodes_start_and_stop_at_the_true_times() {
         [seconds(170, 260), seconds(280, 290)].concat()
     );
     assert_eq!(life("/robot1/dock_controller"), seconds(290, 320));
+}
+
+/// The headers of connections name all nodes, also those that stop before the part begins.
+#[test]
+fn nodes_of_another_part_of_the_recording_are_not_in_the_graph() {
+    let names = |mission: &Mission, window: usize| -> BTreeSet<String> {
+        let graph = mission.graphs.get(window).unwrap();
+        let node = |id: u32| mission.elements.nodes[id as usize].name.to_string();
+        graph.nodes.iter().map(|n| node(n.id)).collect()
+    };
+    let (whole, part) = (mission(), part(Some("280"), None));
+    let (alive, drawn) = (names(&whole, 28), names(&part, 0));
+    let strangers: Vec<_> = drawn.difference(&alive).collect();
+    assert!(strangers.is_empty(), "{strangers:?}");
+    assert!(drawn.contains("/map_server") && drawn.contains("/robot2/planner"));
+    let is_stopped = |name: &str| name == "/robot1/emergency_stop";
+    let mut all = part.elements.nodes.iter();
+    assert!(!all.any(|node| is_stopped(node.name.as_str())));
+    let part = self::part(None, Some("20"));
+    let (alive, drawn) = (names(&whole, 0), names(&part, 0));
+    let strangers: Vec<_> = drawn.difference(&alive).collect();
+    assert!(strangers.is_empty(), "{strangers:?}");
 }

@@ -391,6 +391,7 @@ impl Sink for BagSink<'_> {
             speaker: None,
             latched: is_held(connection),
             trust: Reliability::Whole,
+            is_outside: false,
             times: all.messages.series(),
         };
         let (mut readers, foreign) = source::readers(&stream);
@@ -485,6 +486,15 @@ impl Recorded {
     /// Whether a time is credible.
     pub(crate) fn believes(&self, time: Stamp) -> bool {
         self.believed.is_none_or(|span| span.contains(time))
+    }
+
+    /// Marks the streams without a message in the part of the recording that was read. In a part from the beginning on,
+    /// they have latched nothing yet.
+    pub(crate) fn mark_outside(&mut self, is_first: bool) {
+        for stream in &mut self.streams {
+            stream.is_outside = self.messages.bounds(stream.times).is_none();
+            stream.latched &= !(stream.is_outside && is_first);
+        }
     }
 
     /// Finds the span of all messages at credible times, and counts the others.

@@ -91,8 +91,20 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         mut proofs,
         mut incidents,
         copies,
+        gone,
         ..
     } = known;
+    // Neither their headers nor what follows from these shows that they are there.
+    proofs.retain(|proof| {
+        let node = match proof.what {
+            ElementKey::Topic(_) => None,
+            ElementKey::Node(node)
+            | ElementKey::Publish(node, _)
+            | ElementKey::Subscribe(_, node) => Some(node),
+        };
+        let is_sign = !matches!(proof.when, Validity::Messages(_) | Validity::Like(_));
+        is_sign || node.is_none() || !gone.contains(&node)
+    });
     let roles = if options.roles {
         fold(&mut proofs, &mut facts)
     } else {

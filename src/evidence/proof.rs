@@ -35,6 +35,8 @@ pub(crate) struct Stream {
     pub(crate) trust: Reliability,
     /// The log times of its messages.
     pub(crate) times: SeriesId,
+    /// Whether a part of the recording is read and all its messages are in another.
+    pub(crate) is_outside: bool,
 }
 
 impl Stream {
@@ -141,6 +143,22 @@ impl Proof {
     }
 }
 
+/// The publishers that send only in another part of the recording than the one that is read: they may have stopped, or
+/// not have started. Nodes that send nothing but latched messages and logs may well be there.
+fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
+    let of = |is: &dyn Fn(&&Stream) -> bool| -> BTreeSet<Option<Name>> {
+        streams.iter().filter(is).map(|s| s.publisher).collect()
+    };
+    let absent = of(&|s| s.is_outside && s.publisher.is_some());
+    let speaking = of(&|s| !s.is_outside);
+    let holding = of(&|s| s.latched);
+    let repeating = of(&|s| !s.latched && s.connection.topic.as_str() != "/rosout");
+    let is_gone = |node: &Option<Name>| {
+        !speaking.contains(node) && (repeating.contains(node) || !holding.contains(node))
+    };
+    absent.into_iter().filter(is_gone).collect()
+}
+
 /// Everything known about a mission once all bags are read, and the conclusions so far.
 #[derive(Debug)]
 pub(crate) struct Conclusions<'a> {
@@ -155,6 +173,8 @@ pub(crate) struct Conclusions<'a> {
     pub(crate) copies: BTreeSet<(Name, Name)>,
     /// The mission's first and last moment.
     pub(crate) mission: (Stamp, Stamp),
+    /// The publishers that may be gone, or not there yet, in the part of the recording that is read.
+    pub(crate) gone: BTreeSet<Option<Name>>,
     /// The streams of each topic.
     recorded: BTreeMap<Name, Vec<usize>>,
     /// The number of publishers of each topic when its recording began.
@@ -175,6 +195,7 @@ impl<'a> Conclusions<'a> {
         }
         Self {
             mission,
+            gone: gone(streams),
             recorded,
             offers: offers(&facts.offers, streams),
             streams,

@@ -66,6 +66,9 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         }
     }
     let mut recorded = collector.finish()?;
+    if let Some((range, known)) = range.zip(known) {
+        recorded.mark_outside(range.start <= known.start);
+    }
     recorded.notices.extend(twice);
     recorded.falls = seams
         .iter()

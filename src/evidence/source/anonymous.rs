@@ -14,7 +14,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let Some(start) = start(&known.text(node)) else {
             continue;
         };
-        if start > last || first.since(start) > LONGEST_NS {
+        if known.gone.contains(&Some(node)) || start > last || first.since(start) > LONGEST_NS {
             continue;
         }
         let proof = Proof {
