@@ -15,7 +15,7 @@ pub fn drive<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = 
         std::env::var_os("CI").is_some_and(|ci| !ci.is_empty() && ci != "0" && ci != "false");
     let Ok(driven) = driven else {
         assert!(!is_must, "`python3` is not installed");
-        eprintln!("skipped: `python3` is not installed");
+        println!("skipped: `python3` is not installed");
         return;
     };
     let (out, err) = (
@@ -32,5 +32,5 @@ pub fn drive<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = 
             "{out}"
         );
     }
-    eprint!("{out}");
+    print!("{out}");
 }
