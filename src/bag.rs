@@ -34,11 +34,13 @@ pub(crate) use folder::recordings;
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{closed, head, place};
+#[doc(hidden)]
+pub use model::Growth;
 pub use model::{
     Connection, ConnectionId, Encoding, Lumps, Message, OpenOptions, Reader, Report, Sink, Tier,
     Want,
 };
-pub(crate) use model::{ETAG, Growing, Growth};
+pub(crate) use model::{ETAG, Growing};
 pub(crate) use object::{list, version};
 use unknown::explain;
 

@@ -65,5 +65,7 @@ pub mod export {
 
 /// See `src/pipeline.rs`.
 pub mod pipeline {
+    #[cfg(feature = "cli")]
+    pub use crate::pipeline::follow;
     pub use crate::pipeline::{Reading, Unwatched, explain, read};
 }

@@ -15,7 +15,7 @@ mod fit;
 #[cfg(feature = "render")]
 pub mod fleet;
 #[cfg(feature = "cli")]
-pub(crate) mod follow;
+pub mod follow;
 #[cfg(feature = "cli")]
 pub(crate) mod gate;
 mod inputs;

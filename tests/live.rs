@@ -1,11 +1,11 @@
 //! Tests of live systems: scripted local servers for the ROS 1 master API and Foxglove's protocol.
 
 use std::collections::BTreeSet;
-use std::io::{Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Command, Output};
-use std::thread::spawn;
+use std::process::{Command, Output, Stdio};
+use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -101,22 +101,55 @@ fn a_ros_1_master_is_watched() {
     assert!(edges.contains("/listener ← /chat"), "{edges:?}");
 }
 
-#[test]
-fn a_server_that_is_not_a_master_is_reported() {
+/// The first line about the connection to an address.
+fn complaint(address: &str) -> String {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    run.args(["follow", address]).stderr(Stdio::piped());
+    let mut follower = run.spawn().unwrap();
+    let mut line = String::new();
+    let mut lines = BufReader::new(follower.stderr.take().unwrap());
+    lines.read_line(&mut line).unwrap();
+    follower.kill().unwrap();
+    follower.wait().unwrap();
+    line
+}
+
+/// Answers every call with the same bytes, one at a time if it `drips`.
+fn answering(answer: String, drips: bool) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("ros1://{}", listener.local_addr().unwrap());
     spawn(move || {
         for stream in listener.incoming() {
             let mut stream = stream.unwrap();
             let _ = stream.read(&mut [0; 4096]);
-            let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\n\r\n");
+            let parts = answer
+                .as_bytes()
+                .chunks(if drips { 1 } else { answer.len() });
+            for part in parts {
+                if stream.write_all(part).is_err() {
+                    break;
+                }
+                sleep(Duration::from_millis(20));
+            }
         }
     });
-    let folder = TempDir::new().unwrap();
-    let done = follow(folder.path(), &[&address]);
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(said.contains("not that of a ROS master"), "{said}");
-    assert_eq!(done.status.code(), Some(1), "{said}");
+    address
+}
+
+#[test]
+fn what_is_not_a_master_is_reported() {
+    let ok = "HTTP/1.0 200 OK\r\n\r\n";
+    let attributes: Vec<String> = (0..200_000).map(|at| format!(" a{at}=''")).collect();
+    let answers = [
+        (format!("{ok}{}", "<value/>".repeat(4 << 20)), false),
+        (format!("{ok}<a{}/>", attributes.concat()), false),
+        (format!("{ok}{}", " ".repeat(10_000)), true),
+        ("HTTP/1.1 404 Not Found\r\n\r\n".to_owned(), false),
+    ];
+    for (answer, drips) in answers {
+        let said = complaint(&answering(answer, drips));
+        assert!(said.contains("no connection to ros1://"), "{said}");
+    }
 }
 
 #[test]
@@ -137,7 +170,7 @@ mod bridge {
     use tungstenite::handshake::server::{Request, Response};
     use tungstenite::{Message, WebSocket, accept_hdr};
 
-    use super::{follow, graph};
+    use super::{complaint, follow, graph};
 
     /// Sends a message to the client.
     fn say(to: &mut WebSocket<TcpStream>, message: &Value) {
@@ -158,8 +191,8 @@ mod bridge {
         })
     }
 
-    /// Like `foxglove_bridge`: sends the graph when a subscription follows the one to the graph.
-    fn serve(stream: TcpStream) {
+    /// Opens the protocol with a client.
+    fn open(stream: TcpStream) -> WebSocket<TcpStream> {
         #[expect(clippy::result_large_err, reason = "the type is the library's")]
         let protocol = |_: &Request, mut response: Response| {
             let own = "foxglove.websocket.v1".parse().unwrap();
@@ -171,6 +204,12 @@ mod bridge {
             &mut client,
             &json!({"op": "serverInfo", "name": "robot", "capabilities": ["connectionGraph"]}),
         );
+        client
+    }
+
+    /// Like `foxglove_bridge`: sends the graph when a subscription follows the one to the graph.
+    fn serve(stream: TcpStream) {
+        let mut client = open(stream);
         assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
         say(
             &mut client,
@@ -192,6 +231,34 @@ mod bridge {
         }
         say(&mut client, &update(&[]));
         sleep(Duration::from_millis(1500));
+    }
+
+    #[test]
+    fn hostile_bridges_are_left() {
+        let channel = |at| json!({"id": at, "topic": format!("/topic{at}"), "schemaName": "a/B"});
+        let channels =
+            json!({"op": "advertise", "channels": (0..300_000).map(channel).collect::<Vec<_>>()});
+        let topic = |at| json!({"name": format!("/t{at}"), "publisherIds": ["/node"]});
+        let many = json!({"op": "connectionGraphUpdate", "publishedTopics": (0..70_000).map(topic).collect::<Vec<_>>()});
+        let texts = [
+            (r#"{"op": "connectionGr"#.to_owned(), "EOF while parsing"),
+            (channels.to_string(), "too much at once"),
+            (many.to_string(), "more than 65536 names"),
+        ];
+        for (text, why) in texts {
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            let address = format!("ws://{}", listener.local_addr().unwrap());
+            spawn(move || {
+                for stream in listener.incoming() {
+                    let mut client = open(stream.unwrap());
+                    let _ = client.send(Message::text(&*text));
+                    // The client ends the connection.
+                    while client.read().is_ok() {}
+                }
+            });
+            let said = complaint(&address);
+            assert!(said.contains(why), "{said}");
+        }
     }
 
     #[test]

@@ -86,6 +86,11 @@ pub(crate) trait Grammar: Default + Send + 'static {
         false
     }
 
+    /// Whether the writer ended the bag, also where it wrote no index.
+    fn is_ended(_source: &FileSource) -> bool {
+        false
+    }
+
     /// Facts from the first bytes, to show in `info`.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
 

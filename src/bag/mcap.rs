@@ -122,6 +122,10 @@ impl Grammar for Mcap {
         source.is_none_or(|source| !matches!(summary::data_crc(source), Ok(Some(0))))
     }
 
+    fn is_ended(source: &FileSource) -> bool {
+        matches!(summary::data_crc(source), Ok(Some(_)))
+    }
+
     /// The facts in the file's header.
     fn facts(head: &[u8]) -> Vec<(String, String)> {
         let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());

@@ -209,7 +209,7 @@ pub trait Reader: Send {
 
 /// The outcome of one look at a growing recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Growth {
+pub enum Growth {
     /// Nothing new could be read.
     Same,
     /// Something new was reported.

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::base::error::{Error, Result};
 
@@ -15,7 +15,7 @@ use crate::base::error::{Error, Result};
 const MOST_REQUEST: usize = 8 << 10;
 /// The most connections at a time: a page keeps one open.
 const MOST_OPEN: usize = 32;
-/// The timeout for reading a request or writing a part of an answer.
+/// The time for a request, and for writing a part of an answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The keep-alive interval of event streams, so that closed connections are detected.
 const ALIVE: Duration = Duration::from_secs(15);
@@ -80,10 +80,11 @@ fn answer(mut stream: TcpStream, newest: &Newest) -> std::io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut request = Vec::new();
     let mut part = [0; 1024];
+    let until = Instant::now() + PATIENCE;
     while !request.windows(4).any(|end| end == b"\r\n\r\n") {
         let got = stream.read(&mut part)?;
         request.extend_from_slice(&part[..got]);
-        if got == 0 || request.len() > MOST_REQUEST {
+        if got == 0 || request.len() > MOST_REQUEST || Instant::now() > until {
             return refuse(&mut stream, "431 Request Header Fields Too Large");
         }
     }

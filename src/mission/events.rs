@@ -44,7 +44,7 @@ pub struct LogOptions {
 }
 
 /// A row of the log, in order.
-enum LogRow<'a> {
+pub(crate) enum LogRow<'a> {
     Phase(usize, &'a Phase),
     Interruption(&'a Interruption),
     Switch(Switch),
@@ -70,16 +70,25 @@ pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String 
     }
 }
 
-/// One entry of the log, as [`LogFormat::Ndjson`] or as text.
-pub(crate) fn line(mission: &Mission, id: EntryId, entry: &Entry, format: LogFormat) -> String {
-    if format == LogFormat::Ndjson {
-        return rows_of(mission).swap_remove(id as usize);
+/// The rows of the log without phases and parts; switches to another mode are rows for people only.
+pub(crate) fn headlines(mission: &Mission, format: LogFormat) -> Vec<LogRow<'_>> {
+    let rows = chosen(mission, LogOptions::default());
+    match format {
+        LogFormat::Csv | LogFormat::Ndjson => rows,
+        LogFormat::Text | LogFormat::Markdown => with_switches(mission, rows),
     }
-    format!(
-        "{:>13}  {}",
-        at(mission, entry),
-        sentence(mission, id, entry)
-    )
+}
+
+/// Rows of the log, each as [`LogFormat::Ndjson`] or as text, without a new line.
+pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -> Vec<String> {
+    if format == LogFormat::Ndjson {
+        return ndjson(mission, rows).lines().map(str::to_owned).collect();
+    }
+    let text = |row| {
+        let (when, words) = when_and_what(mission, row);
+        format!("{when:>13}  {words}")
+    };
+    rows.iter().map(text).collect()
 }
 
 /// The rows with a row before each switch to another mode, which is no event of its own.
@@ -174,29 +183,12 @@ impl LogLine {
 pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
     let rows = with_switches(mission, chosen(mission, options));
     let shown = sorted(&rows).into_iter().map(|row| {
-        let (kind, when, words) = match row {
-            LogRow::Phase(at, phase) => {
-                let when = words::offset_tenths(mission.offset(phase.span.start));
-                (None, when, format!("── {} ──", title(*at, phase)))
-            }
-            LogRow::Interruption(one) => {
-                let when = words::offset_tenths(mission.offset(one.time));
-                (None, when, sentence::interrupted(one))
-            }
-            LogRow::Switch(one) => {
-                let when = words::offset_tenths(mission.offset(one.time));
-                (None, when, sentence::switched(one))
-            }
-            LogRow::Entry(id, entry) | LogRow::Part(id, entry) => (
-                Some(entry.kind),
-                at(mission, entry),
-                sentence(mission, *id, entry),
-            ),
-        };
-        let inner = if matches!(row, LogRow::Part(..)) {
-            "  "
-        } else {
-            ""
+        let (when, words) = when_and_what(mission, row);
+        let (kind, inner, words) = match row {
+            LogRow::Phase(..) => (None, "", format!("── {words} ──")),
+            LogRow::Interruption(_) | LogRow::Switch(_) => (None, "", words),
+            LogRow::Entry(_, entry) => (Some(entry.kind), "", words),
+            LogRow::Part(_, entry) => (Some(entry.kind), "  ", words),
         };
         LogLine {
             kind,
@@ -205,6 +197,19 @@ pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
         }
     });
     shown.collect()
+}
+
+/// The time of a row and its words for people.
+fn when_and_what(mission: &Mission, row: &LogRow<'_>) -> (String, String) {
+    let tenths = |time| words::offset_tenths(mission.offset(time));
+    match row {
+        LogRow::Phase(number, phase) => (tenths(phase.span.start), title(*number, phase)),
+        LogRow::Interruption(one) => (tenths(one.time), sentence::interrupted(one)),
+        LogRow::Switch(one) => (tenths(one.time), sentence::switched(one)),
+        LogRow::Entry(id, entry) | LogRow::Part(id, entry) => {
+            (at(mission, entry), sentence(mission, *id, entry))
+        }
+    }
 }
 
 /// The rows sorted by printed time, parts after the event that they belong to.
@@ -237,27 +242,11 @@ fn shown(entry: &Entry) -> Stamp {
 fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = "| when | what |\n|---:|---|\n".to_owned();
     for row in sorted(rows) {
-        let (when, words) = match row {
-            LogRow::Phase(at, phase) => {
-                let when = words::offset_tenths(mission.offset(phase.span.start));
-                (when, format!("**{}**", escaped(&title(*at, phase))))
-            }
-            LogRow::Interruption(one) => {
-                let when = words::offset_tenths(mission.offset(one.time));
-                (when, sentence::interrupted(one))
-            }
-            LogRow::Switch(one) => {
-                let when = words::offset_tenths(mission.offset(one.time));
-                (when, sentence::switched(one))
-            }
-            LogRow::Entry(id, entry) => {
-                let words = sentence(mission, *id, entry);
-                (at(mission, entry), escaped(&words))
-            }
-            LogRow::Part(id, entry) => {
-                let words = sentence(mission, *id, entry);
-                (at(mission, entry), format!("· {}", escaped(&words)))
-            }
+        let (when, words) = when_and_what(mission, row);
+        let words = match row {
+            LogRow::Phase(..) => format!("**{}**", escaped(&words)),
+            LogRow::Part(..) => format!("· {}", escaped(&words)),
+            _ => escaped(&words),
         };
         let _ = writeln!(all, "| {when} | {words} |");
     }

@@ -8,18 +8,20 @@ mod feed;
 use super::collect::Collected;
 use super::read::so_far;
 use super::{Reading, Render, Unwatched, show};
+pub use crate::bag::Growth;
 use crate::bag::source::Temporary;
-use crate::bag::{self, Growing, Growth, Input, Report, Tier, file_name};
+use crate::bag::{self, Growing, Input, Report, Tier, file_name};
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::collector::Collector;
 use crate::export::Output;
 use crate::graph::window::Length;
 use crate::mission::Mission;
-pub(crate) use feed::{Feed, FindingFeed};
+pub use feed::Feed;
+pub(crate) use feed::FindingFeed;
 
 /// A growing recording and what has been collected from it.
-pub(crate) struct Follow {
+pub struct Follow {
     reading: Reading,
     growing: Box<dyn Growing>,
     collector: Collector,
@@ -31,12 +33,13 @@ pub(crate) struct Follow {
 }
 
 /// The mission of a growing recording so far.
-pub(crate) struct SoFar {
-    pub(crate) mission: Mission,
+pub struct SoFar {
+    /// The mission.
+    pub mission: Mission,
     /// The time from which on it contains all messages.
-    pub(crate) from: Stamp,
+    pub from: Stamp,
     /// The time of the newest message.
-    pub(crate) now: Stamp,
+    pub now: Stamp,
 }
 
 impl Follow {
@@ -44,7 +47,7 @@ impl Follow {
     ///
     /// # Errors
     /// If it cannot be read or cannot grow.
-    pub(crate) fn new(reading: Reading, keep: Period) -> Result<Self> {
+    pub fn new(reading: Reading, keep: Period) -> Result<Self> {
         let [input] = &reading.inputs[..] else {
             return Err(Error::usage("one recording is followed", "name one"));
         };
@@ -67,7 +70,7 @@ impl Follow {
     ///
     /// # Errors
     /// If the recording no longer exists, or a temporary file cannot be used.
-    pub(crate) fn poll(&mut self) -> Result<Growth> {
+    pub fn poll(&mut self) -> Result<Growth> {
         let growth = self.growing.poll(&mut self.collector.on(&mut |_, _| {}))?;
         if let Some((first, last, _)) = self.collector.extent().filter(|_| growth == Growth::More) {
             self.origin.get_or_insert(first);
@@ -91,7 +94,7 @@ impl Follow {
     ///
     /// # Errors
     /// As for reading the recording.
-    pub(crate) fn so_far(&self, most: u64, length: Length) -> Result<Option<SoFar>> {
+    pub fn so_far(&self, most: u64, length: Length) -> Result<Option<SoFar>> {
         let Some((first, last, count)) = self.collector.extent() else {
             return Ok(None);
         };

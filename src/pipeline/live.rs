@@ -10,28 +10,29 @@ mod master;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{JoinHandle, sleep, spawn};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::bag::source::Temporary;
+use crate::base::budget::NAMES;
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
 
 /// The heartbeat interval.
 const BEAT: Duration = Duration::from_secs(1);
-/// The timeout of an answer.
+/// The time for connecting, and for a whole answer.
 const WAIT: Duration = Duration::from_secs(5);
 /// The longest wait before reconnecting.
 const MOST_WAIT: Duration = Duration::from_secs(16);
-/// The most names of nodes, topics and services at a time, each end counted once.
-const MOST_NAMES: usize = 200_000;
+/// The most bytes of graphs recorded per second, so that a system that changes all the time does not fill the disk.
+const MOST_RECORDED: f64 = 1e6;
 
 /// The supported protocols by URL scheme; `None` for those disabled in this build.
 const WAYS: [(&str, Option<Watch>); 2] = [("ros1://", Some(master::watch)), ("ws://", BRIDGE)];
@@ -87,6 +88,7 @@ impl Live {
             topics: topics.iter().cloned().collect(),
             graph: LiveGraph::default(),
             written: None,
+            due: Instant::now(),
             is_over: is_over.clone(),
         };
         let (name, place) = (text.to_string(), place.trim_end_matches('/').to_owned());
@@ -170,6 +172,8 @@ struct Watched {
     graph: LiveGraph,
     /// The last graph written since the connection was established.
     written: Option<Vec<u8>>,
+    /// The time at which the next graph may be written.
+    due: Instant,
     is_over: Arc<AtomicBool>,
 }
 
@@ -181,25 +185,68 @@ impl Watched {
     /// Records a heartbeat, and the graph if it has changed.
     fn beat(&mut self) -> io::Result<()> {
         let now = now();
-        let payload = self.graph.payload();
-        if self.written.as_ref() != Some(&payload) {
-            self.file.write(GRAPH, now, &payload)?;
-            self.written = Some(payload);
+        if self.written.is_none() || Instant::now() >= self.due {
+            let payload = self.graph.payload();
+            if self.written.as_ref() != Some(&payload) {
+                self.file.write(GRAPH, now, &payload)?;
+                let rest = Duration::from_secs_f64(payload.len() as f64 / MOST_RECORDED);
+                self.due = Instant::now() + rest;
+                self.written = Some(payload);
+            }
         }
         self.file.write(LOG, now, &log(now, "connected", false))?;
         self.file.flush()
     }
 }
 
-/// Connects to a server, with timeouts.
-fn connect(place: &str) -> io::Result<TcpStream> {
+/// A connection whose reads end at a certain time, however slowly the server sends.
+struct Patient {
+    stream: TcpStream,
+    until: Instant,
+}
+
+impl Patient {
+    /// Sets the time for all reads from now on.
+    fn wait(&mut self, most: Duration) {
+        self.until = Instant::now() + most;
+    }
+}
+
+impl Read for Patient {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let late = || io::Error::new(io::ErrorKind::TimedOut, "it did not answer in time");
+        let left = self.until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(late());
+        }
+        self.stream.set_read_timeout(Some(left))?;
+        let read = self.stream.read(into);
+        read.map_err(|error| match error.kind() {
+            io::ErrorKind::WouldBlock => late(),
+            _ => error,
+        })
+    }
+}
+
+impl Write for Patient {
+    fn write(&mut self, from: &[u8]) -> io::Result<usize> {
+        self.stream.write(from)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+/// Connects to a server, which then has [`WAIT`] for its first answer.
+fn connect(place: &str) -> io::Result<Patient> {
     let mut failed = io::Error::other("the name has no address");
     for at in place.to_socket_addrs()? {
         match TcpStream::connect_timeout(&at, WAIT) {
             Ok(stream) => {
-                stream.set_read_timeout(Some(WAIT))?;
                 stream.set_write_timeout(Some(WAIT))?;
-                return Ok(stream);
+                let until = Instant::now() + WAIT;
+                return Ok(Patient { stream, until });
             }
             Err(error) => failed = error,
         }
@@ -240,15 +287,15 @@ impl LiveGraph {
     }
 
     /// # Errors
-    /// If there are implausibly many names.
+    /// If there are implausibly many names, each end counted once.
     fn check(&self) -> io::Result<()> {
         let ends = self
             .ends
             .iter()
             .flat_map(BTreeMap::values)
             .map(BTreeSet::len);
-        if ends.sum::<usize>() + self.types.len() > MOST_NAMES {
-            return Err(io::Error::other(format!("more than {MOST_NAMES} names")));
+        if ends.sum::<usize>() + self.types.len() > NAMES {
+            return Err(io::Error::other(format!("more than {NAMES} names")));
         }
         Ok(())
     }

@@ -103,9 +103,9 @@ def check_console(b):
             assert url.startswith(("file:", "data:", "about:", "chrome")), url
 
 
-def until(b, script, wanted=True):
+def until(b, script, wanted=True, seconds=10):
     """Waits for a value, for pages answer in their own time; fails if it does not come."""
-    for _ in range(100):
+    for _ in range(10 * seconds):
         found = b.js("return " + script)
         if found == wanted:
             return

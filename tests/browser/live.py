@@ -16,6 +16,8 @@ import firefox
 import webdriver
 from drive import END, LEFT, until, window
 
+# A page is drawn in three percent of the time, so that the next one may take a while on a busy machine.
+GROWN = 120
 SEEK = "Number(document.getElementById('seek').max)"
 
 
@@ -53,11 +55,11 @@ class Recording:
 
 def drive(b, recording):
     b.open(recording.url)
-    until(b, f"document.getElementById('seek') != null && {SEEK} > 0")
+    until(b, f"document.getElementById('seek') != null && {SEEK} > 0", seconds=GROWN)
     first = b.js(f"return {SEEK}")
     assert window(b) == first, "the newest window is shown"
     recording.grow(0.4, 0.6)
-    until(b, f"{SEEK} > {first}")
+    until(b, f"{SEEK} > {first}", seconds=GROWN)
     second = b.js(f"return {SEEK}")
     until(b, "Number(document.getElementById('seek').value)", second)
     b.keys(LEFT)
@@ -72,7 +74,7 @@ def drive(b, recording):
     until(b, "Number(document.getElementById('seek').value)", second - 2)
     assert b.js(f"return {SEEK}") == second, "a page that is looked at does not change"
     b.keys(END)
-    until(b, f"{SEEK} > {second}")
+    until(b, f"{SEEK} > {second}", seconds=GROWN)
     third = b.js(f"return {SEEK}")
     until(b, "Number(document.getElementById('seek').value)", third)
     print(f"  the film grows from {first + 1} to {second + 1} and {third + 1} windows, and stepping back works meanwhile")

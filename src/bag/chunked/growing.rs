@@ -24,7 +24,7 @@ struct GrowingChunks<G> {
     at: u64,
     /// The size of the bag when it was last read.
     len: u64,
-    /// Whether the bag had its end and an index at that time.
+    /// Whether the bag had its end at that time.
     is_closed: bool,
     announced: Announced<G>,
     allowance: Arc<Allowance>,
@@ -66,7 +66,7 @@ impl<G: Grammar> Growing for GrowingChunks<G> {
         self.len = len;
         self.records(&source, sink);
         let plan = G::plan(&source).map_err(Error::io("read", &self.path))?;
-        self.is_closed = plan.is_ok();
+        self.is_closed = plan.is_ok() || G::is_ended(&source);
         Ok(Growth::More)
     }
 

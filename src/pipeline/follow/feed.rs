@@ -4,12 +4,13 @@
 use std::collections::BTreeMap;
 
 use super::SoFar;
-use crate::base::rhythm::{CLOSING_NS, TOGETHER_NS};
+use crate::base::rhythm::{CLOSING_NS, SWITCH_NS, TOGETHER_NS};
 use crate::base::time::Stamp;
 use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
-use crate::mission::events::{LogFormat, line, quoted};
-use crate::mission::ledger::{Detail, Entry, Kind};
+use crate::mission::Mission;
+use crate::mission::events::{LogFormat, LogRow, headlines, quoted, texts};
+use crate::mission::ledger::{Detail, Entry, InterruptionKind, Kind};
 
 worded! {
     /// The certainty of a line.
@@ -39,11 +40,25 @@ impl Certainty {
     }
 }
 
+/// What makes two rows of the log one event, beside their time: numbers become more precise, while another state, or
+/// another number of switched nodes, is another event.
+#[derive(PartialEq)]
+enum Key {
+    Entry {
+        kind: Kind,
+        names: (Option<String>, Option<String>),
+        state: Option<Detail>,
+    },
+    Interruption(InterruptionKind),
+    Switch {
+        stopped: usize,
+        started: usize,
+    },
+}
+
 /// A printed event.
 struct Printed {
-    kind: Kind,
-    names: (Option<String>, Option<String>),
-    detail: Detail,
+    key: Key,
     time: Stamp,
     certainty: Certainty,
     line: String,
@@ -53,7 +68,7 @@ struct Printed {
 
 /// The events printed so far.
 #[derive(Default)]
-pub(crate) struct Feed {
+pub struct Feed {
     printed: Vec<Printed>,
 }
 
@@ -62,49 +77,51 @@ pub(crate) struct Feed {
 const SURE_NS: i64 = CLOSING_NS;
 
 impl Feed {
-    /// The new lines in `known`, sorted by time.
-    pub(crate) fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<String> {
+    /// The new lines in `known`, in the order of the log.
+    pub fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<String> {
         let mission = &known.mission;
         // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
-        self.printed
-            .iter_mut()
-            .for_each(|printed| printed.is_there = false);
-        let mut lines = Vec::new();
-        let entries = (0..).zip(&mission.ledger.entries);
-        for (id, entry) in entries.filter(|(_, e)| e.is_headline() && e.time >= from) {
-            let certainty = certainty(entry, known.now);
-            let names = mission.elements.names(entry.what);
-            let names = (names.0.map(str::to_owned), names.1.map(str::to_owned));
-            let same = |printed: &&mut Printed| {
-                let is_near = printed.time.since(entry.time).abs() <= TOGETHER_NS;
-                // Numbers become more precise; another state is another event.
-                let is_other = entry.kind == Kind::Lifecycle && printed.detail != entry.detail;
-                let is_alike = printed.kind == entry.kind && printed.names == names && !is_other;
-                is_alike && is_near && !printed.is_there
+        for printed in &mut self.printed {
+            printed.is_there = false;
+        }
+        let (mut places, mut rows) = (Vec::new(), Vec::new());
+        for row in headlines(mission, format) {
+            let Some((key, time, certainty)) = identity(mission, &row, known.now) else {
+                continue;
             };
-            if let Some(printed) = self.printed.iter_mut().find(same) {
-                printed.is_there = true;
-                printed.time = entry.time;
-                if printed.certainty == Certainty::Sure || certainty == Certainty::SoFar {
-                    continue;
-                }
-                printed.certainty = certainty;
-                printed.line = line(mission, id, entry, format);
-                lines.push(certainty.mark(&printed.line, format));
+            if time < from {
                 continue;
             }
-            let line = line(mission, id, entry, format);
-            lines.push(certainty.mark(&line, format));
-            self.printed.push(Printed {
-                kind: entry.kind,
-                names,
-                detail: entry.detail.clone(),
-                time: entry.time,
-                certainty,
-                line,
-                is_there: true,
+            let same = |printed: &Printed| {
+                let is_near = printed.time.since(time).abs() <= TOGETHER_NS;
+                is_near && !printed.is_there && printed.key == key
+            };
+            let place = self.printed.iter().position(same);
+            let is_new = place.is_none_or(|at| self.printed[at].certainty < certainty);
+            let place = place.unwrap_or_else(|| {
+                self.printed.push(Printed {
+                    key,
+                    time,
+                    certainty,
+                    line: String::new(),
+                    is_there: true,
+                });
+                self.printed.len() - 1
             });
+            let printed = &mut self.printed[place];
+            (printed.is_there, printed.time) = (true, time);
+            if is_new {
+                printed.certainty = certainty;
+                places.push(place);
+                rows.push(row);
+            }
+        }
+        let mut lines = Vec::new();
+        for (place, line) in places.into_iter().zip(texts(mission, &rows, format)) {
+            let printed = &mut self.printed[place];
+            lines.push(printed.certainty.mark(&line, format));
+            printed.line = line;
         }
         // Events before the kept messages are final and can be dropped.
         self.printed
@@ -114,6 +131,37 @@ impl Feed {
         lines.extend(gone.map(|printed| Certainty::Withdrawn.mark(&printed.line, format)));
         lines
     }
+}
+
+/// The key of a row, its time, and whether it is certain; `None` for a phase and for a part, which are not printed.
+fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Stamp, Certainty)> {
+    Some(match row {
+        LogRow::Entry(_, entry) => {
+            let (node, topic) = mission.elements.names(entry.what);
+            let key = Key::Entry {
+                kind: entry.kind,
+                names: (node.map(str::to_owned), topic.map(str::to_owned)),
+                state: (entry.kind == Kind::Lifecycle).then(|| entry.detail.clone()),
+            };
+            (key, entry.time, certainty(entry, now))
+        }
+        LogRow::Interruption(one) => (Key::Interruption(one.kind), one.time, Certainty::Sure),
+        LogRow::Switch(one) => {
+            let key = Key::Switch {
+                stopped: one.stopped,
+                started: one.started,
+            };
+            // The last of its stops is certain by then.
+            let is_over = now.since(one.time) >= SWITCH_NS + SURE_NS;
+            let certainty = if is_over {
+                Certainty::Sure
+            } else {
+                Certainty::SoFar
+            };
+            (key, one.time, certainty)
+        }
+        LogRow::Phase(..) | LogRow::Part(..) => return None,
+    })
 }
 
 /// Whether an event is certain: an ended element may return, and a rate must last for a while.

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::net::TcpStream;
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -12,18 +11,21 @@ use tungstenite::http::HeaderValue;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
-use super::{BEAT, LiveGraph, PUBLISHERS, SERVERS, SUBSCRIBERS, Watched, connect, now};
+use super::{BEAT, LiveGraph, PUBLISHERS, Patient, SERVERS, SUBSCRIBERS, Watched, connect, now};
 
 /// The supported protocol versions.
 const PROTOCOLS: HeaderValue = HeaderValue::from_static("foxglove.sdk.v1, foxglove.websocket.v1");
 /// The longest message that is read, in bytes.
 const MOST_MESSAGE: usize = 64 << 20;
+/// The longest description of channels and of the graph, in bytes: ten times that of a thousand topics with their
+/// definitions. Parsing needs at most twenty times as much memory.
+const MOST_TEXT: usize = 16 << 20;
 /// The number of bytes before the payload of a message: an operation, a subscription and a time.
 const HEAD: usize = 13;
 
 /// The connection to a server.
 struct Bridge<'a> {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<Patient>,
     watched: &'a mut Watched,
     /// The channel in the file of each subscription, which has the number of its channel.
     subscribed: BTreeMap<u64, usize>,
@@ -44,8 +46,6 @@ pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
         .max_frame_size(Some(MOST_MESSAGE));
     let opened = client_with_config(request, stream, Some(config));
     let (socket, _) = opened.map_err(|e| io::Error::other(e.to_string()))?;
-    // The timeout leaves time for heartbeats between two messages.
-    socket.get_ref().set_read_timeout(Some(BEAT / 10))?;
     watched.graph = LiveGraph::default();
     let bridge = Bridge {
         socket,
@@ -61,7 +61,12 @@ impl Bridge<'_> {
         let mut beat = Instant::now();
         let mut is_new = false;
         while !self.watched.is_over() {
+            // Heartbeats are written between two messages, and within one that is sent slowly.
+            self.socket.get_mut().wait(BEAT / 10);
             match self.socket.read() {
+                Ok(Message::Text(text)) if text.len() > MOST_TEXT => {
+                    return Err(io::Error::other("it described too much at once"));
+                }
                 Ok(Message::Text(text)) => {
                     let message = serde_json::from_str(&text).map_err(io::Error::other)?;
                     self.take(&message)?;
@@ -71,11 +76,7 @@ impl Bridge<'_> {
                 Ok(Message::Binary(bytes)) => self.record(&bytes)?,
                 Ok(Message::Close(_)) => return Err(io::ErrorKind::ConnectionReset.into()),
                 Ok(_) => {}
-                Err(tungstenite::Error::Io(e))
-                    if matches!(
-                        e.kind(),
-                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-                    ) => {}
+                Err(tungstenite::Error::Io(e)) if e.kind() == io::ErrorKind::TimedOut => {}
                 Err(error) => return Err(io::Error::other(error)),
             }
             // Several messages describe one graph, which is written after all of them.
