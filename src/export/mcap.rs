@@ -41,10 +41,11 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
         .map(|at| (at, GRAPH, ends.graph(mission, at)));
     let mut all: Vec<(Stamp, usize, Vec<u8>)> = graphs.collect();
     let last = mission.span.end.plus(-1);
+    let parts = mission.ledger.all_parts();
     for (id, entry) in (0..).zip(&mission.ledger.entries) {
         if entry.is_headline() {
             let at = entry.time.max(mission.span.start).min(last);
-            let says = sentence(mission, id, entry);
+            let says = sentence(mission, &parts, id, entry);
             all.push((at, LOG, log(entry.time, &says, entry.kind.is_remark())));
         }
     }

@@ -15,7 +15,7 @@ use crate::base::words::{self, visible};
 use crate::graph::Element;
 use crate::mission::Mission;
 use crate::mission::ledger::{
-    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase, Switch,
+    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
 };
 
 /// The format of a log.
@@ -84,8 +84,9 @@ pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -
     if format == LogFormat::Ndjson {
         return ndjson(mission, rows).lines().map(str::to_owned).collect();
     }
+    let parts = mission.ledger.all_parts();
     let text = |row| {
-        let (when, words) = when_and_what(mission, row);
+        let (when, words) = when_and_what(mission, &parts, row);
         format!("{when:>13}  {words}")
     };
     rows.iter().map(text).collect()
@@ -182,8 +183,9 @@ impl LogLine {
 /// The log as lines for people, sorted by the time that each shows.
 pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
     let rows = with_switches(mission, chosen(mission, options));
+    let parts = mission.ledger.all_parts();
     let shown = sorted(&rows).into_iter().map(|row| {
-        let (when, words) = when_and_what(mission, row);
+        let (when, words) = when_and_what(mission, &parts, row);
         let (kind, inner, words) = match row {
             LogRow::Phase(..) => (None, "", format!("── {words} ──")),
             LogRow::Interruption(_) | LogRow::Switch(_) => (None, "", words),
@@ -200,14 +202,14 @@ pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
 }
 
 /// The time of a row and its words for people.
-fn when_and_what(mission: &Mission, row: &LogRow<'_>) -> (String, String) {
+fn when_and_what(mission: &Mission, parts: &Parts, row: &LogRow<'_>) -> (String, String) {
     let tenths = |time| words::offset_tenths(mission.offset(time));
     match row {
         LogRow::Phase(number, phase) => (tenths(phase.span.start), title(*number, phase)),
         LogRow::Interruption(one) => (tenths(one.time), sentence::interrupted(one)),
         LogRow::Switch(one) => (tenths(one.time), sentence::switched(one)),
         LogRow::Entry(id, entry) | LogRow::Part(id, entry) => {
-            (at(mission, entry), sentence(mission, *id, entry))
+            (at(mission, entry), sentence(mission, parts, *id, entry))
         }
     }
 }
@@ -241,8 +243,9 @@ fn shown(entry: &Entry) -> Stamp {
 
 fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = "| when | what |\n|---:|---|\n".to_owned();
+    let parts = mission.ledger.all_parts();
     for row in sorted(rows) {
-        let (when, words) = when_and_what(mission, row);
+        let (when, words) = when_and_what(mission, &parts, row);
         let words = match row {
             LogRow::Phase(..) => format!("**{}**", escaped(&words)),
             LogRow::Part(..) => format!("· {}", escaped(&words)),

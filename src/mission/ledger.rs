@@ -34,6 +34,9 @@ const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 /// An entry's index in [`Ledger::entries`].
 pub type EntryId = u32;
 
+/// The parts of entries.
+pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
+
 /// All events of a mission, and its phases.
 ///
 /// ```
@@ -278,12 +281,17 @@ impl Ledger {
         let turns = turns.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
         let turns: Vec<&Entry> = turns.collect();
         let mut found: Vec<Switch> = Vec::new();
-        let mut at = 0;
+        // The first turn, the one after the last within reach, and the stops between them.
+        let (mut at, mut end, mut stopped) = (0, 0, 0);
         while let Some(first) = turns.get(at) {
-            let inside = turns[at..].iter();
-            let inside = inside.take_while(|e| e.time.since(first.time) <= SWITCH_NS);
-            let many = inside.clone().count();
-            let stopped = inside.filter(|e| e.kind == Kind::Stopped).count();
+            while let Some(next) = turns
+                .get(end)
+                .filter(|e| e.time.since(first.time) <= SWITCH_NS)
+            {
+                stopped += usize::from(next.kind == Kind::Stopped);
+                end += 1;
+            }
+            let many = end - at;
             let (each, all) = SWITCH;
             let is_switch = stopped.min(many - stopped) >= each && many >= all;
             found.extend(is_switch.then_some(Switch {
@@ -291,14 +299,19 @@ impl Ledger {
                 stopped,
                 started: many - stopped,
             }));
-            at += if is_switch { many } else { 1 };
+            if is_switch {
+                (at, stopped) = (end, 0);
+            } else {
+                stopped -= usize::from(first.kind == Kind::Stopped);
+                at += 1;
+            }
         }
         found
     }
 
     /// The ids of the parts of all entries, in order, by the ids of those entries.
     pub fn all_parts(&self) -> BTreeMap<EntryId, Vec<EntryId>> {
-        let mut parts: BTreeMap<EntryId, Vec<EntryId>> = BTreeMap::new();
+        let mut parts = Parts::new();
         for (id, entry) in (0..).zip(&self.entries) {
             if let Some(whole) = entry.part_of {
                 parts.entry(whole).or_default().push(id);

@@ -1,6 +1,6 @@
 //! The bags of a mission, without duplicates.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
 
@@ -105,29 +105,28 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
     // Errors of opening are reported when the bag is read.
     let open = |input: &Input| bag::open(input, &OpenOptions::default()).ok();
     // Copies have the same time span or, if that is unknown, the same size.
-    let ends = |input: &&Input| {
+    let ends = |input: &Input| {
         let span = open(input).and_then(|mut bag| bag.span().ok().flatten());
-        let size = if span.is_none() {
-            bag::size_on_disk(input)
-        } else {
-            None
-        };
-        (span, size)
+        let size = || bag::size_on_disk(input);
+        span.map_or_else(|| Err(size()), |span| Ok((span.start, span.end)))
     };
-    let ends: Vec<(Option<Span>, Option<u64>)> = match near.len() {
-        0 | 1 => Vec::new(),
-        _ => near.iter().map(ends).collect(),
-    };
-    let contents = |at: usize| {
+    let contents = |input: &Input| {
         let mut contents = Contents::default();
-        open(near[at])?.read(None, &mut contents).ok()?;
+        open(input)?.read(None, &mut contents).ok()?;
         Some((contents.messages, contents.sum)).filter(|(messages, _)| *messages > 0)
     };
-    for at in 1..ends.len() {
-        let alike = (0..at).filter(|before| ends[*before] == ends[at]);
-        for before in alike {
-            if contents(at).is_some_and(|own| Some(own) == contents(before)) {
-                let (own, other) = (near[at].name(), near[before].name());
+    let mut alike: BTreeMap<_, Vec<&Input>> = BTreeMap::new();
+    if near.len() > 1 {
+        for input in near {
+            alike.entry(ends(input)).or_default().push(input);
+        }
+    }
+    for inputs in alike.values().filter(|inputs| inputs.len() > 1) {
+        let mut known = BTreeMap::new();
+        for input in inputs {
+            let other = contents(input).and_then(|own| known.insert(own, input.name()));
+            if let Some(other) = other {
+                let own = input.name();
                 let what =
                     format!("`{own}` holds the same messages as `{other}`: they would count twice");
                 return Err(Error::usage(what, "name one of them"));

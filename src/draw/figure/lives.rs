@@ -247,7 +247,8 @@ impl<'a> LivesFigure<'a> {
     fn sentence(&self, entry: EntryId) -> String {
         let mission = self.source.mission;
         let event = mission.ledger.entries.get(entry as usize);
-        event.map_or_else(String::new, |event| sentence(mission, entry, event))
+        let parts = mission.ledger.all_parts();
+        event.map_or_else(String::new, |event| sentence(mission, &parts, entry, event))
     }
 
     /// Draws the ticks, the crosses and the small circles.

@@ -19,7 +19,7 @@ use crate::draw::picture::chips;
 use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
-use crate::mission::events::sentence_with;
+use crate::mission::events::sentence;
 use crate::mission::ledger::Kind;
 use crate::mission::{EntryId, Mission};
 use crate::view::runs::ElementRuns;
@@ -262,9 +262,8 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
             .take(MOST_TOLD)
             .filter_map(|headline| {
                 let entry = mission.ledger.entries.get(headline.entry as usize)?;
-                let own = parts.get(&headline.entry).map_or(&[][..], |p| &p[..]);
                 let what = place(&headline.what);
-                let sentence = sentence_with(mission, own, entry);
+                let sentence = sentence(mission, &parts, headline.entry, entry);
                 let time = clock.secs(entry.time);
                 Some((time, sign(entry.kind), what, sentence, headline.entry))
             })

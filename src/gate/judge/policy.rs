@@ -34,11 +34,12 @@ impl Judge<'_> {
     /// The findings of one kind of remark in the event log.
     fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
         let mission = self.facts.mission;
+        let parts = mission.ledger.all_parts();
         let own = (0..).zip(&mission.ledger.entries);
         let own = own.filter(|(_, entry)| entry.kind == kind && !entry.quiet);
         let found = own.map(|(id, entry)| {
             let (node, topic) = mission.elements.names(entry.what);
-            let says = sentence(mission, id, entry);
+            let says = sentence(mission, &parts, id, entry);
             let name = topic.or(node).unwrap_or_default();
             let mut found = Finding::new(finding, name, self.expectation.policy.at, says);
             found.severity = severity;

@@ -242,8 +242,9 @@ impl Judge<'_> {
         let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
             .saw(entries.len(), words::count_range(many.from, many.to))
             .at(span);
+        let parts = self.facts.mission.ledger.all_parts();
         for (id, entry) in entries.iter().take(MOST_LISTED) {
-            let text = sentence(self.facts.mission, *id, entry);
+            let text = sentence(self.facts.mission, &parts, *id, entry);
             finding = finding.detail(format!("{}  {text}", self.facts.clock(entry.time)));
         }
         if entries.len() > MOST_LISTED {

@@ -42,10 +42,11 @@ struct Own<'a> {
 fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, Vec<Own<'a>>> {
     let mut of: BTreeMap<Name, Vec<Own<'a>>> = BTreeMap::new();
     for (topic, all) in traffic {
-        for (place, sender) in all.list.iter().enumerate() {
-            let streams = all.streams.iter().zip(&all.of);
-            let streams = streams.filter(|(_, of)| **of == place).map(|(at, _)| *at);
-            let streams: Vec<usize> = streams.collect();
+        let mut streams: Vec<Vec<usize>> = vec![Vec::new(); all.list.len()];
+        for (at, of) in all.streams.iter().zip(&all.of) {
+            streams[*of].push(*at);
+        }
+        for (sender, streams) in all.list.iter().zip(streams) {
             let is_whole = |at: &usize| findings.streams[*at].trust == Reliability::Whole;
             if let Some(node) = sender.node.filter(|_| streams.iter().all(is_whole)) {
                 of.entry(node).or_default().push(Own {
@@ -135,10 +136,22 @@ pub(crate) fn restarts(
     for (node, own) in &nodes {
         falls.insert(*node, falls_of(recorded, findings, *node, own)?);
     }
+    let mut alike: BTreeMap<_, Vec<(Name, &Fall)>> = BTreeMap::new();
+    for (node, fall) in falls
+        .iter()
+        .flat_map(|(node, of)| of.iter().map(|f| (*node, f)))
+    {
+        if fall.first.stamp != 0 {
+            alike.entry(fall.header()).or_default().push((node, fall));
+        }
+    }
+    let said = said(&findings.proofs);
     let mut all = Restarts::new();
     for (node, own) in &nodes {
-        let others = || falls.iter().filter(|(other, _)| *other != node);
-        let is_copy = |fall: &&Fall| others().any(|(_, of)| of.iter().any(|f| fall.is_copy_of(f)));
+        let is_copy = |fall: &&Fall| {
+            let mut alike = alike.get(&fall.header()).into_iter().flatten();
+            alike.any(|(other, of)| other != node && fall.is_later_than(of))
+        };
         let own_falls = falls[node].iter().filter(|fall| !is_copy(fall));
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
@@ -155,7 +168,8 @@ pub(crate) fn restarts(
         let streams = own.iter().flat_map(|own| &own.streams);
         let times = streams.map(|at| recorded.messages.times(recorded.streams[*at].times));
         let mut signs = times.collect::<io::Result<Vec<_>>>()?.concat();
-        signs.extend(said_of(*node, &findings.proofs));
+        let proofs = said.get(node).into_iter().flatten();
+        signs.extend(proofs.copied().flat_map(signs_of));
         signs.sort_unstable();
         let gaps = breaks.iter();
         let gaps = gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to));
@@ -190,13 +204,16 @@ struct Fall {
 }
 
 impl Fall {
-    /// Whether these are the messages of another stream, passed on with their headers: their numbers prove nothing of
-    /// the node that passes them on.
-    fn is_copy_of(&self, other: &Self) -> bool {
-        // A throttle leaves out messages, and the recorder may get the copy first.
-        let is_later = (other.before, self.to) > (self.before, other.to);
-        let is_same = self.first == other.first && self.kind == other.kind;
-        is_same && is_later && self.first.stamp != 0
+    /// What it has in common with those of copies: messages of another stream that are passed on with their headers, whose
+    /// numbers prove nothing of the node that passes them on.
+    fn header(&self) -> (u64, u32, &str) {
+        (self.first.stamp, self.first.number, &self.kind)
+    }
+
+    /// Whether it is the copy of two with one header. A throttle leaves out messages, and the recorder may get the copy
+    /// first.
+    fn is_later_than(&self, other: &Self) -> bool {
+        (other.before, self.to) > (self.before, other.to)
     }
 }
 
@@ -242,22 +259,28 @@ fn falls_of(
     Ok(falls)
 }
 
-/// The times of all statements about a node.
-fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
-    let of_node = proofs.iter().filter(move |proof| match proof.what {
-        ElementKey::Node(name) | ElementKey::Publish(name, _) | ElementKey::Subscribe(_, name) => {
-            name == node
+/// All statements about each node.
+fn said(proofs: &[Proof]) -> BTreeMap<Name, Vec<&Proof>> {
+    let mut of: BTreeMap<Name, Vec<&Proof>> = BTreeMap::new();
+    for proof in proofs {
+        if let ElementKey::Node(node)
+        | ElementKey::Publish(node, _)
+        | ElementKey::Subscribe(_, node) = proof.what
+        {
+            of.entry(node).or_default().push(proof);
         }
-        ElementKey::Topic(_) => false,
-    });
-    of_node
-        .flat_map(|proof| match &proof.when {
-            Validity::Signs { signs, .. }
-            | Validity::Begins { signs, .. }
-            | Validity::Moments(signs) => &signs[..],
-            _ => &[],
-        })
-        .copied()
+    }
+    of
+}
+
+/// The times of a statement.
+fn signs_of(proof: &Proof) -> &[Stamp] {
+    match &proof.when {
+        Validity::Signs { signs, .. }
+        | Validity::Begins { signs, .. }
+        | Validity::Moments(signs) => signs,
+        _ => &[],
+    }
 }
 
 /// Stretches of time that end with a latched message sent again, and in which no stream with a rhythm had messages.

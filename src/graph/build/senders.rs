@@ -155,8 +155,11 @@ fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Ve
         *is_latched &= stream.latched;
         *all = (all.0.min(own.0), all.1.max(own.1));
     }
-    let place = |stream: &&Stream| latched.range(..sender(stream)).count();
-    let places = streams.iter().map(place).collect();
+    let places: BTreeMap<Option<Name>, usize> = latched.keys().copied().zip(0..).collect();
+    let places = streams
+        .iter()
+        .map(|stream| places[&sender(stream)])
+        .collect();
     let heard = latched
         .iter()
         .map(|(node, (latched, recording))| SenderTimes {

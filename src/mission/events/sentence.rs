@@ -1,29 +1,27 @@
 //! An entry as one sentence: the change, the element, and the parts that appeared or vanished with it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::name::is_quiet;
 use crate::base::words::{self, visible};
 use crate::graph::history::begins_steadily as begins_steadily_in;
-use crate::graph::{Element, Elements, TopicId};
+use crate::graph::{Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::{
-    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Switch,
+    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Parts, Switch,
 };
 
 /// The most topics that are listed; the rest is counted.
 const NAMED: usize = 6;
 
-/// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`.
-pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String {
-    let all = (0..).zip(&mission.ledger.entries);
-    let parts = all
-        .filter(|(_, e)| e.part_of == Some(id))
-        .map(|(part, _)| part);
-    sentence_with(mission, &parts.collect::<Vec<_>>(), entry)
+/// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`. `parts`: of all
+/// entries.
+pub(crate) fn sentence(mission: &Mission, parts: &Parts, id: EntryId, entry: &Entry) -> String {
+    let own = parts.get(&id).map_or(&[][..], Vec::as_slice);
+    sentence_with(mission, own, entry)
 }
 
-/// The sentence for known parts of the entry.
+/// The sentence for these parts of the entry.
 pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let name = name(&mission.elements, entry);
     format!("{name} {}", predicate(mission, parts, entry))
@@ -46,17 +44,15 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
                     |id: &u32| visible(elements.nodes[*id as usize].name.as_str()).into_owned();
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
-            let mut by: Vec<u32> = Vec::new();
-            if let Element::Topic(topic) = entry.what {
-                let own = elements.publishes.iter().filter(|edge| edge.topic == topic);
-                by.extend(own.map(|edge| edge.node));
-            }
             // Who sends and is not one of them is the mux between them.
-            let is_end = |node| from.contains(node) || to.contains(node);
-            let by = if by.is_empty() || by.iter().any(is_end) {
+            let mux = match entry.what {
+                Element::Topic(topic) => mux(elements, topic, from.iter().chain(to)),
+                _ => Vec::new(),
+            };
+            let by = if mux.is_empty() {
                 String::new()
             } else {
-                format!(", by {}", names(&by))
+                format!(", by {}", names(&mux))
             };
             format!("handed over: {} → {}{by}", names(from), names(to))
         }
@@ -112,6 +108,19 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             format!("{word}{}", too(mission, parts, entry))
         }
     }
+}
+
+/// The publishers of a topic, if none of `ends` is one.
+fn mux<'a>(
+    elements: &Elements,
+    topic: TopicId,
+    mut ends: impl Iterator<Item = &'a NodeId>,
+) -> Vec<NodeId> {
+    if ends.any(|node| elements.publication(*node, topic).is_some()) {
+        return Vec::new();
+    }
+    let own = elements.publishes.iter().filter(|edge| edge.topic == topic);
+    own.map(|edge| edge.node).collect()
 }
 
 /// Whether the first messages of a topic or publication are regular, so that there were none before; always true for a
@@ -239,29 +248,27 @@ const ACTION: [&str; 5] = ["goal", "cancel", "status", "feedback", "result"];
 /// The names of topics within a namespace, actions as one name, without housekeeping.
 fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) -> Vec<String> {
     let full = |id: &TopicId| elements.topics[*id as usize].name.as_str();
-    let parts = |name: &str| {
-        let of = |id: &TopicId| {
-            full(id)
-                .rsplit_once('/')
-                .is_some_and(|(a, p)| a == name && ACTION.contains(&p))
-        };
-        topics.iter().filter(|id| of(id)).count()
+    let action = |name: &str| {
+        let (action, part) = name.rsplit_once('/')?;
+        ACTION.contains(&part).then(|| action.to_owned())
     };
-    let mut names: Vec<String> = Vec::new();
+    let mut parts: BTreeMap<String, usize> = BTreeMap::new();
+    for action in topics.iter().filter_map(|id| action(full(id))) {
+        *parts.entry(action).or_default() += 1;
+    }
+    let (mut names, mut seen) = (Vec::new(), BTreeSet::new());
     for name in topics.iter().map(full).filter(|name| !is_quiet(name)) {
         let within = |name: &str| {
             let inner = name.strip_prefix(space).filter(|_| space != "/");
             let inner = inner.and_then(|rest| rest.strip_prefix('/'));
             visible(inner.unwrap_or(name)).into_owned()
         };
-        let phrases = match name.rsplit_once('/') {
-            Some((action, part)) if ACTION.contains(&part) && parts(action) > 1 => {
-                format!("{} (action)", within(action.trim_end_matches("/_action")))
-            }
-            _ => within(name),
+        let phrase = match action(name).filter(|action| parts[action] > 1) {
+            Some(action) => format!("{} (action)", within(action.trim_end_matches("/_action"))),
+            None => within(name),
         };
-        if !names.contains(&phrases) {
-            names.push(phrases);
+        if seen.insert(phrase.clone()) {
+            names.push(phrase);
         }
     }
     names

@@ -28,69 +28,83 @@ fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
     places
 }
 
-/// Those of entries sorted by time that lie between two times, or near them.
-fn near(drafts: &Drafts, sorted: &[EntryId], from: Stamp, to: Stamp) -> Vec<EntryId> {
-    let (from, to) = (from.plus(-TOGETHER_NS), to.plus(TOGETHER_NS));
-    let first = sorted.partition_point(|id| drafts.get(*id).time < from);
-    let near = sorted[first..].iter().copied();
-    near.take_while(|id| drafts.get(*id).time <= to).collect()
+/// The ids of entries about nodes or topics, by what `key` finds in them.
+fn by<K: Ord>(
+    drafts: &Drafts,
+    ids: impl IntoIterator<Item = EntryId>,
+    key: impl Fn(&Entry) -> Option<K>,
+) -> BTreeMap<K, Vec<EntryId>> {
+    let mut of: BTreeMap<K, Vec<EntryId>> = BTreeMap::new();
+    for id in ids {
+        if let Some(key) = key(drafts.get(id)) {
+            of.entry(key).or_default().push(id);
+        }
+    }
+    of
+}
+
+/// The node and the kind of a turn: a start or a stop.
+fn turn(entry: &Entry) -> Option<(NodeId, Kind)> {
+    match (entry.what, entry.kind) {
+        (Element::Node(node), Kind::Started | Kind::Stopped) => Some((node, entry.kind)),
+        _ => None,
+    }
 }
 
 /// A node known only from the messages of one topic that hands it over or takes it over need not have stopped or
 /// started.
 fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
-    let steps = headlines(drafts, &[Kind::Rate]);
+    let turns = by(drafts, turns, turn);
+    let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |entry| {
+        let (node, topic) = context.elements.ends(entry.what);
+        topic.filter(|_| node.is_some())
+    });
+    let mut sent: BTreeMap<NodeId, Vec<TopicId>> = BTreeMap::new();
+    for edge in &context.elements.publishes {
+        sent.entry(edge.node).or_default().push(edge.topic);
+    }
+    // Whether a node is known only from the messages of a topic.
+    let is_only_sender = |node: NodeId, topic| {
+        let mut words = context.elements.nodes[node as usize].evidence.words();
+        let mut sent = sent.get(&node).into_iter().flatten();
+        words.all(|word| word == "connection") && sent.all(|other| *other == topic)
+    };
     for hand in headlines(drafts, &[Kind::HandedOver]) {
         let entry = drafts.get(hand).clone();
         let (Detail::Senders { from, to }, Element::Topic(topic)) = (&entry.detail, entry.what)
         else {
             continue;
         };
-        for step in near(drafts, &steps, entry.time, entry.time) {
-            let other = drafts.get(step);
-            let (Some(node), of) = context.elements.ends(other.what) else {
-                continue;
-            };
+        for step in steps.get(&topic).into_iter().flatten() {
+            let other = drafts.get(*step);
+            let node = context.elements.ends(other.what).0;
             // A mux has the rate of the sender whose turn it is.
-            let is_mux = of == Some(topic) && !from.contains(&node) && !to.contains(&node);
-            if is_mux {
-                drafts.fold(step, hand);
+            let is_mux = node.is_some_and(|node| !from.contains(&node) && !to.contains(&node));
+            if is_mux && is_within(other.time, entry.time, TOGETHER_NS) {
+                drafts.fold(*step, hand);
             }
         }
-        for turn in near(drafts, &turns, entry.earliest, entry.time) {
-            let other = drafts.get(turn);
-            let Element::Node(node) = other.what else {
-                continue;
-            };
-            let (of, at) = match other.kind {
-                Kind::Stopped => (from, entry.earliest),
-                _ => (to, entry.time),
-            };
-            let is_end = of.contains(&node) && is_within(other.time, at, TOGETHER_NS);
-            if is_end && is_only_sender(context, node, topic) {
-                drafts.fold(turn, hand);
+        let ends = [
+            (from, Kind::Stopped, entry.earliest),
+            (to, Kind::Started, entry.time),
+        ];
+        for (nodes, kind, at) in ends {
+            for node in nodes.iter().filter(|node| is_only_sender(**node, topic)) {
+                for turn in turns.get(&(*node, kind)).into_iter().flatten() {
+                    if is_within(drafts.get(*turn).time, at, TOGETHER_NS) {
+                        drafts.fold(*turn, hand);
+                    }
+                }
             }
         }
     }
-}
-
-/// Whether a node is known only from the messages of this topic.
-fn is_only_sender(context: &LedgerInput<'_>, node: NodeId, topic: TopicId) -> bool {
-    let evidence = context.elements.nodes[node as usize].evidence;
-    let mut sent = context.elements.publishes.iter().filter(|e| e.node == node);
-    evidence.words().all(|word| word == "connection") && sent.all(|edge| edge.topic == topic)
 }
 
 /// Subscriptions that appear or vanish with the topic's publisher are consequences.
 fn subscribers(context: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let mut turns: BTreeMap<(NodeId, bool), Vec<EntryId>> = BTreeMap::new();
-    for (id, entry) in (0..).zip(&drafts.list) {
-        if let (Element::Node(node), Kind::Started | Kind::Stopped) = (entry.what, entry.kind) {
-            let of = turns.entry((node, entry.kind == Kind::Started));
-            of.or_default().push(id);
-        }
-    }
+    let all = (0..).zip(&drafts.list).map(|(id, _)| id);
+    let turns = by(drafts, all, turn);
     let wiring = Wiring::of(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let entry = drafts.get(id);
@@ -100,7 +114,11 @@ fn subscribers(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             continue;
         };
         let senders = wiring.publishers.get(&topic).into_iter().flatten();
-        let of = senders.filter_map(|node| turns.get(&(*node, entry.kind == Kind::Appeared)));
+        let kind = match entry.kind {
+            Kind::Appeared => Kind::Started,
+            _ => Kind::Stopped,
+        };
+        let of = senders.filter_map(|node| turns.get(&(*node, kind)));
         let is_then = |turn: &EntryId| {
             let turn = drafts.get(*turn);
             is_within(turn.time, entry.time, TOGETHER_NS)

@@ -13,6 +13,9 @@ use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender};
 use crate::graph::{Element, NodeId, TopicId};
 
+/// The most senders of a topic that take over from each other: a topic of more is shared.
+const MOST_SENDERS: usize = 100;
+
 /// An interval of sending of one role, without a gap.
 #[derive(Clone, Debug)]
 struct RoleSending {
@@ -53,7 +56,7 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
         }
         let all = sendings(context, &senders);
         let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
-        if roles.len() > 1 {
+        if (2..=MOST_SENDERS).contains(&roles.len()) {
             for (old, new) in replaced(&all, end) {
                 hand(context, drafts, topic, &old, &new);
             }
@@ -179,14 +182,14 @@ fn shares(context: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, sender
     cuts.sort_unstable();
     cuts.dedup();
     let mut before: Option<(NodeId, BTreeSet<NodeId>, Stamp)> = None;
-    for pair in cuts.windows(2) {
+    let lasting = cuts.windows(2);
+    for pair in lasting.filter(|pair| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) {
         let inside = paces
             .iter()
             .filter(|p| p.first <= pair[0] && pair[1] <= p.last);
         let senders: Vec<&Pace> = inside.collect();
         let whole: f64 = senders.iter().map(|p| p.hz).sum();
-        let main = senders.iter().find(|p| p.hz > whole / 2.0);
-        let Some(main) = main.filter(|_| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) else {
+        let Some(main) = senders.iter().find(|p| p.hz > whole / 2.0) else {
             continue;
         };
         let nodes: BTreeSet<NodeId> = senders.iter().map(|p| p.node).collect();
