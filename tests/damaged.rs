@@ -12,8 +12,8 @@ use bagreel::internals::base::time::Stamp;
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;
+use crate::support::tiny::{self, MESSAGES};
 use crate::support::{self, Kept, ORIGIN, Recording, mcap, read, read_as, rosbag1, sqlite3};
-use every_byte::{TINY, tiny};
 
 /// A folder with one file in it.
 fn placed(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
@@ -133,7 +133,7 @@ fn a_flipped_bit_neither_loses_nor_invents_messages_silently() {
 
 #[test]
 fn a_chunk_listed_at_a_wrong_position_is_reported_once() {
-    for (name, bytes) in tiny()
+    for (name, bytes) in tiny::bags()
         .into_iter()
         .filter(|(name, _)| !name.starts_with("front"))
     {
@@ -148,10 +148,10 @@ fn a_chunk_listed_at_a_wrong_position_is_reported_once() {
             bytes[info + 10] ^= moved;
             fs::write(&path, &bytes).unwrap();
             let (report, kept) = read(&path, Want::Payload).unwrap();
-            assert_eq!(kept.stamps.len(), TINY, "{name}: {moved:x}");
+            assert_eq!(kept.stamps.len(), MESSAGES, "{name}: {moved:x}");
             let payloads = kept.payloads().len();
             assert!(
-                payloads == TINY || payloads >= TINY - 2 && !report.complete,
+                payloads == MESSAGES || payloads >= MESSAGES - 2 && !report.complete,
                 "{name}: {moved:x}: {payloads}"
             );
         }

@@ -9,6 +9,7 @@ pub mod mission;
 pub mod pdf;
 pub mod rosbag1;
 pub mod sqlite3;
+pub mod tiny;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

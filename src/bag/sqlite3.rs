@@ -295,9 +295,9 @@ impl Sqlite3Bag {
     }
 }
 
-/// Has SQLite check the whole file for damage.
+/// Has SQLite check the whole file for damage, and the index of times against the rows.
 fn check(db: &Db, sink: &mut dyn Sink) {
-    let found = db.first("PRAGMA quick_check(1)", &[], |row| row.text(0));
+    let found = db.first("PRAGMA integrity_check(1)", &[], |row| row.text(0));
     let result = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);
     if result != "ok" {
         sink.notice(Notice::new(

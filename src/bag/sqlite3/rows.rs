@@ -38,6 +38,8 @@ struct LostRows {
     orphans: u64,
     odd: u64,
     payloads: u64,
+    /// The ids that no row has: recorders number the rows from 1 on.
+    unused: u64,
 }
 
 /// The end from which rows are read.
@@ -102,6 +104,11 @@ impl RowReading<'_, '_> {
             if in_order && id.is_some_and(|id| !(self.left.0..=self.left.1).contains(&id)) {
                 self.repeated = true;
                 return ControlFlow::Break(());
+            }
+            let is_sound = in_order && !self.rows.bag.ready.damaged;
+            if let (true, Direction::Up, Some(id)) = (is_sound, way, id) {
+                let unused = id.saturating_sub(self.left.0.max(1));
+                self.lost.unused += u64::try_from(unused).unwrap_or(0);
             }
             match (id, way) {
                 (Some(id), Direction::Up) => self.left.0 = id.saturating_add(1),
@@ -271,21 +278,22 @@ fn report_payload(
 
 impl LostRows {
     fn report(&self, sink: &mut dyn Sink) {
+        use NoticeKind::{Damaged, Note};
+        let orphans = "rows belong to a topic that the bag does not name";
+        let unused = "rows are missing among the others: deleted, or lost by damage";
         let kinds = [
+            (Damaged, self.orphans, orphans),
+            (Damaged, self.odd, "rows hold no topic or no time"),
             (
-                self.orphans,
-                "rows belong to a topic that the bag does not name",
+                Damaged,
+                self.payloads,
+                "rows could be counted and not looked into",
             ),
-            (self.odd, "rows hold no topic or no time"),
-            (self.payloads, "rows could be counted and not looked into"),
+            (Note, self.unused, unused),
         ];
-        for (count, text) in kinds.into_iter().filter(|(count, _)| *count > 0) {
+        for (kind, count, text) in kinds.into_iter().filter(|(_, count, _)| *count > 0) {
             let text = text.to_owned();
-            sink.notice(Notice {
-                kind: NoticeKind::Damaged,
-                count,
-                text,
-            });
+            sink.notice(Notice { kind, count, text });
         }
     }
 }
