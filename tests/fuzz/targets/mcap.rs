@@ -1,6 +1,0 @@
-//! MCAP files: by the summary, from the front.
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    bagreel_fuzz::as_file("x.mcap", bytes, |path| bagreel_fuzz::read_bag(path, false));
-});

@@ -1,6 +1,0 @@
-//! Databases.
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    bagreel_fuzz::as_file("x.db3", bytes, |path| bagreel_fuzz::read_bag(path, false));
-});

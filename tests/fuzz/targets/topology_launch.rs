@@ -1,6 +1,0 @@
-//! Topology files: launch.
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    bagreel_fuzz::as_file("x.launch", bytes, |path| drop(bagreel::internals::evidence::topology::read(path)));
-});
