@@ -228,8 +228,10 @@ fn results_fit_the_terminal() {
     for columns in [60, 80, 120] {
         for line in [
             "info W",
+            "info W --why /map_server",
             "info C",
             "info E",
+            "diff W C",
             "events W",
             "events W --parts",
             "events C",

@@ -178,6 +178,20 @@ pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) 
     out
 }
 
+/// The text with lines of at most `width` characters; the rest of a longer one is below the start of its last column.
+pub(crate) fn fitted(text: &str, width: usize) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let widest = line.char_indices().nth(width - width / 4);
+        let half = widest.map_or("", |(at, _)| &line[..at]);
+        let indent = half
+            .rfind("  ")
+            .map_or(2, |at| half[..at + 2].chars().count());
+        out.push_str(&hang("", line, indent, Some(width)));
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +202,14 @@ mod tests {
         assert_eq!(bars(&[], 32), " ");
         assert_eq!(bars(&[1; 100], 32).chars().count(), MOST_BARS);
         assert_eq!(bars(&[1; 100], 8), "████████");
+    }
+
+    #[test]
+    fn a_long_line_goes_on_below_its_last_column() {
+        let text = "+ node  /é  only in the first of two\nshort\n";
+        let expected = "+ node  /é  only in\n            the first\n            of two\nshort\n";
+        assert_eq!(fitted(text, 22), expected);
+        assert_eq!(fitted(text, 40), text);
     }
 
     #[test]

@@ -14,6 +14,11 @@ pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> O
     (1..=most).contains(&distance).then_some(other)
 }
 
+/// The end of a sentence about an unknown name, which suggests the nearest; empty if none is close.
+pub(crate) fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    nearest(name, known).map_or_else(String::new, |near| format!("; the nearest is `{near}`"))
+}
+
 /// The number of letters to insert, leave out or exchange (Levenshtein).
 fn distance(one: &str, other: &str) -> usize {
     let other: Vec<char> = other.chars().take(LONGEST).collect();

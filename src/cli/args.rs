@@ -158,8 +158,13 @@ pub(super) struct ExtractArgs {
     /// Write nested messages as Parquet structures instead of columns with dotted names.
     #[arg(long, requires = "fields")]
     pub(super) nested: bool,
-    /// Folder of `.msg` files for types that the bag does not define (repeatable; common ROS 2 types are built in).
-    #[arg(long, value_name = "DIR", requires = "fields")]
+    /// Folder of `.msg` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
+    #[arg(
+        long,
+        visible_alias = "source",
+        value_name = "DIR",
+        requires = "fields"
+    )]
     pub(super) msg_path: Vec<PathBuf>,
     /// Topics to export, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]

@@ -12,6 +12,7 @@ use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code, look};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::base::nearest::suggestion;
 use crate::base::words;
 use crate::export::Output;
 use crate::export::target::Target;
@@ -32,7 +33,11 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
         applies::check_inputs(given, reading)?;
     }
     let done = gate::diff(&job, terminal)?;
-    terminal.results(&(args.format.write)(&job.subject, &done.differences))?;
+    let text = (args.format.write)(&job.subject, &done.differences);
+    match args.format.word {
+        "text" => terminal.fitted(&text)?,
+        _ => terminal.results(&text)?,
+    }
     for remark in &done.remarks {
         terminal.note(remark);
     }
@@ -272,8 +277,7 @@ fn tracked(path: &Path) -> String {
 
 fn unknown_kind(word: &str) -> Error {
     let words = || crate::gate::FindingKind::words();
-    let near = crate::base::nearest::nearest(word, words());
-    let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+    let near = suggestion(word, words());
     let all: Vec<&str> = words().collect();
     Error::usage(
         format!("there is no finding `{word}`{near}"),

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::CommandFactory as _;
 
 use crate::base::error::Error;
-use crate::base::nearest::nearest;
+use crate::base::nearest::suggestion;
 use crate::cli::args::Typed;
 use crate::cli::terminal::Terminal;
 
@@ -29,8 +29,7 @@ pub(super) fn manual(name: Option<&str>, terminal: &mut Terminal) -> Result<(), 
         command = command.find_subcommand(name).cloned().ok_or_else(|| {
             let known = command.get_subcommands().map(clap::Command::get_name);
             let known: Vec<&str> = known.collect();
-            let near = nearest(name, known.iter().copied());
-            let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+            let near = suggestion(name, known.iter().copied());
             let all = known.join(", ");
             Error::usage(
                 format!("no command `{name}`{near}"),

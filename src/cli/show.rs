@@ -85,7 +85,7 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
         let mut reading = reading;
         reading.collect.why.clone_from(&args.why);
         let (mission, pieces) = explain(&reading, terminal)?;
-        terminal.results(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;
+        terminal.fitted(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;
         terminal.notices(&mission.notices);
         return Ok(code(&mission));
     }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use super::args::{Colour, Typed};
 use super::stop::Stop;
+use crate::base::columns::fitted;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words::{self, visible};
@@ -124,6 +125,17 @@ impl Terminal {
     pub(crate) fn results(&mut self, text: &str) -> Result<()> {
         self.progress.end();
         print(printable(text).as_bytes()).map(drop)
+    }
+
+    /// As [`Terminal::results`], with lines that fit a terminal.
+    ///
+    /// # Errors
+    /// As [`Terminal::results`].
+    pub(crate) fn fitted(&mut self, text: &str) -> Result<()> {
+        match self.width() {
+            Some(width) => self.results(&fitted(text, width)),
+            None => self.results(text),
+        }
     }
 
     /// As [`Terminal::results`], for a table: bytes that are not text are printed unchanged.

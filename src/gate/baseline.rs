@@ -10,7 +10,7 @@ use crate::base::time::Period;
 use crate::base::words::{self, visible_json};
 use crate::mission::Mission;
 
-pub(super) use draft::{Draft, NodeLine, TopicLine};
+pub(super) use draft::{Draft, Line};
 pub(crate) use update::update;
 
 /// The longest name in the file, in bytes; longer ones are left out: YAML allows no longer keys, and ROS allows 255.
@@ -44,7 +44,7 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     // Elements that did not fit are not unexpected.
     let others = if room.left_out == 0 { "warn" } else { "allow" };
     let topics = draft.topics.iter();
-    let topics = topics.map(|(name, line)| (name, line.text() + &line.comment()));
+    let topics = topics.map(|(name, line)| (name, line.text() + &line.comment));
     let topics = room.section("topics", topics);
     let note = match room.left_out {
         0 => String::new(),
@@ -170,10 +170,10 @@ mod tests {
     fn of(nodes: usize, topics: &[String]) -> (Written, usize) {
         let mut draft = Draft::default();
         for n in 0..nodes {
-            draft.nodes.insert(format!("/n{n}"), NodeLine::default());
+            draft.nodes.insert(format!("/n{n}"), Line::default());
         }
         for name in topics {
-            draft.topics.insert(name.clone(), TopicLine::default());
+            draft.topics.insert(name.clone(), Line::default());
         }
         let written = written(
             &draft,

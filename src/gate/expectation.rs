@@ -107,7 +107,8 @@ pub(crate) struct TopicFacts {
     pub(crate) optional: bool,
     /// The time range for its last message, until which its rate is checked; `None` if it must stay.
     pub(crate) may_end: Option<At<During>>,
-    pub(crate) kind: Option<At<String>>,
+    /// The types of its messages: these and no others.
+    pub(crate) kinds: Option<At<Vec<At<Pattern>>>>,
     /// The nodes that publish it: these and no others.
     pub(crate) by: Option<At<Vec<At<Pattern>>>>,
     /// The nodes that subscribe to it: these at least.

@@ -35,7 +35,7 @@ pub struct Extract {
     pub nested: bool,
     /// The topics to extract.
     pub topics: NameFilter,
-    /// Folders of `.msg` files for types that the bags do not define.
+    /// Folders of `.msg` and `.idl` files for types that the bags do not define.
     pub msg_paths: Vec<PathBuf>,
     /// The start; earlier messages are left out.
     pub start: Option<Moment>,

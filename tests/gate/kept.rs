@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{HEALTHY, bag, recording, run};
-use crate::support::shared;
+use crate::support::{Recording, shared};
 
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
@@ -35,6 +35,38 @@ fn a_run_passes_its_own_expectation() {
             assert!(said.contains("no findings"), "{bag}: {said}");
         }
     }
+}
+
+#[test]
+fn a_topic_of_two_types_keeps_both() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let write = |name: &str, types: [&str; 2]| {
+        let mut robot = Recording::default();
+        for (node, kind) in ["/old", "/new"].into_iter().zip(types) {
+            let tf = robot.publisher(node, "/tf", kind);
+            robot.send(tf, (0, 60_000), 100, b"\0\0\0\0");
+        }
+        bag(here, name, &robot);
+    };
+    write("run.bag", ["tf/tfMessage", "tf2_msgs/TFMessage"]);
+    write("other.bag", ["tf/tfMessage", "std_msgs/String"]);
+    run(here, &["baseline", "run.bag", "-o", "g.yaml"]);
+    let text = fs::read_to_string(here.join("g.yaml")).unwrap();
+    assert!(
+        text.contains("type: [tf/tfMessage, tf2_msgs/TFMessage]"),
+        "{text}"
+    );
+    assert_eq!(run(here, &["check", "run.bag", "--expect", "g.yaml"]).0, 0);
+    let (code, said) = run(here, &["check", "other.bag", "--expect", "g.yaml"]);
+    let why = "/tf is a std_msgs/String, expected tf/tfMessage and tf2_msgs/TFMessage";
+    assert!(code == 1 && said.contains(why), "{said}");
+    run(here, &["baseline", "other.bag", "--update", "g.yaml"]);
+    let text = fs::read_to_string(here.join("g.yaml")).unwrap();
+    assert!(
+        text.contains("type: [std_msgs/String, tf/tfMessage]"),
+        "{text}"
+    );
 }
 
 /// Every recording below a folder: files, and folders with metadata.

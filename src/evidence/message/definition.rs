@@ -84,7 +84,7 @@ impl MessageLayout {
         }
         let definition = connection.definition.as_deref().unwrap_or_default();
         let hash = connection.type_hash.as_deref().unwrap_or_default();
-        let same = if definition.trim().is_empty() || is_idl(definition) {
+        let same = if definition.trim().is_empty() {
             // Nothing to compare with: a payload that is not used up exactly is still refused.
             self.md5.is_empty() || ["", "*", self.md5].contains(&hash)
         } else {
@@ -110,11 +110,6 @@ impl MessageLayout {
                 }
             })
     }
-}
-
-/// Whether a definition is in OMG IDL, which is not parsed.
-fn is_idl(definition: &str) -> bool {
-    definition.contains("module ") && definition.contains("struct ")
 }
 
 /// The messages in a definition, the outermost first: the last part of the name, then `type name` of each field,

@@ -6,6 +6,7 @@
 //! column; a duration is two, `sec` and `nanosec`, in ROS 1 as in ROS 2.
 
 mod definition;
+mod idl;
 mod known;
 
 use std::ops::Range;
@@ -16,6 +17,7 @@ use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn};
 use definition::{Array, Definition, Field};
 
 pub(crate) use definition::MessageFields;
+use known::Carried;
 pub(crate) use known::KnownTypes;
 
 /// The messages in a definition's text, the outermost first, without a name.
@@ -85,13 +87,18 @@ impl Decoder {
         }
         let text = connection.definition.as_deref().unwrap_or_default();
         let type_name = &connection.type_name;
-        let known = |is_older| Definition::known(types, type_name, is_older);
-        match (Definition::parse(text, type_name), known(false)) {
+        let known = |carried| Definition::known(types, type_name, carried);
+        let usual = match connection.encoding {
+            Encoding::Ros1 => Carried::Ros1,
+            _ => Carried::Ros2,
+        };
+        match (Definition::parse(text, type_name), known(usual)) {
             (Ok(definition), _) => Ok((Self::of(connection, &definition)?, None)),
             (Err(_), Some(definition)) => {
                 let newer = Self::of(connection, &definition)?;
-                let older = known(true).map(|d| Self::of(connection, &d)).transpose()?;
-                let older = older.filter(|older| *older != newer);
+                let older = (usual == Carried::Ros2).then_some(Carried::OlderRos2);
+                let older = older.and_then(known).map(|d| Self::of(connection, &d));
+                let older = older.transpose()?.filter(|older| *older != newer);
                 Ok((newer, older))
             }
             (Err(why), None) => Err(why),

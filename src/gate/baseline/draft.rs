@@ -32,96 +32,43 @@ const SECOND: i64 = 1_000_000_000;
 /// The facts that are true in all runs.
 #[derive(Debug, Default)]
 pub(crate) struct Draft {
-    pub(crate) nodes: BTreeMap<String, NodeLine>,
-    pub(crate) topics: BTreeMap<String, TopicLine>,
+    pub(crate) nodes: BTreeMap<String, Line>,
+    pub(crate) topics: BTreeMap<String, Line>,
 }
 
-/// The common facts of a node.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct NodeLine {
-    pub(crate) optional: bool,
-    /// The time ranges in which it must start and may end, as text.
-    pub(crate) within: Option<String>,
-    pub(crate) may_end: Option<String>,
-    pub(crate) is_logged: bool,
-    pub(crate) restarts: usize,
-    pub(crate) lifecycle: Option<String>,
+/// The common facts of a node or topic: the keys of its line with their values in YAML, and the comment after it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Line {
+    facts: Vec<(&'static str, String)>,
+    pub(crate) comment: String,
 }
 
-/// The common facts of a topic.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct TopicLine {
-    pub(crate) optional: bool,
-    pub(crate) within: Option<String>,
-    pub(crate) may_end: Option<String>,
-    pub(crate) kind: Option<String>,
-    pub(crate) by: Option<BTreeSet<String>>,
-    pub(crate) to: BTreeSet<String>,
-    pub(crate) hz: Option<Range>,
-    pub(crate) mean_hz: Option<Range>,
-    /// The longest silence in nanoseconds.
-    pub(crate) max_gap: Option<i64>,
-    pub(crate) is_latched: bool,
-    /// The rates for which no rule is generated, for a comment.
-    pub(crate) unjudged: Option<String>,
-}
-
-impl NodeLine {
-    /// The text after the name: its facts as a mapping of YAML.
-    pub(crate) fn text(&self) -> String {
-        let mut pairs = Vec::new();
-        if let Some(state) = &self.lifecycle {
-            pairs.push(("lifecycle", scalar(state)));
+impl Line {
+    fn of<const N: usize>(facts: [(&'static str, Option<String>); N]) -> Self {
+        let facts = facts
+            .into_iter()
+            .filter_map(|(key, value)| Some((key, value?)));
+        Self {
+            facts: facts.collect(),
+            comment: String::new(),
         }
-        pairs.extend(self.within.clone().map(|within| ("within", within)));
-        pairs.extend(self.may_end.clone().map(|end| ("may_end", end)));
-        if self.is_logged {
-            pairs.push(("known_by", "log".to_owned()));
-        }
-        if self.optional {
-            pairs.push(("optional", "true".to_owned()));
-        }
-        pairs.push(("restarts", format!("..{}", self.restarts)));
-        mapping(&pairs)
     }
-}
 
-impl TopicLine {
-    /// The comment at the end of the line.
-    pub(crate) fn comment(&self) -> String {
-        let rates = self.unjudged.as_ref();
-        rates.map_or_else(String::new, |rates| format!("  # {rates}: not judged"))
+    /// The value of a key.
+    pub(crate) fn get(&self, key: &str) -> Option<String> {
+        let own = self.facts.iter().find(|(own, _)| *own == key);
+        own.map(|(_, value)| value.clone())
     }
 
     /// The text after the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
-        let mut pairs = Vec::new();
-        if let Some(kind) = &self.kind {
-            pairs.push(("type", scalar(kind)));
-        }
-        if let Some(by) = &self.by {
-            pairs.push(("by", list(by.iter())));
-        }
-        if !self.to.is_empty() {
-            pairs.push(("to", list(self.to.iter())));
-        }
-        if let Some(hz) = &self.hz {
-            pairs.push(("hz", hz.to_string()));
-        }
-        if let Some(hz) = &self.mean_hz {
-            pairs.push(("mean_hz", hz.to_string()));
-        }
-        pairs.extend(self.max_gap.map(|gap| ("max_gap", length(gap))));
-        pairs.extend(self.within.clone().map(|within| ("within", within)));
-        pairs.extend(self.may_end.clone().map(|end| ("may_end", end)));
-        if self.is_latched {
-            pairs.push(("latched", "true".to_owned()));
-        }
-        if self.optional {
-            pairs.push(("optional", "true".to_owned()));
-        }
-        mapping(&pairs)
+        mapping(&self.facts)
     }
+}
+
+/// The value of a key that is there or not.
+fn flag(is_set: bool, word: &str) -> Option<String> {
+    is_set.then(|| word.to_owned())
 }
 
 impl Draft {
@@ -136,7 +83,7 @@ impl Draft {
     }
 }
 
-fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, NodeLine> {
+fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
     let mut all: BTreeMap<String, Vec<NodeInRun<'_>>> = BTreeMap::new();
     for facts in runs {
         for (role, nodes) in facts.roles() {
@@ -147,8 +94,7 @@ fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, NodeLine> {
         }
     }
     let line = |(name, seen): (String, Vec<NodeInRun<'_>>)| {
-        let mut line = node(&seen, times);
-        line.optional = seen.len() < runs.len();
+        let line = node(&seen, times, seen.len() < runs.len());
         (name, line)
     };
     all.into_iter().map(line).collect()
@@ -160,7 +106,7 @@ struct NodeInRun<'a> {
     nodes: &'a [NodeId],
 }
 
-fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
+fn node(seen: &[NodeInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let since = |run: &NodeInRun<'_>, at: Stamp| at.since(run.facts.mission.span.start);
     let ends = seen
         .iter()
@@ -183,14 +129,19 @@ fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
     let restarts = seen
         .iter()
         .map(|s| s.facts.entries(s.nodes, Kind::Restarted).len());
-    NodeLine {
-        optional: false,
-        within: began.and_then(|began| times.within(&began)),
-        may_end: times.may_end(&ends, is_sure),
-        is_logged: seen.iter().all(|s| s.facts.is_logged_only(s.nodes)),
-        restarts: restarts.max().unwrap_or(0),
-        lifecycle: last.filter(|last| seen.iter().all(|s| state(s).as_ref() == Some(last))),
-    }
+    let lifecycle = last.filter(|last| seen.iter().all(|s| state(s).as_ref() == Some(last)));
+    let is_logged = seen.iter().all(|s| s.facts.is_logged_only(s.nodes));
+    Line::of([
+        ("lifecycle", lifecycle.map(|state| scalar(&state))),
+        ("within", began.and_then(|began| times.within(&began))),
+        ("may_end", times.may_end(&ends, is_sure)),
+        ("known_by", flag(is_logged, "log")),
+        ("optional", flag(is_optional, "true")),
+        (
+            "restarts",
+            Some(format!("..{}", restarts.max().unwrap_or(0))),
+        ),
+    ])
 }
 
 /// How starts and ends differ between runs.
@@ -260,7 +211,7 @@ struct TopicInRun<'a> {
     id: TopicId,
 }
 
-fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, TopicLine> {
+fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
     let mut all: BTreeMap<String, Vec<TopicInRun<'_>>> = BTreeMap::new();
     for facts in runs {
         for id in facts.topics(&Pattern::new("**")) {
@@ -271,14 +222,13 @@ fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, TopicLine> {
         }
     }
     let line = |(name, seen): (String, Vec<TopicInRun<'_>>)| {
-        let mut line = topic(&seen, times);
-        line.optional = seen.len() < runs.len();
+        let line = topic(&seen, times, seen.len() < runs.len());
         (name, line)
     };
     all.into_iter().map(line).collect()
 }
 
-fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
+fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let since = |s: &TopicInRun<'_>, at: Stamp| at.since(s.facts.mission.span.start);
     let heard = || seen.iter().filter_map(|s| Some((s, s.facts.heard(s.id)?)));
     let ends: Vec<i64> = heard()
@@ -286,20 +236,19 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
         .map(|(s, heard)| since(s, heard.end))
         .collect();
     let began: Vec<i64> = heard().map(|(s, heard)| since(s, heard.start)).collect();
-    let may_end = !ends.is_empty();
+    let ends_somewhere = !ends.is_empty();
     let same = |get: &dyn Fn(&TopicInRun<'_>) -> Option<BTreeSet<String>>| {
         let first = seen.first().and_then(get)?;
         seen.iter()
             .all(|s| get(s).as_ref() == Some(&first))
             .then_some(first)
     };
-    let kinds = same(&|s| Some(s.kinds())).filter(|kinds| kinds.len() == 1);
     let mut to = seen.first().map(TopicInRun::to).unwrap_or_default();
     for other in seen.iter().skip(1) {
         let other = other.to();
         to.retain(|name| other.contains(name));
     }
-    let judged = |s: &TopicInRun<'_>| s.facts.rates(s.id, may_end, s.facts.mission.span);
+    let judged = |s: &TopicInRun<'_>| s.facts.rates(s.id, ends_somewhere, s.facts.mission.span);
     let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
     let is_rated = rates.iter().all(|own| !own.is_empty());
     let is_even = rates.iter().all(|own| Rate::are_even(own));
@@ -317,20 +266,31 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
         .stays(tails.max().unwrap_or(0))
         .filter(|_| hz.is_none());
     let mean_hz = mean(seen, hz).filter(|_| is_timed);
-    let is_judged = hz.is_some() || mean_hz.is_some() || is_latched;
-    TopicLine {
-        optional: false,
-        within: times.within(&began).filter(|_| is_timed),
-        may_end: times.may_end(&ends, true).or(stays).filter(|_| is_timed),
-        unjudged: (!is_judged).then(|| unjudged(seen, &rates.concat())),
-        mean_hz,
-        max_gap: longest(seen, may_end).filter(|_| is_timed),
-        kind: kinds.and_then(|kinds| kinds.into_iter().next()),
-        by: same(&|s| s.by()).filter(|by| !by.is_empty()),
-        to,
-        hz,
-        is_latched,
+    let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(names.iter()));
+    let types = same(&|s| Some(s.types())).unwrap_or_default();
+    let types = match types.first() {
+        Some(one) if types.len() == 1 => Some(scalar(one)),
+        _ => names(types),
+    };
+    let within = times.within(&began);
+    let may_end = times.may_end(&ends, true).or(stays);
+    let max_gap = longest(seen, ends_somewhere).map(length);
+    let mut line = Line::of([
+        ("type", types),
+        ("by", same(&|s| s.by()).and_then(names)),
+        ("to", names(to)),
+        ("hz", hz.map(|hz| hz.to_string())),
+        ("mean_hz", mean_hz.map(|hz| hz.to_string())),
+        ("max_gap", max_gap.filter(|_| is_timed)),
+        ("within", within.filter(|_| is_timed)),
+        ("may_end", may_end.filter(|_| is_timed)),
+        ("latched", flag(is_latched, "true")),
+        ("optional", flag(is_optional, "true")),
+    ]);
+    if hz.is_none() && mean_hz.is_none() && !is_latched {
+        line.comment = format!("  # {}: not judged", unjudged(seen, &rates.concat()));
     }
+    line
 }
 
 /// The range of a topic's rate from its first to its last message, if the one for each window is too wide to detect the
@@ -408,7 +368,7 @@ impl TopicInRun<'_> {
         heard.is_some_and(|h| self.facts.mission.span.end.since(h.end) > CLOSING_NS)
     }
 
-    fn kinds(&self) -> BTreeSet<String> {
+    fn types(&self) -> BTreeSet<String> {
         let own = &self.facts.mission.elements.topics[self.id as usize];
         own.types.iter().map(|t| (**t).to_owned()).collect()
     }

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::edit::EditedText;
-use super::{Draft, NodeLine, TopicLine, length, list, scalar, two_digits};
+use super::{Draft, Line, length, scalar, two_digits};
 use crate::base::error::{Error, Result};
-use crate::base::nearest::nearest;
+use crate::base::nearest::suggestion;
 use crate::base::words;
 use crate::base::yaml::BadYaml;
 use crate::gate::facts::Facts;
@@ -96,8 +96,7 @@ fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
     if all.contains(name) {
         return Ok(());
     }
-    let near = nearest(name, all.into_iter());
-    let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+    let near = suggestion(name, all.into_iter());
     Err(Error::usage(
         format!("`--only {name}` is neither in the file nor in the bag{near}"),
         "use the exact name of a node or topic",
@@ -158,11 +157,11 @@ impl Work<'_> {
         let key = fact(finding.kind);
         match finding.kind {
             FindingKind::UnexpectedNode => {
-                let line = self.draft.nodes.get(name).map(NodeLine::text);
+                let line = self.draft.nodes.get(name).map(Line::text);
                 self.insert("nodes", name, line)
             }
             FindingKind::UnexpectedTopic => {
-                let line = self.draft.topics.get(name).map(TopicLine::text);
+                let line = self.draft.topics.get(name).map(Line::text);
                 self.insert("topics", name, line)
             }
             FindingKind::NodeMissing => {
@@ -246,30 +245,21 @@ impl Work<'_> {
             .nodes
             .iter()
             .filter(|(role, _)| pattern.matches(role));
-        let lines: Vec<&NodeLine> = lines.map(|(_, line)| line).collect();
-        match key {
-            "may_end" => match lines[..] {
-                [line] => line.may_end.clone(),
-                _ => Some("true".to_owned()),
-            },
-            "restarts" => {
-                let most = lines.iter().map(|l| l.restarts).max()?;
-                Some(format!("..{most}"))
+        let lines: Vec<&Line> = lines.map(|(_, line)| line).collect();
+        match (key, &lines[..]) {
+            ("within", [line]) => line.get(key).or_else(|| self.began(&pattern)),
+            ("within", _) => self.began(&pattern),
+            (_, [line]) => line.get(key),
+            ("may_end", _) => Some("true".to_owned()),
+            ("restarts", all) => {
+                let values = all.iter().filter_map(|line| line.get(key));
+                // Of `..2` and `..10` the longer text is the larger number.
+                values.max_by_key(|text| (text.len(), text.clone()))
             }
-            "lifecycle" => {
-                let first = lines.first()?.lifecycle.clone()?;
-                let same = lines.iter().all(|l| l.lifecycle.as_ref() == Some(&first));
-                same.then(|| scalar(&first))
+            (_, all) => {
+                let first = all.first()?.get(key);
+                first.filter(|own| all.iter().all(|line| line.get(key).as_ref() == Some(own)))
             }
-            _ => match lines[..] {
-                [
-                    NodeLine {
-                        within: Some(within),
-                        ..
-                    },
-                ] => Some(within.clone()),
-                _ => self.began(&pattern),
-            },
         }
     }
 
@@ -301,15 +291,7 @@ impl Work<'_> {
         let [line] = lines.map(|(_, line)| line).collect::<Vec<_>>()[..] else {
             return None;
         };
-        match key {
-            "type" => line.kind.as_deref().map(scalar),
-            "by" => line.by.as_ref().map(|by| list(by.iter())),
-            "to" => (!line.to.is_empty()).then(|| list(line.to.iter())),
-            "within" => line.within.clone(),
-            "may_end" => line.may_end.clone(),
-            "mean_hz" => line.mean_hz.map(|hz| hz.to_string()),
-            _ => line.hz.map(|hz| hz.to_string()),
-        }
+        line.get(key)
     }
 
     fn longest(&self, pattern: &Pattern) -> Option<String> {

@@ -6,7 +6,7 @@ use super::super::pattern::Pattern;
 use super::super::range::{During, Range};
 use super::{At, YamlPlace};
 use crate::base::error::{Error, Result};
-use crate::base::nearest::nearest;
+use crate::base::nearest::suggestion;
 use crate::base::time::parse_nanos;
 use crate::base::yaml::{YamlData, YamlPart};
 
@@ -41,8 +41,7 @@ impl<'a> Document<'a> {
         word: &str,
         known: impl Iterator<Item = &'w str> + Clone,
     ) -> Error {
-        let near = nearest(word, known.clone());
-        let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+        let near = suggestion(word, known.clone());
         let all: Vec<&str> = known.collect();
         self.bad(
             at,
@@ -222,14 +221,18 @@ impl<'a> Fields<'a> {
         Ok(self.read("during", hint, During::parse)?.map(|d| d.value))
     }
 
-    /// A list of names.
+    /// A list of names, or one name.
     pub(super) fn names(&self, key: &str) -> Result<Option<At<Vec<At<Pattern>>>>> {
         let Some(part) = self.get(key) else {
             return Ok(None);
         };
         let what = format!("`{key}`");
         let mut names = Vec::new();
-        for one in self.document.list(part, &what)? {
+        let list = match &part.data {
+            YamlData::Scalar(text) if !text.is_empty() => std::slice::from_ref(part),
+            _ => self.document.list(part, &what)?,
+        };
+        for one in list {
             names.push(At {
                 at: one.at,
                 value: Pattern::new(self.document.text(one, &what)?),

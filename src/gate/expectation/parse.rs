@@ -164,7 +164,7 @@ fn topic(fields: &Fields<'_>) -> Result<TopicFacts> {
         forbidden: fields.is_set("forbidden")?,
         optional: fields.is_set("optional")?,
         may_end: fields.may_end()?,
-        kind: fields.string("type")?,
+        kinds: fields.names("type")?,
         by: fields.names("by")?,
         to: fields.names("to")?,
         hz: fields.range("hz")?,

@@ -37,7 +37,7 @@ impl Judge<'_> {
     pub(super) fn topic_facts(&mut self, title: &str, pattern: &Pattern, facts: &TopicFacts) {
         let topics = self.facts.topics(pattern);
         let wanted = [
-            ("type", facts.kind.as_ref().map(|k| k.at)),
+            ("type", facts.kinds.as_ref().map(|k| k.at)),
             ("by", facts.by.as_ref().map(|b| b.at)),
             ("to", facts.to.as_ref().map(|t| t.at)),
             ("within", facts.within.as_ref().map(|w| w.at)),
@@ -167,18 +167,16 @@ impl Judge<'_> {
     }
 
     fn kind(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(kind) = &facts.kind else {
+        let Some(kinds) = &facts.kinds else {
             return Vec::new();
         };
         let types = &self.facts.mission.elements.topics[topic as usize].types;
+        let expected: Vec<&str> = kinds.value.iter().map(|k| k.value.as_str()).collect();
         let plain = |text: &str| text.replace("/msg/", "/");
-        let other: Vec<&str> = types
-            .iter()
-            .map(|t| &**t)
-            .filter(|t| plain(t) != plain(&kind.value))
-            .collect();
+        let is_other = |t: &&str| expected.iter().all(|kind| plain(kind) != plain(t));
+        let other: Vec<&str> = types.iter().map(|t| &**t).filter(is_other).collect();
         let name = self.facts.topic(topic);
-        let expected = &kind.value;
+        let expected = words::some_of(&expected, NAMED);
         if types.is_empty() {
             let says = format!("cannot tell whether {name} is a {expected}: its type is unknown");
             return vec![Finding::unknown(FindingKind::TopicType, name, at, says)];

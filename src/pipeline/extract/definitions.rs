@@ -1,4 +1,4 @@
-//! Definitions of message types in folders of `.msg` files.
+//! Definitions of message types in folders of `.msg` and `.idl` files.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -11,7 +11,7 @@ use crate::evidence::message::fields::KnownTypes;
 /// The most files and folders below a folder of definitions: ten times a whole installation of ROS.
 const MOST_FILES: usize = 1 << 16;
 
-/// The types of `.msg` files in folders.
+/// The types of `.msg` and `.idl` files in folders.
 ///
 /// # Errors
 /// If a folder or a file cannot be read, or is not a definition.
@@ -25,12 +25,13 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
                 path: path.clone(),
                 line: 0,
                 reason,
-                hint: "write one field a line, as ROS does".to_owned(),
+                hint: "its fields are written as ROS writes them, one a line in a `.msg` file"
+                    .to_owned(),
             })?;
         }
         if files.is_empty() {
             return Err(Error::usage(
-                format!("`{}` holds no `.msg` file", folder.display()),
+                format!("`{}` holds no `.msg` or `.idl` file", folder.display()),
                 "name the folder of a package or of several: `my_msgs/msg/Thing.msg`",
             ));
         }
@@ -38,7 +39,8 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
     Ok(types)
 }
 
-/// The `.msg` files below a folder by the names of their types, sorted: `my_msgs/msg/Thing.msg` is `my_msgs/Thing`.
+/// The files of definitions below a folder by the names of their types, sorted: `my_msgs/msg/Thing.msg` is
+/// `my_msgs/Thing`.
 fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
     let whole = folder.canonicalize().map_err(Error::io("read", folder))?;
     let (mut waiting, mut found) = (vec![whole], Vec::new());
@@ -49,7 +51,10 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
             let (path, kind) = (entry.path(), entry.file_type());
             if kind.is_ok_and(|kind| kind.is_dir()) {
                 waiting.push(path);
-            } else if path.extension().is_some_and(|end| end == "msg") {
+            } else if path
+                .extension()
+                .is_some_and(|end| end == "msg" || end == "idl")
+            {
                 let outer = folder.parent().filter(|_| folder.ends_with("msg"));
                 let name = |path: Option<&OsStr>| path.map(|n| n.to_string_lossy().into_owned());
                 let package = name(outer.unwrap_or(&folder).file_name()).unwrap_or_default();

@@ -99,7 +99,8 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
             "no message could be decoded; {}",
             words::some_of(&types, MOST_NAMED)
         ),
-        hint: "`--msg-path DIR` names a folder of `.msg` files for missing definitions".to_owned(),
+        hint: "`--msg-path DIR` names a folder of `.msg` or `.idl` files for missing definitions"
+            .to_owned(),
     }
 }
 

@@ -108,7 +108,8 @@ fn edges(out: &mut String, style: &Style) {
     let _ = write!(
         out,
         ".edge path{{fill:none;stroke:{c};stroke-width:{}}}.edge path+path{{fill:{c};stroke:none}}\
-         .edge text{{font:{}px {FONT};fill:{};paint-order:stroke;stroke:{};stroke-width:{};stroke-linejoin:round}}",
+         .edge text{{font:{}px {FONT};fill:{}}}\
+         .edge text,.topic>.c{{paint-order:stroke;stroke:{};stroke-width:{};stroke-linejoin:round}}",
         edge.width,
         edge.size,
         edge.text,

@@ -1,10 +1,10 @@
-"""Writes `ros2.msg`: the fields of the message types of ROS 2's common packages, for bags that hold no definitions.
+"""Writes `ros1.msg` or `ros2.msg`: the fields of the message types of common packages, for bags that hold no definitions.
 
-Usage: carry.py CHECKOUT… > ros2.msg
+Usage: carry.py 1|2 CHECKOUT… > ros1.msg|ros2.msg
 
-Each CHECKOUT is a clone of one of `REPOSITORIES`, whose `.msg` files are read as of the branch of ROS 2 Humble, the last
-release whose sqlite3 recordings hold no definitions. What has other fields in Galactic or Foxy stands behind it once
-more, as `MSG: package/Name before`.
+Each CHECKOUT is a clone of one of `REPOSITORIES`. Its `.msg` files are read as of the branch that ROS 1 Noetic was released
+from (the branch of the clone), or as of that of ROS 2 Humble, the last release whose sqlite3 recordings hold no definitions.
+What has other fields in Galactic or Foxy stands behind it once more, as `MSG: package/Name before`.
 """
 
 import re
@@ -14,13 +14,16 @@ from pathlib import Path
 
 # Where the definitions come from, and under which licence.
 REPOSITORIES = {
-    "common_interfaces": "Apache-2.0",
-    "rcl_interfaces": "Apache-2.0",
-    "geometry2": "BSD-3-Clause",
-    "unique_identifier_msgs": "BSD-3-Clause",
-    "rmw_dds_common": "Apache-2.0",
+    "1": {name: "BSD-3-Clause" for name in ["common_msgs", "ros_comm_msgs", "std_msgs", "geometry2", "geometry"]},
+    "2": {
+        "common_interfaces": "Apache-2.0",
+        "rcl_interfaces": "Apache-2.0",
+        "geometry2": "BSD-3-Clause",
+        "unique_identifier_msgs": "BSD-3-Clause",
+        "rmw_dds_common": "Apache-2.0",
+    },
 }
-RELEASES = ["humble", "galactic", "foxy"]
+RELEASES = {"1": ["HEAD"], "2": ["humble", "galactic", "foxy"]}
 
 
 def git(checkout, *args):
@@ -45,17 +48,18 @@ def fields(text):
     return [f"{match[1]} {match[2]}" for match in found if match and not match[3]]
 
 
-def main(checkouts):
-    releases = {release: {} for release in RELEASES}
-    print("# The fields of common message types of ROS 2, made by carry.py from")
+def main(ros, checkouts):
+    names = RELEASES[ros]
+    releases = {release: {} for release in names}
+    print(f"# The fields of common message types of ROS {ros}, made by carry.py from")
     for checkout in checkouts:
         origin = Path(checkout)
-        repository = next(name for name in REPOSITORIES if name in str(origin))
-        commit = git(checkout, "rev-parse", "--short=12", RELEASES[0]).strip()
-        print(f"# github.com/ros2/{repository} {commit} ({REPOSITORIES[repository]})")
+        repository = next(name for name in REPOSITORIES[ros] if name in str(origin))
+        commit = git(checkout, "rev-parse", "--short=12", names[0]).strip()
+        print(f"# github.com/{'ros' if ros == '1' else 'ros2'}/{repository} {commit} ({REPOSITORIES[ros][repository]})")
         for release, found in releases.items():
             found.update(messages(checkout, repository, release))
-    newest = releases[RELEASES[0]]
+    newest = releases[names[0]]
     for name, own in sorted(newest.items()):
         print(f"MSG: {name}", *own, sep="\n")
         others = [found[name] for found in releases.values() if found.get(name, own) != own]
@@ -65,6 +69,6 @@ def main(checkouts):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
+    if len(sys.argv) < 3 or sys.argv[1] not in RELEASES:
         sys.exit(__doc__)
-    main(sys.argv[1:])
+    main(sys.argv[1], sys.argv[2:])

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::known::KnownTypes;
+use super::idl;
+use super::known::{Carried, KnownTypes};
 
 /// A field of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,9 +62,6 @@ impl Definition {
         if is_empty && !type_name.ends_with("/Empty") {
             return Err("the bag holds no definition of its type".to_owned());
         }
-        if text.contains("module ") && text.contains("struct ") {
-            return Err("its definition is written in IDL, which is not decoded".to_owned());
-        }
         let messages = messages(text, type_name)?;
         Ok(Self {
             messages: messages.into_iter().map(Arc::new).collect(),
@@ -71,10 +69,10 @@ impl Definition {
         })
     }
 
-    /// The definition of a type that the bag does not define; `is_older` as it was before it changed, if it has.
-    pub(super) fn known(types: &KnownTypes, type_name: &str, is_older: bool) -> Option<Self> {
+    /// The definition of a type that the bag does not define.
+    pub(super) fn known(types: &KnownTypes, type_name: &str, carried: Carried) -> Option<Self> {
         let name = MessageFields::new(type_name);
-        let all = types.all(is_older);
+        let all = types.all(carried);
         let same = |m: &&&Arc<MessageFields>| m.name == name.name && m.package == name.package;
         let own = all.iter().find(same).map(|m| Arc::clone(m))?;
         Some(Self {
@@ -112,12 +110,20 @@ impl Definition {
     }
 }
 
-/// The messages of a text: `type_name`, whose fields come first, and those after `MSG:` lines.
+/// The messages of a text: `type_name`, whose fields come first, and those after `MSG:` lines, or the structures of IDL.
 ///
 /// # Errors
 /// The reason why it cannot be used.
 pub(super) fn messages(text: &str, type_name: &str) -> Result<Vec<MessageFields>, String> {
-    let mut messages = vec![MessageFields::new(type_name)];
+    let own = MessageFields::new(type_name);
+    if idl::is_idl(text) {
+        let mut messages = idl::messages(text)?;
+        let is_own = |m: &MessageFields| m.name == own.name && m.package == own.package;
+        let first = messages.iter().position(is_own).unwrap_or(0);
+        messages[..=first].rotate_right(1);
+        return Ok(messages);
+    }
+    let mut messages = vec![own];
     for line in text.lines() {
         let line = without_comment(line);
         if let Some(name) = line.strip_prefix("MSG:") {

@@ -56,6 +56,40 @@ fn nested_fields_have_dotted_names_and_arrays_are_lists() {
 }
 
 #[test]
+fn idl_is_decoded_as_the_same_message() {
+    let idl = "====\nIDL: b/msg/Part\nmodule b { module msg { struct Part { sequence<double> list; }; }; };\n\
+               ====\nIDL: a/msg/Top\nmodule a { module msg { typedef b::msg::Part two[2]; struct Top {\n\
+               builtin_interfaces::msg::Time stamp; two parts; octet last; }; }; };\n\
+               ====\nIDL: builtin_interfaces/msg/Time\n\
+               module builtin_interfaces { module msg { struct Time { long sec; unsigned long nanosec; }; }; };\n";
+    let text = "builtin_interfaces/Time stamp\nb/Part[2] parts\nbyte last\n===\nMSG: b/Part\nfloat64[] list\n\
+                ===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+    let mut data = vec![0, 1, 0, 0, 5, 0, 0, 0, 6, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
+    data.extend(2.5_f64.to_le_bytes());
+    data.extend([0, 0, 0, 0, 9]);
+    let of = |text| csv(&connection("a/msg/Top", text, Encoding::Cdr), &data);
+    assert_eq!(of(idl), of(text));
+    assert!(of(idl).contains("5000000006"), "{}", of(idl));
+    let union = "module a { struct b { long c; }; union d { }; };";
+    let why = decoded(&connection("a/b", union, Encoding::Cdr), &data).unwrap_err();
+    assert!(why.contains("unexpected `union d`"), "{why}");
+}
+
+#[test]
+fn common_types_are_those_of_the_connections_ros() {
+    let mut data = vec![3, 0, 0, 0, 5, 0, 0, 0, 6, 0, 0, 0, 1, 0, 0, 0, b'x'];
+    data.extend([0; 24]);
+    let point = connection("geometry_msgs/PointStamped", "", Encoding::Ros1);
+    assert!(csv(&point, &data).starts_with("header.seq,header.stamp,"));
+    let cdr = connection("geometry_msgs/msg/PointStamped", "", Encoding::Cdr);
+    let mut data = vec![
+        0, 1, 0, 0, 5, 0, 0, 0, 6, 0, 0, 0, 2, 0, 0, 0, b'x', 0, 0, 0,
+    ];
+    data.extend([0; 24]);
+    assert!(csv(&cdr, &data).starts_with("header.stamp,header.frame_id,"));
+}
+
+#[test]
 fn cdr_is_aligned_and_an_empty_message_is_a_byte() {
     let definition = "b/Nothing nothing\nfloat64[] list\nuint8 last\n===\nMSG: b/Nothing\n";
     let little = [
@@ -89,7 +123,13 @@ fn undecodable_messages_report_the_reason() {
     assert!(why("X x\n", Encoding::Ros1).contains("lacks the type `X`"));
     assert!(why("T t\n===\nMSG: a/T\nT t\n", Encoding::Ros1).contains("holds itself"));
     assert!(why("int8 x\n", Encoding::Other("json".to_owned())).contains("`json`"));
-    assert!(why("module a { struct T { long x; }; };", Encoding::Cdr).contains("IDL"));
+    assert!(
+        why(
+            "module a { struct T { map<long, long> x; }; };",
+            Encoding::Cdr
+        )
+        .contains("IDL")
+    );
 }
 
 #[test]
@@ -129,13 +169,18 @@ fn common_types_need_no_definition_in_either_version() {
 #[test]
 fn every_carried_type_is_complete() {
     let types = KnownTypes::default();
-    let all = types.all(false);
-    assert!(all.len() > 140);
-    for message in all {
-        let name = format!("{}/msg/{}", message.package, message.name);
-        let mut one = connection(&name, "", Encoding::Cdr);
-        one.definition = None;
-        Decoder::new(&one, &types).unwrap_or_else(|why| panic!("{name}: {why}"));
+    for (carried, encoding) in [
+        (Carried::Ros1, Encoding::Ros1),
+        (Carried::Ros2, Encoding::Cdr),
+    ] {
+        let all = types.all(carried);
+        assert!(all.len() > 120);
+        for message in all {
+            let name = format!("{}/msg/{}", message.package, message.name);
+            let mut one = connection(&name, "", encoding.clone());
+            one.definition = None;
+            Decoder::new(&one, &types).unwrap_or_else(|why| panic!("{name}: {why}"));
+        }
     }
 }
 
