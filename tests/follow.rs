@@ -167,9 +167,9 @@ fn a_signal_ends_following_and_writes_the_outputs() {
         .unwrap();
     sleep(Duration::from_millis(1500));
     assert!(follower.try_wait().unwrap().is_none(), "it follows on");
-    let kill = Command::new("kill")
-        .args(["-INT", &follower.id().to_string()])
-        .status();
+    // Twice, as `timeout` does.
+    let id = follower.id().to_string();
+    let kill = Command::new("kill").args(["-INT", &id, &id]).status();
     if !kill.is_ok_and(|status| status.success()) {
         println!("skipped: no `kill` here");
         follower.kill().unwrap();

@@ -13,9 +13,13 @@ use tempfile::TempDir;
 
 /// Follows a system until it has been silent for two seconds.
 fn follow(folder: &Path, more: &[&str]) -> Output {
+    follow_for("2s", folder, more)
+}
+
+fn follow_for(idle: &str, folder: &Path, more: &[&str]) -> Output {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
     run.current_dir(folder).arg("follow").args(more);
-    run.args(["--idle", "2s", "-o", "f.json"]).output().unwrap()
+    run.args(["--idle", idle, "-o", "f.json"]).output().unwrap()
 }
 
 /// The final output: names of nodes, and the ends of edges, of all windows.
@@ -170,7 +174,7 @@ mod bridge {
     use tungstenite::handshake::server::{Request, Response};
     use tungstenite::{Message, WebSocket, accept_hdr};
 
-    use super::{complaint, follow, graph};
+    use super::{complaint, follow, follow_for, graph};
 
     /// Sends a message to the client.
     fn say(to: &mut WebSocket<TcpStream>, message: &Value) {
@@ -207,20 +211,22 @@ mod bridge {
         client
     }
 
-    /// Like `foxglove_bridge`: sends the graph when a subscription follows the one to the graph.
-    fn serve(stream: TcpStream) {
-        let mut client = open(stream);
-        assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
+    /// Advertises a channel; returns the client's subscription to it.
+    fn begin(client: &mut WebSocket<TcpStream>) -> u64 {
+        assert_eq!(hear(client)["op"], "subscribeConnectionGraph");
         say(
-            &mut client,
+            client,
             &json!({"op": "advertise", "channels": [{
                 "id": 7, "topic": "/scan", "encoding": "cdr", "schemaName": "std_msgs/msg/Empty", "schema": "",
             }]}),
         );
-        let asked = hear(&mut client);
+        let asked = hear(client);
         assert_eq!(asked["subscriptions"][0]["channelId"], 7, "{asked}");
-        let subscription = asked["subscriptions"][0]["id"].as_u64().unwrap();
-        say(&mut client, &update(&["/lidar"]));
+        asked["subscriptions"][0]["id"].as_u64().unwrap()
+    }
+
+    /// Sends messages for three seconds.
+    fn scans(client: &mut WebSocket<TcpStream>, subscription: u64) {
         for time in 0..60_u64 {
             let mut message = vec![1];
             message.extend(&subscription.to_le_bytes()[..4]);
@@ -229,15 +235,64 @@ mod bridge {
             client.send(Message::binary(message)).unwrap();
             sleep(Duration::from_millis(50));
         }
+    }
+
+    /// Like `foxglove_bridge`: sends the graph when a subscription follows the one to the graph.
+    fn serve(stream: TcpStream) {
+        let mut client = open(stream);
+        let subscription = begin(&mut client);
+        say(&mut client, &update(&["/lidar"]));
+        scans(&mut client, subscription);
         say(&mut client, &update(&[]));
         sleep(Duration::from_millis(1500));
+    }
+
+    #[test]
+    fn what_was_not_seen_did_not_stop_and_what_no_change_names_did() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("ws://{}", listener.local_addr().unwrap());
+        let server = spawn(move || {
+            for is_last in [false, true] {
+                let mut client = open(listener.accept().unwrap().0);
+                let subscription = begin(&mut client);
+                say(&mut client, &update(&["/lidar"]));
+                scans(&mut client, subscription);
+                if !is_last {
+                    let _ = client.close(None);
+                    sleep(Duration::from_millis(4500));
+                    continue;
+                }
+                // The lidar left, of which servers say nothing, since its topic still has a subscriber.
+                assert_eq!(hear(&mut client)["op"], "unsubscribeConnectionGraph");
+                assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
+                let mut whole = update(&[]);
+                whole["publishedTopics"] = json!([]);
+                say(&mut client, &whole);
+                sleep(Duration::from_secs(3));
+            }
+        });
+        let folder = TempDir::new().unwrap();
+        let more = [&*address, "--rates", "/scan"];
+        let done = follow_for("9s", folder.path(), &more);
+        server.join().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(0), "{said}");
+        let log = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(folder.path())
+            .args(["events", "f.json"])
+            .output()
+            .unwrap();
+        let log = String::from_utf8_lossy(&log.stdout);
+        assert!(log.contains("nothing was recorded for"), "{log}");
+        assert!(!log.contains("silent for"), "{log}");
+        assert_eq!(log.matches("/lidar stopped").count(), 1, "{log}");
     }
 
     #[test]
     fn hostile_bridges_are_left() {
         let channel = |at| json!({"id": at, "topic": format!("/topic{at}"), "schemaName": "a/B"});
         let channels =
-            json!({"op": "advertise", "channels": (0..300_000).map(channel).collect::<Vec<_>>()});
+            json!({"op": "advertise", "channels": (0..400_000).map(channel).collect::<Vec<_>>()});
         let topic = |at| json!({"name": format!("/t{at}"), "publisherIds": ["/node"]});
         let many = json!({"op": "connectionGraphUpdate", "publishedTopics": (0..70_000).map(topic).collect::<Vec<_>>()});
         let texts = [

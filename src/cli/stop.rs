@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::base::leftovers;
 
@@ -94,8 +94,14 @@ fn listen(stop: &Stop) {
     };
     let stop = stop.clone();
     thread::spawn(move || {
+        let mut last: Option<(i32, Instant)> = None;
         for signal in signals.forever() {
-            stop.on_signal(u8::try_from(signal).unwrap_or(1));
+            // `timeout` sends its signal to the process and then to the whole group.
+            let is_again = |(other, at): (i32, Instant)| other == signal && at.elapsed() < GRACE;
+            if !last.is_some_and(is_again) {
+                stop.on_signal(u8::try_from(signal).unwrap_or(1));
+            }
+            last = Some((signal, Instant::now()));
         }
     });
 }

@@ -22,11 +22,14 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use crate::bag::source::Temporary;
 use crate::base::budget::NAMES;
 use crate::base::error::{Error, Result};
+use crate::base::name::HEARTBEAT;
 use crate::base::time::Stamp;
-use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, graph, log};
+use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, graph};
 
 /// The heartbeat interval.
 const BEAT: Duration = Duration::from_secs(1);
+/// The payload of a heartbeat: a message without a field, in CDR.
+const EMPTY: [u8; 5] = [0, 1, 0, 0, 0];
 /// The time for connecting, and for a whole answer.
 const WAIT: Duration = Duration::from_secs(5);
 /// The longest wait before reconnecting.
@@ -78,13 +81,17 @@ impl Live {
         let folder = Temporary::new()?;
         let path = folder.path().join("live.mcap");
         let file = File::create(&path).map_err(Error::io("write", &path))?;
-        let file = GraphFile::new(BufWriter::new(file), false);
-        let flushed = file.and_then(|mut file| file.flush().map(|()| file));
-        let file = flushed.map_err(Error::io("write", &path))?;
+        let begun = GraphFile::new(BufWriter::new(file), false).and_then(|mut file| {
+            let heartbeat = file.own_channel(HEARTBEAT, "std_msgs/msg/Empty", String::new())?;
+            file.flush()?;
+            Ok((file, heartbeat))
+        });
+        let (file, heartbeat) = begun.map_err(Error::io("write", &path))?;
         let is_over = Arc::new(AtomicBool::new(false));
         let (told, news) = channel();
         let watched = Watched {
             file,
+            heartbeat,
             topics: topics.iter().cloned().collect(),
             graph: LiveGraph::default(),
             written: None,
@@ -166,6 +173,7 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Se
 /// A watched live system and its recording.
 struct Watched {
     file: GraphFile<BufWriter<File>>,
+    heartbeat: usize,
     /// The topics whose messages are recorded.
     #[cfg_attr(not(feature = "live"), expect(dead_code, reason = "a master has none"))]
     topics: BTreeSet<String>,
@@ -194,7 +202,7 @@ impl Watched {
                 self.written = Some(payload);
             }
         }
-        self.file.write(LOG, now, &log(now, "connected", false))?;
+        self.file.write(self.heartbeat, now, &EMPTY)?;
         self.file.flush()
     }
 }
@@ -277,6 +285,11 @@ const SUBSCRIBERS: usize = 1;
 const SERVERS: usize = 3;
 
 impl LiveGraph {
+    #[cfg(feature = "live")]
+    fn is_empty(&self) -> bool {
+        self.ends.iter().all(BTreeMap::is_empty)
+    }
+
     /// Sets the nodes of a topic or service; none if it no longer exists.
     fn set(&mut self, side: usize, name: &str, nodes: BTreeSet<String>) {
         if nodes.is_empty() {

@@ -155,7 +155,7 @@ fn the_followed_mission_equals_the_closed_recording() {
 #[test]
 #[ignore = "takes half an hour"]
 fn a_thousand_followed_recordings_of_each_kind_equal_the_closed_ones() {
-    for (name, what, recorder) in RECORDERS.iter().chain(EXAMPLES) {
+    for (name, what, recorder) in RECORDERS {
         (0..1000).for_each(|seed| holds(name, what, *recorder, seed));
         println!("{name}: 1000 seeds");
     }

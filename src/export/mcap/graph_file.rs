@@ -38,13 +38,22 @@ impl<W: Write + Seek> GraphFile<W> {
             channels: Vec::new(),
             sequence: 0,
         };
-        // Our own reader recognizes by the node that these topics are not the robot's.
-        let metadata = BTreeMap::from([("callerid".to_owned(), OWN_NODE.to_owned())]);
         for (topic, kind, definition) in CHANNELS {
-            let schema = (kind, "ros2msg", definition());
-            file.channel(topic, "cdr", schema, &metadata)?;
+            file.own_channel(topic, kind, definition())?;
         }
         Ok(file)
+    }
+
+    /// Adds a channel about the robot: our own reader recognizes by the node that its topic is not the robot's. Returns the
+    /// number to write to.
+    pub(crate) fn own_channel(
+        &mut self,
+        topic: &str,
+        kind: &str,
+        text: String,
+    ) -> io::Result<usize> {
+        let metadata = BTreeMap::from([("callerid".to_owned(), OWN_NODE.to_owned())]);
+        self.channel(topic, "cdr", (kind, "ros2msg", text), &metadata)
     }
 
     /// Adds a channel with its encoding and its schema (name, encoding, text); returns the number to write to.

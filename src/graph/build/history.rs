@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::liveness::{Lifetime, Liveness};
 use super::merged::fall_silent;
-use super::recordings::{doubled, hide, pauses};
+use super::recordings::{doubled, hide, pauses, unseen};
 use super::restarts::restarts;
 use super::senders::{Sender as TopicSender, Traffic};
 use super::settle::settle;
@@ -133,7 +133,8 @@ fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> i
     let mut tracks = tracks(recorded, findings, traffic, &restarts)?;
     fall_silent(&mut tracks, traffic, findings);
     settle(&mut tracks, &findings.proofs, &restarts, findings.mission);
-    let pauses = pauses(traffic, &restarts, &findings.streams);
+    let mut pauses = pauses(traffic, &restarts, &findings.streams);
+    pauses.extend(unseen(recorded, &findings.streams)?);
     Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::client::{IntoClientRequest as _, client_with_config};
@@ -11,7 +11,9 @@ use tungstenite::http::HeaderValue;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
-use super::{BEAT, LiveGraph, PUBLISHERS, Patient, SERVERS, SUBSCRIBERS, Watched, connect, now};
+use super::{
+    BEAT, LiveGraph, PUBLISHERS, Patient, SERVERS, SUBSCRIBERS, WAIT, Watched, connect, now,
+};
 
 /// The supported protocol versions.
 const PROTOCOLS: HeaderValue = HeaderValue::from_static("foxglove.sdk.v1, foxglove.websocket.v1");
@@ -20,6 +22,9 @@ const MOST_MESSAGE: usize = 64 << 20;
 /// The longest description of channels and of the graph, in bytes: ten times that of a thousand topics with their
 /// definitions. Parsing needs at most twenty times as much memory.
 const MOST_TEXT: usize = 16 << 20;
+/// The interval at which the whole graph is requested: servers do not report that the last publisher of a topic left which
+/// still has subscribers, and some report no changes to a second client.
+const ANEW: Duration = Duration::from_secs(5);
 /// The number of bytes before the payload of a message: an operation, a subscription and a time.
 const HEAD: usize = 13;
 
@@ -29,6 +34,10 @@ struct Bridge<'a> {
     watched: &'a mut Watched,
     /// The channel in the file of each subscription, which has the number of its channel.
     subscribed: BTreeMap<u64, usize>,
+    /// What was described since the whole graph was last requested; `None` once it is in use.
+    whole: Option<LiveGraph>,
+    /// The time of that request; `None` before the first.
+    requested: Option<Instant>,
     /// Whether a subscription was made, or made and ended, so that the server sends its first graph.
     has_asked: bool,
 }
@@ -51,6 +60,8 @@ pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
         socket,
         watched,
         subscribed: BTreeMap::new(),
+        whole: None,
+        requested: None,
         has_asked: false,
     };
     bridge.listen()
@@ -58,7 +69,8 @@ pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
 
 impl Bridge<'_> {
     fn listen(mut self) -> io::Result<()> {
-        let mut beat = Instant::now();
+        let begun = Instant::now();
+        let mut beat = begun;
         let mut is_new = false;
         while !self.watched.is_over() {
             // Heartbeats are written between two messages, and within one that is sent slowly.
@@ -79,8 +91,11 @@ impl Bridge<'_> {
                 Err(tungstenite::Error::Io(e)) if e.kind() == io::ErrorKind::TimedOut => {}
                 Err(error) => return Err(io::Error::other(error)),
             }
-            // Several messages describe one graph, which is written after all of them.
-            if beat.elapsed() >= if is_new { BEAT / 10 } else { BEAT } {
+            is_new |= self.renew()?;
+            // Several messages describe one graph, which is written after all of them. A server that has just started
+            // knows no node for a while.
+            let is_known = !self.watched.graph.is_empty() || begun.elapsed() >= WAIT;
+            if is_known && beat.elapsed() >= if is_new { BEAT / 10 } else { BEAT } {
                 self.watched.beat()?;
                 (beat, is_new) = (Instant::now(), false);
             }
@@ -90,6 +105,31 @@ impl Bridge<'_> {
         Ok(())
     }
 
+    /// Takes the whole graph over after a request, and requests it again; returns whether the graph may be new.
+    fn renew(&mut self) -> io::Result<bool> {
+        let Some(requested) = self.requested else {
+            return Ok(false);
+        };
+        if requested.elapsed() >= ANEW {
+            self.send(&json!({"op": "unsubscribeConnectionGraph"}))?;
+            self.request()?;
+        }
+        // Changes that were under way may precede the whole.
+        let is_whole =
+            requested.elapsed() >= BEAT && self.whole.as_ref().is_some_and(|g| !g.is_empty());
+        if let Some(mut whole) = self.whole.take_if(|_| is_whole) {
+            whole.types = std::mem::take(&mut self.watched.graph.types);
+            self.watched.graph = whole;
+        }
+        Ok(is_whole)
+    }
+
+    /// Requests the whole graph, and each change from then on.
+    fn request(&mut self) -> io::Result<()> {
+        (self.whole, self.requested) = (Some(LiveGraph::default()), Some(Instant::now()));
+        self.send(&json!({"op": "subscribeConnectionGraph"}))
+    }
+
     /// Handles a message from the server.
     fn take(&mut self, message: &Value) -> io::Result<()> {
         match text(message, "op") {
@@ -97,7 +137,7 @@ impl Bridge<'_> {
                 if !list(message, "capabilities").any(|c| c == "connectionGraph") {
                     return Err(io::Error::other("the server does not report its graph"));
                 }
-                self.send(&json!({"op": "subscribeConnectionGraph"}))?;
+                self.request()?;
             }
             "advertise" => {
                 for channel in list(message, "channels") {
@@ -109,39 +149,13 @@ impl Bridge<'_> {
                     self.subscribed.remove(&id);
                 }
             }
-            "connectionGraphUpdate" => self.changed(message),
+            "connectionGraphUpdate" => {
+                let graphs = self.whole.iter_mut().chain([&mut self.watched.graph]);
+                graphs.for_each(|graph| change(graph, message));
+            }
             _ => {}
         }
         Ok(())
-    }
-
-    /// Applies changes of the graph.
-    fn changed(&mut self, message: &Value) {
-        let graph = &mut self.watched.graph;
-        for (sides, gone) in [
-            (&[PUBLISHERS, SUBSCRIBERS][..], "removedTopics"),
-            (&[SERVERS], "removedServices"),
-        ] {
-            for name in list(message, gone).filter_map(Value::as_str) {
-                for side in sides {
-                    graph.set(*side, name, [].into());
-                }
-            }
-        }
-        for (side, topics, nodes) in [
-            (PUBLISHERS, "publishedTopics", "publisherIds"),
-            (SUBSCRIBERS, "subscribedTopics", "subscriberIds"),
-            (SERVERS, "advertisedServices", "providerIds"),
-        ] {
-            for topic in list(message, topics) {
-                let nodes = list(topic, nodes).filter_map(Value::as_str);
-                graph.set(
-                    side,
-                    text(topic, "name"),
-                    nodes.map(str::to_owned).collect(),
-                );
-            }
-        }
     }
 
     /// Records the type of a channel, and subscribes to it if requested.
@@ -193,6 +207,34 @@ impl Bridge<'_> {
     fn send(&mut self, message: &Value) -> io::Result<()> {
         let sent = self.socket.send(Message::text(message.to_string()));
         sent.map_err(io::Error::other)
+    }
+}
+
+/// Applies changes of the graph.
+fn change(graph: &mut LiveGraph, message: &Value) {
+    for (sides, gone) in [
+        (&[PUBLISHERS, SUBSCRIBERS][..], "removedTopics"),
+        (&[SERVERS], "removedServices"),
+    ] {
+        for name in list(message, gone).filter_map(Value::as_str) {
+            for side in sides {
+                graph.set(*side, name, [].into());
+            }
+        }
+    }
+    for (side, topics, nodes) in [
+        (PUBLISHERS, "publishedTopics", "publisherIds"),
+        (SUBSCRIBERS, "subscribedTopics", "subscriberIds"),
+        (SERVERS, "advertisedServices", "providerIds"),
+    ] {
+        for topic in list(message, topics) {
+            let nodes = list(topic, nodes).filter_map(Value::as_str);
+            graph.set(
+                side,
+                text(topic, "name"),
+                nodes.map(str::to_owned).collect(),
+            );
+        }
     }
 }
 
