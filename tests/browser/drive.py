@@ -322,6 +322,9 @@ def elsewhere(url, page):
         b.click("#toside")
         b.click("#told a")
         assert window(b) >= 0 and b.js("return location.href") == "about:srcdoc", "a link left the frame"
+        # The panel does not cover the button that closes it.
+        b.click("#toside")
+        assert b.js("return getComputedStyle(document.getElementById('side')).display") == "none"
         check_console(b)
         under_policies(b, outer, page)
         b.cdp("Emulation.setScriptExecutionDisabled", value=True)

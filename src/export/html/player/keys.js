@@ -18,13 +18,21 @@ function escape() {
 	if (range) { span(null); return seek(now); }
 	if (base >= 0) compare(-1);
 }
+// Panel and life lines are there where they have room, until somebody chooses.
+let isChosen = false;
+function arrange() {
+	if (isChosen || beforePrint) return;
+	side(innerWidth >= 1200 || innerWidth <= 760);
+	livesOn(isBoard || innerWidth > 760 && innerHeight > 600);
+}
+const choose = (arranges, on) => { isChosen = true; arranges(on); };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1, '.': 1, ',': -1, PageDown: W / 10, PageUp: -W / 10, Home: -W, End: W };
 const KEYS = {
 	' ': () => play(!timer), '[': () => jump(-1), ']': () => jump(1), p: () => jump(-1), n: () => jump(1),
 	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
-	'/': () => { side(true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
+	'/': () => { choose(side, true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
 	g: () => enlarge($.big.hidden), r: () => { if (data.sides) return; if (range) { span(null); seek(now); } else { anchor = now; go(now); } },
-	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => livesOn($.deck.classList.contains('small')), s: () => side(!sideIsOpen()),
+	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => choose(livesOn, $.deck.classList.contains('small')), s: () => choose(side, !sideIsOpen()),
 	o: () => { if (group >= 0) unfold(); else if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
 };
 const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + Math.sign(MOVES[key]) * Math.ceil(Math.abs(MOVES[key] * far)) : Math.round(last * key / 10));
@@ -63,9 +71,8 @@ new ResizeObserver(resized).observe(stage);
 onhashchange = e => load(e.newURL.split('#')[1]);
 if ($.open) $.open.hidden = !folded;
 $.notes.hidden = !$.notes.querySelector('li');
-if (innerWidth < 1200) side(false);
-livesOn(isBoard || innerWidth > 760 && innerHeight > 600);
-if (innerWidth <= 760) side(true);
+addEventListener('resize', arrange);
+arrange();
 // Paper shows all of it, with names and lives, whatever the screen shows.
 onbeforeprint = () => {
 	beforePrint = [view, $.deck.classList.contains('small')];
