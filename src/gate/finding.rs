@@ -58,7 +58,7 @@ kinds! {
         "Written as `forbidden: true`, mostly for a pattern.";
     TopicType "topic-type":
         "A topic has another type than expected.",
-        "`type: sensor_msgs/LaserScan`; the `/msg/` of ROS 2 makes no difference.";
+        "`type: sensor_msgs/LaserScan`, or a list of several; the `/msg/` of ROS 2 makes no difference.";
     TopicQos "topic-qos":
         "A topic is offered with another quality of service.",
         "`qos: reliable` asks for each of its words; `latched: true` for a last message that stands. Undecidable where \
