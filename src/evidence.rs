@@ -9,6 +9,7 @@ pub(crate) mod clock;
 pub mod code;
 pub mod collector;
 pub mod conclude;
+pub(crate) mod given;
 mod kinds;
 pub(crate) mod message;
 pub(crate) mod numbers;

@@ -14,6 +14,7 @@ pub(crate) mod html;
 mod json;
 pub(crate) mod mcap;
 pub(crate) mod mermaid;
+pub(crate) mod nodl;
 pub mod options;
 pub(crate) mod palette;
 #[cfg(feature = "parquet")]
@@ -153,6 +154,13 @@ pub const FORMATS: &[OutputFormat] = &[
         ..DATA
     },
     OutputFormat {
+        word: "nodl",
+        what: "a folder `nodl/` with a NoDL document per node",
+        check: Some(nodl::check),
+        start: nodl::start,
+        ..DATA
+    },
+    OutputFormat {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
         check: Some(tables::check),
@@ -233,6 +241,9 @@ impl Output {
     pub fn named(name: &OsStr, word: Option<&str>) -> Result<Self> {
         let target = Target::parse(name);
         let word = word.map(str::to_lowercase).or_else(|| target.extension());
+        // The only format that is a folder.
+        let is_nodl = target.path().file_name().is_some_and(|name| name == "nodl");
+        let word = word.or_else(|| is_nodl.then(|| "nodl".to_owned()));
         let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
         let all = all.join(", ");
         let Some(word) = word else {
@@ -260,6 +271,9 @@ impl Output {
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
     check::check(&targets, kept)?;
+    for output in outputs.iter().filter(|o| o.format.word == "nodl") {
+        check::check_folder(output.target.path(), "yaml", kept)?;
+    }
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
@@ -269,6 +283,7 @@ pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
 fn files(output: &Output) -> Vec<Target> {
     match output.format.word {
         word @ ("csv" | "parquet") => tables::files(&output.target, word),
+        "nodl" => vec![Target::Path(output.target.path().join("node.nodl.yaml"))],
         _ => vec![output.target.clone()],
     }
 }

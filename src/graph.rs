@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder};
+use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder, is_service};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::{Degree, Evidence};
@@ -90,9 +90,9 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// Whether it is a service: its clients write to it, and its server reads it.
+    /// Whether it is a service: its clients write to it, and its server reads it. A topic of the same name counts more.
     pub fn is_service(&self) -> bool {
-        self.types.iter().any(|kind| kind.contains("/srv/"))
+        !self.types.is_empty() && self.types.iter().all(|kind| is_service(kind))
     }
 }
 
@@ -401,6 +401,12 @@ impl Elements {
             Element::Publish(id) => ends(self.publishes.get(id as usize)),
             Element::Subscribe(id) => ends(self.subscribes.get(id as usize)),
         }
+    }
+
+    /// Whether an element is a service, or an end of one.
+    pub(crate) fn is_service(&self, what: Element) -> bool {
+        let topic = self.ends(what).1;
+        topic.is_some_and(|id| self.topics.get(id as usize).is_some_and(Topic::is_service))
     }
 
     /// The kinds of evidence for an element.

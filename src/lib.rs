@@ -137,7 +137,7 @@ pub mod values {
     pub use crate::pipeline::{Body, Drawing, Purpose};
     pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};
     #[cfg(feature = "render")]
-    pub use crate::view::{Grouping, Hide, Mode, ViewOptions};
+    pub use crate::view::{Grouping, Hide, LineWidth, Mode, ViewOptions};
 }
 
 #[cfg(feature = "render")]

@@ -4,6 +4,7 @@ pub mod events;
 pub mod info;
 pub mod ledger;
 pub mod phases;
+pub(crate) mod reconfiguration;
 
 mod json;
 pub(crate) use json::raw;
@@ -106,6 +107,28 @@ impl Mission {
     /// The windows in order, each with its graph, which is built on demand.
     pub fn each(&self) -> impl Iterator<Item = (&Window, Graph)> {
         self.windows.iter().zip(&self.graphs)
+    }
+
+    /// The skew of each topic: the coefficient of variation of its rate over the windows, 0 for one that is always the
+    /// same; `None` without two whole windows or without messages. A partial window at the end does not count.
+    pub(crate) fn skews(&self) -> Vec<Option<f64>> {
+        // The sums of the rates and of their squares.
+        let mut sums = vec![(0.0, 0.0); self.elements.topics.len()];
+        let mut many = 0.0;
+        for (window, graph) in self.each().filter(|(window, _)| !window.partial) {
+            many += 1.0;
+            for topic in &graph.topics {
+                let hz = topic.count as f64 * 1e9 / window.span.nanos().max(1) as f64;
+                let sum = &mut sums[topic.id as usize];
+                *sum = (sum.0 + hz, sum.1 + hz * hz);
+            }
+        }
+        let skew = |(sum, squares): (f64, f64)| {
+            let mean = sum / many;
+            let spread = libm::sqrt((squares / many - mean * mean).max(0.0));
+            (many > 1.0 && mean > 0.0).then(|| spread / mean)
+        };
+        sums.into_iter().map(skew).collect()
     }
 
     /// Determines the changes from each window to the next, by the ledger.

@@ -21,6 +21,8 @@ pub(crate) mod gate;
 mod inputs;
 #[cfg(feature = "cli")]
 pub(crate) mod live;
+#[cfg(all(feature = "cli", feature = "pdf"))]
+pub(crate) mod paper;
 mod phases;
 mod probe;
 #[cfg(feature = "render")]

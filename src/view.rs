@@ -49,8 +49,9 @@ pub(crate) use frame::Phrase;
 pub use frame::{Frame, Headline};
 pub(crate) use lasting::Lasting;
 pub(crate) use nothing::{nothing, unmatched};
-pub use options::{Grouping, Hide, Mode, ViewOptions};
+pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
 pub use showing::Showing;
+pub(crate) use showing::TopicRow;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
@@ -153,8 +154,21 @@ pub struct Item {
     pub members: Vec<Element>,
     /// Whether its members are the same thing in several equal namespaces.
     pub is_replica: bool,
+    /// Whether it is a service: its clients write to it, and its server reads it.
+    pub is_service: bool,
     /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
+}
+
+impl Item {
+    /// The words for its class in SVG.
+    pub(crate) fn class(&self) -> &'static str {
+        if self.is_service {
+            "topic service"
+        } else {
+            self.kind.word()
+        }
+    }
 }
 
 /// A namespace drawn as a box around its members.
@@ -238,9 +252,24 @@ pub struct Arrow {
     /// The names of the topics of a bundle, sorted, with those of an action or a family of images as one; empty for all
     /// else.
     pub topics: Vec<Arc<str>>,
+    /// Whether it stands for calls of services only.
+    pub is_service: bool,
+    /// The mean payload of its messages in kilobytes, 0 where unknown, if its thickness shows bytes per second.
+    pub kilobytes: Option<f64>,
 }
 
 impl Arrow {
+    /// The words for its class in SVG.
+    pub(crate) fn class(&self) -> String {
+        let service = if self.is_service { " service" } else { "" };
+        format!("{}{service}", self.kind.word())
+    }
+
+    /// The number that decides its thickness: messages or kilobytes per second.
+    pub(crate) fn flow(&self, shown: &Shown) -> Option<f64> {
+        shown.steady_hz.map(|hz| hz * self.kilobytes.unwrap_or(1.0))
+    }
+
     /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those
     /// with the highest rate first; `None` for one from or to a topic.
     pub fn carries(&self, shown: &Shown) -> Option<String> {
@@ -266,39 +295,6 @@ impl Arrow {
             .iter()
             .map(|row| self.topics.get(row.topic as usize));
         names.flatten().map(|name| &**name).collect()
-    }
-}
-
-/// A topic on a line between two boxes in a window, or several that are shown as one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TopicRow {
-    /// Its place in [`Arrow::topics`].
-    pub topic: u32,
-    /// Whether its messages run along the arrow, and whether they run against it.
-    pub ways: [bool; 2],
-    /// Its state.
-    pub state: State,
-    /// Messages per second in the window, if known.
-    pub hz: Option<f64>,
-    /// The number of messages in the window, if known.
-    pub count: Option<u64>,
-    /// Its change, where that is not the change of the whole line.
-    pub mark: Option<Mark>,
-    /// Messages per second before and after, where its rate changed.
-    pub rates: Option<(f64, f64)>,
-}
-
-/// The properties that distinguish unmarked topics of a bundle.
-type RowKey = (u32, [bool; 2], State, [Option<u64>; 2]);
-
-impl TopicRow {
-    fn key(&self) -> RowKey {
-        (
-            self.topic,
-            self.ways,
-            self.state,
-            [self.hz.map(f64::to_bits), self.count],
-        )
     }
 }
 
@@ -386,6 +382,8 @@ pub struct Shown {
     /// Whether it is silent or away all through the window, with a beginning and an end in the ledger, or no message
     /// came yet.
     pub is_paused: bool,
+    /// Whether the receiver gets nothing, as the qualities of service do not match.
+    pub is_starved: bool,
     /// The headlines behind `mark`, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
     /// The topics that a bundle carries, sorted by their places; empty for all else.
@@ -436,6 +434,7 @@ impl Shown {
             held: None,
             rates: None,
             is_paused: false,
+            is_starved: false,
             entries: Vec::new(),
             topics: Vec::new(),
             each: 0,
@@ -444,6 +443,11 @@ impl Shown {
             count: None,
             lifecycle: None,
         }
+    }
+
+    /// Makes it the look of a service, which is not silent for having no messages.
+    fn is_called(&mut self) {
+        (self.state, self.is_paused) = (self.state.min(State::Active), false);
     }
 
     /// The topics of a bundle, those that changed first, then those with the highest rate.

@@ -37,10 +37,10 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],
-        &["conclude"],
+        &["conclude", "given"],
     ]),
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
-    ("mission", &[&["ledger"], &["json", "phases"], &["events"], &["info"]]),
+    ("mission", &[&["ledger"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
     ("view", &[
         &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing"],
         &["cards", "settle"],
@@ -63,6 +63,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["spells"],
         &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "still", "tex", "video"],
         &["report", "run", "tables"],
+        &["nodl"],
     ]),
     ("gate", &[
         &["pattern", "range"],
@@ -79,7 +80,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["figure", "fit", "probe", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["fleet", "follow", "gate", "live"],
+        &["fleet", "follow", "gate", "live", "paper"],
     ]),
     ("cli", &[
         &["args", "stop"],

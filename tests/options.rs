@@ -51,6 +51,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -p all -o out/x.svg", "--for column"),
     ("render", "r.bag -p all -o out/x.png", "--size 300x200"),
     ("render", "r.bag -p all -o out/x.svg", "--width 88mm"),
+    ("render", "r.bag -p all -o out/x.svg", "--line-width bytes"),
     ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--fit none"),
     ("render", "r.bag -p all -o out/x.html", "--orientation TB"),
     ("render", "r.bag -p all -o out/x.svg", "--layout layout-rs"),
@@ -71,6 +72,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--cut changes"),
     ("render", "r.bag -o out/x.json", "--json runs"),
     ("render", "r.bag -o out/x.csv", "--runs"),
+    ("render", "r.bag --infer stamps -o out/nodl", "--include inferred"),
     ("figure", "r.bag", "--output out/x.svg"),
     ("figure", "r.bag --width 180mm -o out/x.svg", "--kind steps"),
     ("figure", "r.bag -o out/x.svg", "--width 180mm"),
@@ -110,6 +112,8 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("tables", "r.bag -o out", "--mission bag"),
     ("tables", "r.bag -o out", "--tier chunks"),
     ("tables", "bags -o out", "--shard 1/2"),
+    ("paper", "r.bag", "--output out/b"),
+    ("paper", "r.bag -o out/b", "--period 7s"),
     ("events", "r.bag", "--format csv"),
     ("events", "r.bag", "--rate-change 5"),
     ("events", "r.bag", "--parts"),
@@ -214,6 +218,8 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("info", "bags", "--why /chat", "hint: name one of the bags"),
     ("render", "r.bag -o out/x.json", "--style dark", "hint: it applies to pictures"),
     ("render", "r.bag -o out/x.dot", "--style dark", "hint: it applies to pictures"),
+    ("render", "r.bag -o out/x.json", "--include inferred", "hint: it applies to `nodl/`"),
+    ("render", "r.bag -o out/x.json", "--line-width bytes", "hint: it applies to pictures"),
     ("render", "r.bag -o out/x.mmd", "--orientation TB", "hint: it applies to pictures"),
     ("render", "r.bag -o out/x.dot", "--layout layout-rs", "hint: it applies to pictures"),
     ("render", "r.bag -o out/x.csv", "--layout-from wide.json", "hint: it applies to pictures"),
@@ -519,6 +525,11 @@ fn every_option_of_render_changes_something() {
 #[test]
 fn every_option_of_figure_changes_something() {
     changes("figure");
+}
+
+#[test]
+fn every_option_of_paper_changes_something() {
+    changes("paper");
 }
 
 #[test]

@@ -27,6 +27,7 @@ mod fleet;
 mod folders;
 mod follow;
 mod gate;
+mod given;
 mod hostile;
 mod info;
 mod layout;

@@ -13,11 +13,30 @@ pub(crate) fn policy(text: &str) -> String {
 /// The first `digits` hex digits of a text's digest, 64 at most.
 #[cfg(any(feature = "cli", feature = "parquet"))]
 pub(crate) fn hex(text: &str, digits: usize) -> String {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    let digest = Sha256::digest(text.as_bytes());
-    let nibbles = digest.iter().flat_map(|byte| [byte >> 4, byte & 15]);
-    let all = nibbles.map(|nibble| char::from(DIGITS[usize::from(nibble)]));
-    all.take(digits).collect()
+    let mut sum = Sum::default();
+    sum.add(text.as_bytes());
+    sum.hex(digits)
+}
+
+/// A digest of bytes that come in parts.
+#[derive(Default)]
+#[cfg(any(feature = "cli", feature = "parquet"))]
+pub(crate) struct Sum(Sha256);
+
+#[cfg(any(feature = "cli", feature = "parquet"))]
+impl Sum {
+    pub(crate) fn add(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The first `digits` hex digits, 64 at most.
+    pub(crate) fn hex(self, digits: usize) -> String {
+        const DIGITS: &[u8; 16] = b"0123456789abcdef";
+        let digest = self.0.finalize();
+        let nibbles = digest.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+        let all = nibbles.map(|nibble| char::from(DIGITS[usize::from(nibble)]));
+        all.take(digits).collect()
+    }
 }
 
 /// Appends `data` in base64 with padding (RFC 4648, section 4).

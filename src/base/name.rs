@@ -10,6 +10,14 @@ pub(crate) const HEARTBEAT: &str = "/_bagreel/connected";
 /// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
 pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
 
+/// The type of a service whose type is unknown.
+pub(crate) const SERVICE: &str = "service";
+
+/// Whether this is the type of a service.
+pub(crate) fn is_service(kind: &str) -> bool {
+    kind == SERVICE || kind.contains("/srv/")
+}
+
 macro_rules! name {
     ($(#[$doc:meta])* $type:ident) => {
         $(#[$doc])*

@@ -80,7 +80,7 @@ fn is_picture(output: &Output) -> bool {
 
 /// Whether the output contains the graph as data, complete unless `--filtered` is given.
 fn is_data(output: &Output) -> bool {
-    ["json", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
+    ["json", "mcap", "nodl", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
 }
 
 /// Whether the output plays from frame to frame.
@@ -90,7 +90,7 @@ fn plays(output: &Output) -> bool {
 
 const RULES: &[AppliesTo] = &[
     AppliesTo {
-        options: "style view for size width fit expand orientation layout layout-from font",
+        options: "style view for size width line-width fit expand orientation layout layout-from font",
         takes: |_, output| is_picture(output),
         what: "it applies to pictures, such as `x.gif`",
     },
@@ -123,7 +123,7 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "filtered",
         takes: |_, output| is_data(output),
-        what: "it applies to data: json, csv, parquet, gexf, graphml; pictures are already filtered",
+        what: "it applies to data: json, mcap, nodl, csv, parquet, gexf, graphml; pictures are already filtered",
     },
     AppliesTo {
         options: "frame-ms",
@@ -169,6 +169,11 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to `x.json`",
     },
     AppliesTo {
+        options: "include",
+        takes: |_, output| output.format.word == "nodl",
+        what: "it applies to `nodl/`",
+    },
+    AppliesTo {
         options: "runs",
         takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
         what: "it applies to tables: `x.csv`",
@@ -176,7 +181,7 @@ const RULES: &[AppliesTo] = &[
 ];
 
 /// Options that have no effect on figures.
-const NOT_OF_FIGURES: &str = "style size fit orientation layout layout-from mode hide group collapse expand rqt-defaults \
+const NOT_OF_FIGURES: &str = "style size line-width fit orientation layout layout-from mode hide group collapse expand rqt-defaults \
     show-recorder title";
 
 /// Options that ask for windows one after the other.

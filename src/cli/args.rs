@@ -70,6 +70,9 @@ pub(super) enum Command {
     #[cfg(feature = "parquet")]
     #[command(after_help = tables::HELP)]
     Tables(Box<tables::TablesArgs>),
+    /// Write a bundle for replication: digests, commands, a survey, how much each recording reconfigures, and figures.
+    #[cfg(feature = "pdf")]
+    Paper(PaperArgs),
     /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when.
     Events(Box<EventsArgs>),
     /// Compare two missions: nodes, topics, connections, rates and events.
@@ -115,6 +118,20 @@ pub(super) struct InfoArgs {
     pub(super) graph: GraphArgs,
     #[command(flatten)]
     pub(super) sizes: SizeArgs,
+}
+
+#[cfg(feature = "pdf")]
+#[derive(Debug, Args)]
+pub(super) struct PaperArgs {
+    /// Recordings, or folders with recordings below them.
+    #[arg(required = true, value_name = "RUN")]
+    pub(super) runs: Vec<PathBuf>,
+    /// Output folder.
+    #[arg(long, short, value_name = "FOLDER")]
+    pub(super) output: PathBuf,
+    /// Length of a window, as for `render`. [default: as for `render`]
+    #[arg(long, short, value_parser = length)]
+    pub(super) period: Option<Length>,
 }
 
 #[derive(Debug, Args)]
@@ -278,7 +295,7 @@ pub(super) struct GraphArgs {
     /// Compare nodes by role: ignore the suffixes of anonymous names.
     #[arg(long, help_heading = "Filter")]
     pub(super) roles: bool,
-    /// Add nodes and edges from a CSV, YAML or launch file, or from DOT saved by rqt_graph.
+    /// Add nodes and edges from a CSV, YAML, MCAP (`/rosgraph`) or launch file, or from DOT saved by rqt_graph.
     #[arg(long, value_name = "FILE")]
     pub(super) topology: Vec<PathBuf>,
     /// Add the publishers and subscribers that this workspace's source code declares for nodes in the bag. Nothing is

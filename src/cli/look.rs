@@ -16,7 +16,7 @@ use crate::export::options::{self, FigureOptions, Profile};
 use crate::layout::Orientation;
 use crate::mission::{Places, read_json};
 use crate::pipeline::{Body, Phases};
-use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
+use crate::view::{Grouping, Hide, LineWidth, Mode, NameFilter, ViewOptions};
 
 /// The view options: `rqt_graph`'s defaults or ours, modified by the given options.
 pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
@@ -45,6 +45,12 @@ pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     view.expand = names(&args.expand);
     view.show_recorder = args.show_recorder;
     Ok(view)
+}
+
+/// The number that the thickness of lines shows.
+pub(super) fn line_width(args: &LookArgs) -> LineWidth {
+    let word = args.line_width.as_deref();
+    word.and_then(LineWidth::from_word).unwrap_or_default()
 }
 
 /// A built-in style by its name, else a file.

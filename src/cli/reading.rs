@@ -4,7 +4,7 @@ use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::evidence::code::{SourceCode, Version};
-use crate::evidence::{collector, conclude, topology};
+use crate::evidence::{collector, conclude, given};
 use crate::graph::window::{Division, Length};
 use crate::pipeline::{Phases, Reading};
 
@@ -42,7 +42,7 @@ pub(super) fn reading(
         grace: change.grace as usize,
         conclude: conclude::ConcludeOptions {
             roles: graph.roles,
-            topology: topology::read_all(&graph.topology)?,
+            topology: given::read_all(&graph.topology)?,
             code: None,
         },
         code: source_code(graph)?,

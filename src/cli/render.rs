@@ -19,7 +19,7 @@ use crate::export::options::FigureOptions;
 use crate::export::target::Target;
 use crate::mission::Mission;
 use crate::pipeline::{Drawing, Purpose, Render, Rendered, Watch as _, read};
-use crate::view::NameFilter;
+use crate::view::{LineWidth, NameFilter, ViewOptions};
 
 /// Reads once and writes every output.
 pub(super) fn render(
@@ -34,7 +34,8 @@ pub(super) fn render(
             "`render --figure` will be removed; {kind} draws the same"
         ));
     }
-    job.reading.collect.sizes = args.sizes.bytes;
+    let shows_bytes = job.drawing.view.line_width == LineWidth::Bytes;
+    job.reading.collect.sizes = args.sizes.bytes || shows_bytes;
     applies::check_outputs(given, args, &job.outputs)?;
     crate::pipeline::check(&job)?;
     applies::check_inputs(given, &job.reading)?;
@@ -233,7 +234,10 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         .transpose()?;
     let drawing = Drawing {
         body: look::body(args)?,
-        view: look::view(&args.view)?,
+        view: ViewOptions {
+            line_width: look::line_width(&args.look),
+            ..look::view(&args.view)?
+        },
         style: look::style(&args.look.style)?,
         fonts: look::fonts(args.look.font.as_deref())?,
         page: look::options(&args.look, args.change.rate_change),
@@ -251,6 +255,7 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),
             figure: look::old_figure(args)?,
+            has_inferred: args.include.is_some(),
             ..look::sequence(&args.sequence)?
         },
         kept: kept(args),

@@ -1,15 +1,21 @@
-//! The commands that print the contents of a bag: `info`, `events`.
+//! The commands that tell what is in bags: `info`, `events`, `paper`.
 
 use super::applies::{self, Given};
+#[cfg(feature = "pdf")]
+use super::args::PaperArgs;
 use super::args::{ChangeArgs, EventsArgs, EventsFormat, InfoArgs, InfoFormat, TimeArgs};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{DONE, SKIPPED, code};
 use crate::base::error::Error;
 use crate::base::notice::NoticeKind;
+#[cfg(feature = "pdf")]
+use crate::base::words;
 use crate::graph::window::Length;
 use crate::mission::events::{LogFormat, LogOptions, lines, log};
 use crate::mission::info::{SurveyRow, json, survey_text};
+#[cfg(feature = "pdf")]
+use crate::pipeline::{self, Reading, paper::Paper};
 use crate::pipeline::{Survey, explain, is_survey, read, survey, survey_file};
 
 /// The number of parts of a mission for which `info` shows the activity.
@@ -105,4 +111,35 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
     }
     terminal.notices(&mission.notices);
     Ok(code(&mission))
+}
+
+/// Writes the bundle.
+#[cfg(feature = "pdf")]
+pub(super) fn paper(args: &PaperArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+    let mut reading = Reading::default();
+    reading.division.length = args.period.unwrap_or(Length::Auto);
+    let period = |length: Length| match length {
+        Length::Fixed(period) => period.to_string().replace(' ', ""),
+        _ => "all".to_owned(),
+    };
+    let job = Paper {
+        runs: args.runs.clone(),
+        folder: args.output.clone(),
+        options: args.period.map_or_else(String::new, |length| {
+            format!(" --period {}", period(length))
+        }),
+        reading,
+    };
+    let done = pipeline::paper::paper(&job, terminal)?;
+    for remark in &done.remarks {
+        terminal.note(remark);
+    }
+    terminal.say(&format!(
+        "wrote {}: {} about {}, in {:.1} s",
+        job.folder.display(),
+        words::count(done.files, "file"),
+        words::count(done.runs, "recording"),
+        terminal.seconds()
+    ));
+    Ok(if done.skipped { SKIPPED } else { DONE })
 }

@@ -403,6 +403,7 @@ mod tests {
             label: Arc::from(name),
             members: vec![Element::Node(id)],
             is_replica: false,
+            is_service: false,
             cluster: None,
         };
         let shown = |id, mark| Shown {

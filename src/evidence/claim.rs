@@ -3,6 +3,7 @@
 //! A claim is kept once per source with the times at which it was made, so that millions of messages that repeat
 //! themselves take no more room than their (compressed) times.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::sync::Arc;
@@ -95,37 +96,19 @@ pub(crate) enum Claim {
 }
 
 impl Claim {
-    /// The names in the claim.
+    /// The first two names in the claim.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
-        match self {
-            Self::Node(a)
-            | Self::Begins(a)
-            | Self::NodeGone(a)
-            | Self::Topic(a)
-            | Self::Appears(a)
-            | Self::Duplicate(a)
-            | Self::Snapshot(a) => [Some(a), None],
-            Self::Publish(a, b)
-            | Self::Subscribe(a, b)
-            | Self::Joins(a, b)
-            | Self::Refused(a, b)
-            | Self::Unsubscribe(a, b)
-            | Self::Lists(a, b)
-            | Self::Carries(a, b)
-            | Self::Reports(a, b)
-            | Self::Logger(a, b)
-            | Self::Lifecycle(a, b)
-            | Self::Client(a, b)
-            | Self::Called(a, b)
-            | Self::Type(a, b)
-            | Self::Quality(a, b)
-            | Self::SaysPublish(a, b)
-            | Self::SaysSubscribe(a, b)
-            | Self::LogsFrom(a, b)
-            | Self::Starves(a, b, _)
-            | Self::Starved(a, b, _)
-            | Self::Lost(a, b) => [Some(a), Some(b)],
-        }
+        let (first, second) = (Cell::new(None), Cell::new(None));
+        self.renamed(&|name| {
+            let slot = if first.get().is_none() {
+                &first
+            } else {
+                &second
+            };
+            slot.set(slot.get().or(Some(name)));
+            name
+        });
+        [first.get(), second.get()]
     }
 
     /// The same claim with its names renumbered.
@@ -193,7 +176,8 @@ pub struct EvidenceLine {
 /// What statistics say of the messages of a topic in an interval: over one connection, or at one end of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measurement {
-    pub(crate) topic: Name,
+    /// The topic; `None`: the only one that the subscriber subscribes to.
+    pub(crate) topic: Option<Name>,
     pub(crate) publisher: Option<Name>,
     pub(crate) subscriber: Option<Name>,
     /// The interval, half-open.
@@ -412,7 +396,7 @@ impl Claims {
             fact.snapshot = fact.snapshot.map(to);
         }
         for measured in &mut self.measured {
-            measured.topic = to(measured.topic);
+            measured.topic = measured.topic.map(to);
             measured.publisher = measured.publisher.map(to);
             measured.subscriber = measured.subscriber.map(to);
         }

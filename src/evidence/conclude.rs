@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::collector::{Recorded, spool_error};
 use super::values::StatedValues;
 use crate::base::error::Result;
+use crate::base::name::is_service;
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
@@ -143,13 +144,21 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         one.publisher = one.publisher.map(role);
         one.subscriber = one.subscriber.map(role);
     }
+    let mut values = StatedValues::new(&facts, role)?;
+    for entry in &options.topology.entries {
+        if let NamedElement::Type(topic, kind) = &entry.element
+            && let Some(topic) = facts.known(topic)
+        {
+            values.state_type(topic, kind);
+        }
+    }
     Ok(Findings {
         mission,
         copies: copies
             .into_iter()
             .map(|(n, t)| (role(to(n)), to(t)))
             .collect(),
-        values: StatedValues::new(&facts, role)?,
+        values,
         offers: offers(&facts.offers, &streams),
         names: facts.into_texts(),
         streams,
@@ -216,6 +225,11 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
     };
     let nodes = texts(&mut known.nodes().iter().copied());
     let topics = texts(&mut known.streams.iter().map(|s| s.topic));
+    let services = entries.iter().filter_map(|entry| match &entry.element {
+        NamedElement::Type(topic, kind) if is_service(kind) => Some(topic),
+        _ => None,
+    });
+    let services: BTreeSet<&String> = services.collect();
     let mut told = BTreeMap::new();
     for entry in entries.iter().filter(|e| !e.declared) {
         let (node, topic) = match &entry.element {
@@ -224,7 +238,11 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
             NamedElement::Publish(node, topic) | NamedElement::Subscribe(node, topic) => {
                 (Some(node), Some(topic))
             }
+            NamedElement::Type(..) => continue,
         };
+        // Recorders leave these out.
+        let is_hidden = |topic: &&String| services.contains(topic) || topic.contains("/_action/");
+        let topic = topic.filter(|topic| !is_hidden(topic));
         for (what, name, all) in [("node", node, &nodes), ("topic", topic, &topics)] {
             let Some(name) = name.filter(|name| !all.contains(name.as_str())) else {
                 continue;
@@ -324,6 +342,7 @@ fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Sta
         NamedElement::Topic(topic) => ElementKey::Topic(name(topic)),
         NamedElement::Publish(node, topic) => ElementKey::Publish(name(node), name(topic)),
         NamedElement::Subscribe(node, topic) => ElementKey::Subscribe(name(topic), name(node)),
+        NamedElement::Type(..) => return,
     };
     let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
     // The end itself is not in it any more.

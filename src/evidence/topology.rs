@@ -1,7 +1,7 @@
 //! The user's additions to a bag: nodes and edges from a file. They never overwrite measurements.
 //!
-//! The formats are the research prototype's CSV, our own YAML, DOT saved by `rqt_graph`, and launch files: XML of ROS 1
-//! and ROS 2, YAML and Python of ROS 2. Nothing is executed.
+//! The formats are the research prototype's CSV, our own YAML and that of other tools, DOT saved by `rqt_graph`, and
+//! launch files: XML of ROS 1 and ROS 2, YAML and Python of ROS 2. Nothing is executed.
 
 mod csv;
 mod dot;
@@ -30,6 +30,8 @@ pub enum NamedElement {
     Publish(String, String),
     /// A node and a topic that it subscribes to.
     Subscribe(String, String),
+    /// A topic and its type.
+    Type(String, String),
 }
 
 /// A node or edge in a file.
@@ -80,7 +82,7 @@ pub fn read(path: &Path) -> Result<Topology> {
                 path,
                 0,
                 reason,
-                "name it .csv, .yaml, .dot, .launch, .xml or .launch.py",
+                "name it .csv, .yaml, .mcap, .dot, .launch, .xml or .launch.py",
             ));
         }
     };
@@ -90,21 +92,6 @@ pub fn read(path: &Path) -> Result<Topology> {
     Ok(topology)
 }
 
-/// Reads several files into one topology.
-///
-/// # Errors
-/// As [`read`], for the first file with a mistake.
-pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
-    let mut all = Topology::default();
-    for path in paths {
-        let one = read(path.as_ref())?;
-        all.entries.extend(one.entries);
-        all.notices.extend(one.notices);
-        all.files.extend(one.files);
-    }
-    Ok(all)
-}
-
 /// The text of a file; an error if it is too long.
 fn text(path: &Path) -> Result<String> {
     let bytes = file::read(path, TOPOLOGY)?;
@@ -112,7 +99,7 @@ fn text(path: &Path) -> Result<String> {
 }
 
 /// The error for a mistake in a file of the user's.
-fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
+pub(crate) fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
     Error::BadFile {
         path: path.to_owned(),
         line,

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
+use crate::base::name::SERVICE;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::{Claim, Claims, Name};
 
@@ -43,6 +44,15 @@ impl StatedValues {
             states.sort();
         }
         Ok(all)
+    }
+
+    /// Adds a type that the user states. That something is a service says nothing where its type is known.
+    pub(crate) fn state_type(&mut self, topic: Name, kind: &str) {
+        let kinds = self.types.entry(topic).or_default();
+        if kind != SERVICE || kinds.is_empty() {
+            kinds.remove(SERVICE);
+            kinds.insert(kind.into());
+        }
     }
 
     /// The state of a node at the end of a window; `None` before its first transition.

@@ -115,6 +115,7 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
         };
         let (open, close) = match item.kind {
             ItemKind::Node => ("([", "])"),
+            _ if item.is_service => ("{{", "}}"),
             ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
             ItemKind::Topic => ("[", "]"),
         };

@@ -11,6 +11,10 @@ pub use crate::mission::JsonForm;
 
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "choices that do not depend on each other"
+)]
 pub struct SequenceOptions {
     /// The time for which a window is shown, in milliseconds, ≥ 20.
     pub frame_ms: u32,
@@ -33,6 +37,8 @@ pub struct SequenceOptions {
     pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
+    /// Whether descriptions of nodes hold what is only inferred.
+    pub has_inferred: bool,
     /// The windows of a film strip, if requested; it also replaces a sequence of drawings.
     pub strip: Option<Choice>,
     /// The figure, if requested; it replaces a strip.
@@ -60,6 +66,7 @@ impl Default for SequenceOptions {
             dot_profile: Profile::default(),
             json: JsonForm::Auto,
             has_runs: false,
+            has_inferred: false,
             strip: None,
             figure: None,
             pairs: None,

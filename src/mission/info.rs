@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use advice::advice;
 pub use figure::FigureInfo;
-use figure::figures;
+pub(crate) use figure::figures;
 pub(crate) use survey::survey_table;
 pub use survey::{SurveyRow, survey_text};
 pub(crate) use text::how_many;
@@ -148,6 +148,8 @@ pub struct TopicInfo {
     pub unknown_publishers: Option<u32>,
     /// Quality of service, if known.
     pub qos: Option<String>,
+    /// The coefficient of variation of the rate over the parts of the mission; 0 for an even one, `None` without messages.
+    pub skew: Option<f64>,
     /// The number of messages in each equal part of the mission.
     pub activity: Vec<u64>,
 }
@@ -322,7 +324,8 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
     let mut topics: Vec<TopicInfo> = elements
         .topics
         .iter()
-        .map(|topic| TopicInfo {
+        .zip(mission.skews())
+        .map(|(topic, skew)| TopicInfo {
             name: topic.name.to_string(),
             types: topic.types.iter().map(ToString::to_string).collect(),
             count: 0,
@@ -332,6 +335,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             subscribers: Vec::new(),
             unknown_publishers: topic.unknown_publishers,
             qos: topic.qos.as_deref().map(str::to_owned),
+            skew,
             activity: vec![0; mission.windows.len()],
         })
         .collect();

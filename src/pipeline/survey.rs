@@ -40,15 +40,7 @@ pub struct Survey {
 /// # Errors
 /// If the folder itself cannot be read or contains no bag.
 pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
-    let bags = bag::recordings(folder)?;
-    if bags.is_empty() {
-        let hint = "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned();
-        return Err(Error::UnknownBag {
-            path: folder.to_owned(),
-            looks_like: "a folder without bags".to_owned(),
-            hint,
-        });
-    }
+    let bags = recordings(folder)?;
     let mut skipped = false;
     let row = |path: PathBuf| {
         let shown = match path.strip_prefix(folder).unwrap_or(&path) {
@@ -69,8 +61,25 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
     Ok(Survey { rows, skipped })
 }
 
+/// Every recording below a folder.
+///
+/// # Errors
+/// If it cannot be read or contains no bag.
+pub(super) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
+    let bags = bag::recordings(folder)?;
+    if bags.is_empty() {
+        let hint = "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned();
+        return Err(Error::UnknownBag {
+            path: folder.to_owned(),
+            looks_like: "a folder without bags".to_owned(),
+            hint,
+        });
+    }
+    Ok(bags)
+}
+
 /// The row of a bag that was read, or not.
-fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -> SurveyRow {
+pub(super) fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -> SurveyRow {
     let row = SurveyRow {
         path,
         file_bytes: size,

@@ -104,7 +104,7 @@ impl Viewed {
                     )
                 };
                 places[id as usize] = EdgePlace::Arrow(place);
-                self.arrows.push(arrow(ends, vec![element]));
+                self.arrows.push(arrow(elements, ends, vec![element]));
             }
         }
     }

@@ -298,6 +298,8 @@ fn both_ways(ways: [&Showing; 2]) -> Showing {
             topics: vec![TopicRow {
                 topic: 0,
                 ways: looks.map(|look| look.is_some()),
+                is_service: false,
+                is_starved: look.is_starved,
                 state: look.state,
                 hz: look.hz,
                 count: look.count,

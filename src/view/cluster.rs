@@ -118,6 +118,7 @@ mod tests {
             label: Arc::from(*name),
             members: Vec::new(),
             is_replica: false,
+            is_service: false,
             cluster: None,
         };
         let mut items: Vec<Item> = names.iter().map(item).collect();

@@ -84,6 +84,7 @@ fn words(reason: Reason) -> (&'static str, &'static str) {
             "topics of parameters",
             "`--hide` without `params` shows them",
         ),
+        Reason::Services => ("services", "`--hide` without `services` shows them"),
         Reason::Debug => (
             "what is there for debugging",
             "`--hide` without `debug` shows it",

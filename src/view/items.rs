@@ -11,7 +11,7 @@ use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
-use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
+use super::{Arrow, ArrowKind, Item, ItemKind, LineWidth, Mode, ViewOptions};
 use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
 
@@ -126,6 +126,19 @@ impl Viewed {
         } else {
             viewed.set_arrows(elements);
         }
+        if options.line_width == LineWidth::Bytes {
+            let sizes = sizes(mission);
+            for arrow in &mut viewed.arrows {
+                let topics = arrow
+                    .members
+                    .iter()
+                    .filter_map(|what| elements.ends(*what).1);
+                let topics: BTreeSet<TopicId> = topics.collect();
+                let sizes = topics.iter().map(|topic| sizes[*topic as usize]);
+                let (count, bytes) = sizes.fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+                arrow.kilobytes = Some(bytes as f64 / 1000.0 / count.max(1) as f64);
+            }
+        }
         viewed.set_carriers(elements);
         viewed
     }
@@ -219,9 +232,10 @@ impl Viewed {
                 kind: *kind,
                 name: Arc::clone(name),
                 label: Arc::clone(name),
-                members,
                 is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
+                is_service: members.iter().all(|what| elements.is_service(*what)),
                 cluster: None,
+                members,
             })
             .collect();
         if !options.exact_names {
@@ -265,7 +279,8 @@ impl Viewed {
         };
         self.publish = publish.iter().map(place).collect();
         self.subscribe = subscribe.iter().map(place).collect();
-        self.arrows = arrows.into_iter().map(|(ends, m)| arrow(ends, m)).collect();
+        let arrows = arrows.into_iter();
+        self.arrows = arrows.map(|(ends, m)| arrow(elements, ends, m)).collect();
     }
 
     /// The items of an edge's node and topic.
@@ -342,7 +357,7 @@ impl Viewed {
             let publishes = pairs.iter().map(|(p, _)| Element::Publish(*p));
             let others = pairs.iter().map(|(_, s)| Element::Subscribe(*s));
             let members: BTreeSet<Element> = publishes.chain(others).collect();
-            let mut arrow = arrow(ends, members.into_iter().collect());
+            let mut arrow = arrow(elements, ends, members.into_iter().collect());
             if is_bundled {
                 let topics = pairs
                     .iter()
@@ -446,12 +461,33 @@ impl Viewed {
     }
 }
 
-pub(super) fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
+pub(super) fn arrow(
+    elements: &Elements,
+    (from, to, kind): ArrowEnds,
+    members: Vec<Element>,
+) -> Arrow {
     Arrow {
         from,
         to,
         kind,
+        is_service: members.iter().all(|what| elements.is_service(*what)),
         members,
         topics: Vec::new(),
+        kilobytes: None,
     }
+}
+
+/// The messages and the payload bytes of each topic in all windows in which its bytes are known.
+fn sizes(mission: &Mission) -> Vec<(u64, u64)> {
+    let mut sizes = vec![(0_u64, 0_u64); mission.elements.topics.len()];
+    for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
+        if let Some(bytes) = state.bytes {
+            let size = &mut sizes[state.id as usize];
+            *size = (
+                size.0.saturating_add(state.count),
+                size.1.saturating_add(bytes),
+            );
+        }
+    }
+    sizes
 }

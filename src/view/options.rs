@@ -38,6 +38,18 @@ impl Mode {
     }
 }
 
+worded! {
+    /// The number that the thickness of lines shows.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum LineWidth {
+        /// Messages per second.
+        #[default]
+        Rate = "rate",
+        /// Payload bytes per second.
+        Bytes = "bytes",
+    }
+}
+
 /// The things to leave out. The default is `quiet` alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(
@@ -58,6 +70,8 @@ pub struct Hide {
     pub tf: bool,
     /// Topics that carry parameters.
     pub params: bool,
+    /// Services.
+    pub services: bool,
     /// Nodes without a sign of life in the window.
     pub unreachable: bool,
 }
@@ -71,6 +85,7 @@ impl Hide {
         leaf: false,
         tf: false,
         params: false,
+        services: false,
         unreachable: false,
     };
 
@@ -90,9 +105,10 @@ impl Hide {
                 "leaf" => hide.leaf = true,
                 "tf" => hide.tf = true,
                 "params" => hide.params = true,
+                "services" => hide.services = true,
                 "unreachable" => hide.unreachable = true,
                 _ => {
-                    let all = "quiet, debug, dead, leaf, tf, params, unreachable, none";
+                    let all = "quiet, debug, dead, leaf, tf, params, services, unreachable, none";
                     return Err(unknown("thing to hide", word, all));
                 }
             }
@@ -207,6 +223,8 @@ pub struct ViewOptions {
     pub(crate) is_picture: bool,
     /// Whether bundles name nodes that never change in words too if one line leads to them.
     pub(crate) are_leaves_in_words: bool,
+    /// The number that the thickness of lines shows.
+    pub line_width: LineWidth,
     /// Whether anonymous nodes are drawn under their full names, each run a box of its own.
     pub exact_names: bool,
 }

@@ -116,16 +116,12 @@ struct LookClass {
 }
 
 impl LookClass {
-    fn of(shown: &Shown, is_arrow: bool) -> Self {
+    fn of(shown: &Shown, arrow: Option<&Arrow>) -> Self {
         Self {
             state: shown.state,
             degree: shown.degree,
             mark: shown.mark,
-            step: if is_arrow {
-                width_step(shown.steady_hz)
-            } else {
-                0
-            },
+            step: arrow.map_or(0, |arrow| width_step(arrow.flow(shown))),
         }
     }
 
@@ -247,9 +243,8 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 push(&mut life.classes, window, 0);
                 continue;
             };
-            let class = self
-                .classes
-                .place(Some(LookClass::of(shown, self.arrows.is_some())));
+            let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
+            let class = self.classes.place(Some(LookClass::of(shown, arrow)));
             push(&mut life.classes, window, class);
             if shown.mark == Some(Mark::Removed) {
                 continue;
@@ -322,6 +317,7 @@ impl Serialize for ElementRuns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::ArrowKind;
 
     /// One element over the windows: there with this mark and rate, or not there.
     type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
@@ -337,6 +333,15 @@ mod tests {
         };
         let story: Vec<_> = story.iter().map(shown).collect();
         let view = View {
+            arrows: vec![Arrow {
+                from: 0,
+                to: 0,
+                kind: ArrowKind::Publish,
+                members: Vec::new(),
+                topics: Vec::new(),
+                is_service: false,
+                kilobytes: None,
+            }],
             arrows_shown: vec![Showing::of(story.iter().map(Option::as_ref))],
             ..View::default()
         };

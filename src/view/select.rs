@@ -17,6 +17,7 @@ pub(crate) enum Reason {
     Dead,
     Tf,
     Params,
+    Services,
     Debug,
     Quiet,
     Recorder,
@@ -58,6 +59,8 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let topics = elements.topics.iter().zip(&ends);
     let topics = topics.map(|(t, ends)| {
         let reason = topic_reason(t.name.as_str(), *ends, &names, options);
+        let is_hidden = options.hide.services && t.is_service();
+        let reason = reason.or(is_hidden.then_some(Reason::Services));
         reason.or_else(|| is_only_recorded(t, *ends).then_some(Reason::Recorder))
     });
     let topics = topics.collect();

@@ -4,9 +4,47 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Members, RowKey, Shown, TopicRow};
+use super::{Mark, Members, Shown};
 use crate::evidence::Degree;
 use crate::graph::State;
+
+/// A topic on a line between two boxes in a window, or several that are shown as one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopicRow {
+    /// Its place in [`Arrow::topics`].
+    pub topic: u32,
+    /// Whether its messages run along the arrow, and whether they run against it.
+    pub ways: [bool; 2],
+    /// Whether it is a service.
+    pub is_service: bool,
+    /// Whether the receiver gets nothing, as the qualities of service do not match.
+    pub is_starved: bool,
+    /// Its state.
+    pub state: State,
+    /// Messages per second in the window, if known.
+    pub hz: Option<f64>,
+    /// The number of messages in the window, if known.
+    pub count: Option<u64>,
+    /// Its change, where that is not the change of the whole line.
+    pub mark: Option<Mark>,
+    /// Messages per second before and after, where its rate changed.
+    pub rates: Option<(f64, f64)>,
+}
+
+/// The properties that distinguish unmarked topics of a bundle.
+pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
+
+impl TopicRow {
+    pub(super) fn key(&self) -> RowKey {
+        (
+            self.topic,
+            self.ways,
+            self.is_starved,
+            self.state,
+            [self.hz.map(f64::to_bits), self.count],
+        )
+    }
+}
 
 /// The looks of one item or arrow, window by window.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,7 +114,7 @@ const FEW: usize = 4;
 
 /// The properties that distinguish looks without marks.
 type LookKey = (
-    (State, Degree, bool),
+    (State, Degree, bool, bool),
     [Option<u64>; 3],
     (usize, Members),
     Vec<RowKey>,
@@ -142,7 +180,7 @@ impl ShowingWriter {
 fn key(shown: &Shown) -> LookKey {
     let bits = |hz: Option<f64>| hz.map(f64::to_bits);
     (
-        (shown.state, shown.degree, shown.is_paused),
+        (shown.state, shown.degree, shown.is_paused, shown.is_starved),
         [bits(shown.hz), bits(shown.steady_hz), shown.count],
         (shown.each, shown.members),
         shown.topics.iter().map(TopicRow::key).collect(),
@@ -173,7 +211,6 @@ pub(crate) fn both<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::Mark;
 
     #[expect(clippy::unnecessary_wraps, reason = "lists of what is there or not")]
     fn shown(hz: f64, mark: Option<Mark>) -> Option<Shown> {

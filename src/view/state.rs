@@ -8,7 +8,7 @@ use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, TopicRow, Vi
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
-use crate::mission::ledger::Entry;
+use crate::mission::ledger::{Entry, Kind};
 use crate::mission::{EntryId, Mission};
 
 /// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
@@ -17,11 +17,13 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
     let (state, degree) = (one.state, one.degree);
     let shown = slot.get_or_insert_with(|| Shown {
         is_paused: true,
+        is_starved: true,
         ..Shown::plain(id, state, degree)
     });
     // Those that are there and send nothing would water down the rate of each.
     shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
     shown.is_paused &= one.is_paused;
+    shown.is_starved &= one.is_starved;
     shown.state = shown.state.min(state);
     shown.degree = shown.degree.min(degree);
     shown.hz = sum(shown.hz, one.hz, |a, b| a + b);
@@ -36,6 +38,7 @@ struct One {
     hz: Option<f64>,
     count: Option<u64>,
     is_paused: bool,
+    is_starved: bool,
 }
 
 impl One {
@@ -46,6 +49,7 @@ impl One {
         hz: None,
         count: None,
         is_paused: false,
+        is_starved: false,
     };
 
     fn new(state: State, degree: Degree) -> Self {
@@ -131,6 +135,8 @@ pub(crate) struct Now<'a> {
     sole: Vec<Option<EdgeId>>,
     /// The publications of each topic.
     senders: Vec<Vec<EdgeId>>,
+    /// The subscriptions that get nothing, each from a time on.
+    starved: Vec<(Element, Span)>,
 }
 
 impl<'a> Now<'a> {
@@ -149,6 +155,7 @@ impl<'a> Now<'a> {
             lives: (Alive::default(), Alive::default()),
             rows: PerElement::new(&mission.elements, |_| None),
             sole: mission.elements.sole_publishers(),
+            starved: starved(mission),
         }
     }
 
@@ -187,6 +194,10 @@ impl<'a> Now<'a> {
                 one.is_paused = true;
                 one.state = one.state.max(State::Silent);
             }
+            let starves = |(edge, span): &(Element, Span)| {
+                *edge == what && span.start < self.span.end && self.span.start < span.end
+            };
+            one.is_starved = self.starved.iter().any(starves);
             if let Some(topic) = self.waits_for(what) {
                 one.is_paused = true;
                 one.state = self.state_of_waiting(topic).max(one.state);
@@ -258,6 +269,9 @@ impl<'a> Now<'a> {
             }
         }
         let mut shown = slot?;
+        if item.is_service {
+            shown.is_called();
+        }
         if let ([Element::Node(node)], true) = (&item.members[..], is_single(self.viewed, id)) {
             let row = self.rows.of(Element::Node(*node)).and_then(Option::as_ref);
             shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
@@ -291,7 +305,12 @@ impl<'a> Now<'a> {
             ArrowKind::Direct(_) | ArrowKind::Bundle => self.direct(id, arrow),
             ArrowKind::Publish | ArrowKind::Subscribe => self.edges(id, arrow),
         };
-        slot.map(|shown| Shown { each: 0, ..shown })
+        slot.map(|mut shown| {
+            if arrow.is_service {
+                shown.is_called();
+            }
+            Shown { each: 0, ..shown }
+        })
     }
 
     fn edges(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
@@ -320,7 +339,7 @@ impl<'a> Now<'a> {
     fn direct(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         let is_bundle = arrow.kind == ArrowKind::Bundle;
-        let (mut last, mut carried) = (None, BTreeSet::new());
+        let (mut last, mut carried, mut services) = (None, BTreeSet::new(), BTreeSet::new());
         let mut rows: BTreeMap<u32, (Option<Shown>, [bool; 2])> = BTreeMap::new();
         for (publish, subscribe) in self.viewed.pairs.get(id as usize)? {
             let (Some(p), Some(s)) = (
@@ -351,9 +370,17 @@ impl<'a> Now<'a> {
                 hz: p.hz.or_else(|| topic.and_then(|t| t.hz)),
                 count: p.count,
                 is_paused: p.is_paused,
+                is_starved: s.is_starved,
             };
             gather(&mut slot, id, &joined);
             if let Some((topic, _)) = row {
+                if self
+                    .mission
+                    .elements
+                    .is_service(Element::Subscribe(*subscribe))
+                {
+                    services.insert(topic);
+                }
                 gather(&mut rows.entry(topic).or_default().0, topic, &joined);
             }
         }
@@ -362,6 +389,8 @@ impl<'a> Now<'a> {
             Some(TopicRow {
                 topic: shown.id,
                 ways,
+                is_service: services.contains(&shown.id),
+                is_starved: shown.is_starved,
                 state: if shown.is_paused {
                     shown.state.max(State::Silent)
                 } else {
@@ -411,6 +440,20 @@ impl<'a> Now<'a> {
             Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id as usize))),
         }
     }
+}
+
+/// The subscriptions that get nothing according to the event log: from that event to the end of the subscription.
+fn starved(mission: &Mission) -> Vec<(Element, Span)> {
+    let entries = mission.ledger.entries.iter();
+    let entries = entries.filter(|entry| entry.kind == Kind::Starved);
+    let edges = entries.filter(|entry| matches!(entry.what, Element::Subscribe(_)));
+    let lasts = |entry: &Entry| {
+        let mut runs = mission.elements.runs(entry.what).iter();
+        let run = runs.find(|run| run.contains(entry.time));
+        let end = run.map_or(mission.span.end, |run| run.end);
+        (entry.what, Span::new(entry.time, end))
+    };
+    edges.map(lasts).collect()
 }
 
 fn has_nodes(item: &Item) -> bool {

@@ -77,6 +77,7 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
     }
     sum.state = sum.state.min(shown.state);
     sum.degree = sum.degree.min(shown.degree);
+    sum.is_starved &= shown.is_starved;
     sum.hz = added(sum.hz, shown.hz.map(|hz| hz * length), |a, b| a + b);
     sum.count = added(sum.count, count, u64::saturating_add);
 }
@@ -84,6 +85,7 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
 fn add_row(sum: &mut TopicRow, row: &TopicRow) {
     sum.ways = [sum.ways[0] | row.ways[0], sum.ways[1] | row.ways[1]];
     sum.state = sum.state.min(row.state);
+    sum.is_starved &= row.is_starved;
     sum.hz = added(sum.hz, row.hz, |a, b| a + b);
     sum.count = added(sum.count, row.count, u64::saturating_add);
 }

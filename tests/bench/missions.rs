@@ -178,7 +178,7 @@ fn one(args: &[String]) {
     let start = Instant::now();
     let mut reading = Reading::of([&args[0]]);
     reading.division.length = Period::parse(&args[2]).map_or(Length::Auto, Length::Fixed);
-    reading.conclude.topology = topology::read_all(&[PathBuf::from(&args[1])]).unwrap();
+    reading.conclude.topology = topology::read(&PathBuf::from(&args[1])).unwrap();
     let job = Render::new(reading, vec![Output::parse(&args[3], None).unwrap()]).unwrap();
     let rendered = render(&job).unwrap();
     println!(

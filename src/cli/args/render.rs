@@ -43,6 +43,9 @@ pub(crate) struct RenderArgs {
     pub(crate) form: FigureForm,
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
+    /// Write what is only inferred to `nodl/`, too.
+    #[arg(long, value_name = "inferred", value_parser = ["inferred"], help_heading = "Output")]
+    pub(crate) include: Option<String>,
     /// Print the time spent in each step.
     #[arg(long, help_heading = "Performance")]
     pub(crate) timings: bool,
@@ -66,7 +69,7 @@ pub(crate) struct ViewArgs {
     /// Topics to draw, in the same form as `--ns-filter`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(crate) topic_filter: Option<String>,
-    /// Kinds to leave out: quiet, debug, dead, leaf, tf, params, unreachable, or none. [default: quiet]
+    /// Kinds to leave out: quiet, debug, dead, leaf, tf, params, services, unreachable, or none. [default: quiet]
     #[arg(long, value_name = "KIND,…")]
     pub(crate) hide: Option<String>,
     /// Kinds to draw as one box: actions, tf, images, namespaces=N, or none. [default: all of them]
@@ -120,6 +123,9 @@ pub(crate) struct LookArgs {
     /// Title. [default: the bag's name]
     #[arg(long)]
     pub(crate) title: Option<String>,
+    /// What thicker lines show: messages or payload bytes per second. [default: rate]
+    #[arg(long, value_name = "rate|bytes", value_parser = ["rate", "bytes"])]
+    pub(crate) line_width: Option<String>,
     /// Draw the graph without title, legend or timeline.
     #[arg(long)]
     pub(crate) bare: bool,

@@ -58,21 +58,14 @@ impl<'a> Classes<'a> {
         let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
         let name = |id: u32| &*self.view.items[id as usize].name;
         let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
-        let what = format!("edge {}", arrow.kind.word());
+        let what = format!("edge {}", arrow.class());
         Self::element(xml, part, &what, &ends, look, 0.8);
     }
 
     /// Writes the item at this place of the view.
     pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
-        Self::element(
-            xml,
-            part,
-            item.kind.word(),
-            &[("name", &item.name)],
-            look,
-            1.0,
-        );
+        Self::element(xml, part, item.class(), &[("name", &item.name)], look, 1.0);
     }
 
     fn element(

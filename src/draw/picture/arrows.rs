@@ -165,12 +165,12 @@ impl Arrows<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> (Group, Group) {
-        let look = options::of_arrow(self.style, &arrow.kind, shown);
+        let look = options::of_arrow(self.style, &arrow.kind, shown, arrow.flow(shown));
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
         let mut group = Group {
             id: track.id.clone(),
-            class: class(&format!("edge {kind}"), shown),
+            class: class(&format!("edge {}", arrow.class()), shown),
             data: told(vec![("from", from.clone()), ("to", to.clone())], shown),
             title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
@@ -184,11 +184,16 @@ impl Arrows<'_> {
             id: format!("{}..over", group.id),
             ..group.clone()
         };
+        let tip = match arrow.kind {
+            _ if shown.is_starved => Tip::Stop,
+            ArrowKind::Bundle | ArrowKind::Direct(_) if arrow.is_service => Tip::Service,
+            _ => Tip::Arrow,
+        };
         if arrow.kind == ArrowKind::Bundle {
-            self.line(&mut group, track, &look, topics::uses(shown));
+            self.line(&mut group, track, &look, (tip, topics::uses(shown)));
             self.rows(&mut over, track, shown, &look);
         } else {
-            self.line(&mut group, track, &look, [true, false]);
+            self.line(&mut group, track, &look, (tip, [true, false]));
         }
         if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0])
             && track.label.is_some()
@@ -203,7 +208,13 @@ impl Arrows<'_> {
     }
 
     /// The line with a head at its end and at its start, according to `heads`.
-    fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook, heads: [bool; 2]) {
+    fn line(
+        &self,
+        group: &mut Group,
+        track: &ArrowPath,
+        look: &ArrowLook,
+        (kind, heads): (Tip, [bool; 2]),
+    ) {
         let (Some(first), Some(last)) = (track.curves.first(), track.curves.last()) else {
             return;
         };
@@ -249,7 +260,7 @@ impl Arrows<'_> {
             .zip(heads)
             .filter_map(|(tip, is)| is.then_some(tip))
         {
-            group.shape(Shape::filled(arrow_head(tip, along, head), color));
+            group.shape(Shape::filled(kind.form(tip, along, head), color));
         }
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);
@@ -347,15 +358,34 @@ pub(crate) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
     !rate && !marks.any(|m| m.class() == mark.class())
 }
 
-/// A triangle with its tip here, pointing along a direction of length 1.
-pub(crate) fn arrow_head(tip: Point, along: Point, length: f64) -> Form {
-    let base = Point::new(tip.x - along.x * length, tip.y - along.y * length);
-    let half = length * 0.38;
-    polygon(&[
-        tip,
-        Point::new(base.x - along.y * half, base.y + along.x * half),
-        Point::new(base.x + along.y * half, base.y - along.x * half),
-    ])
+/// The sign at the end of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tip {
+    /// A triangle: messages arrive.
+    Arrow,
+    /// A diamond: a service is called.
+    Service,
+    /// A bar before the end: nothing arrives.
+    Stop,
+}
+
+impl Tip {
+    /// The sign with its end here, pointing along a direction of length 1.
+    pub(crate) fn form(self, tip: Point, along: Point, length: f64) -> Form {
+        // Back along the line, and to its left.
+        let at = |back: f64, left: f64| {
+            let (back, left) = (back * length, left * length);
+            Point::new(
+                tip.x - along.x * back - along.y * left,
+                tip.y - along.y * back + along.x * left,
+            )
+        };
+        match self {
+            Self::Arrow => polygon(&[tip, at(1.0, 0.38), at(1.0, -0.38)]),
+            Self::Service => polygon(&[tip, at(0.6, 0.42), at(1.2, 0.0), at(0.6, -0.42)]),
+            Self::Stop => polygon(&[at(0.5, 0.5), at(0.75, 0.5), at(0.75, -0.5), at(0.5, -0.5)]),
+        }
+    }
 }
 
 /// The direction in which a curve reaches `end`: from its last control that is not there already.

@@ -6,7 +6,7 @@ use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text};
+use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
@@ -125,14 +125,14 @@ impl Boxes<'_> {
         let place = card.place;
         let mut group = Group {
             id: card.id.clone(),
-            class: class(item.kind.word(), shown),
+            class: class(item.class(), shown),
             data: self::data(item, shown),
             title: title(item, shown),
             ..Group::default()
         };
         let inner = match &card.card {
             Some(rows) => self.card(&mut group, rows, place, &look),
-            None => self.outline(&mut group, item.kind, body, place, &look),
+            None => self.outline(&mut group, item, body, place, &look),
         };
         if shown.state == State::Latched
             && item.kind != ItemKind::Node
@@ -182,7 +182,7 @@ impl Boxes<'_> {
     fn outline(
         &self,
         group: &mut Group,
-        kind: ItemKind,
+        item: &Item,
         body: &Body,
         place: Rect,
         look: &BoxLook,
@@ -190,7 +190,9 @@ impl Boxes<'_> {
         let scale = self.fit.scale;
         let stroke = look.stroke.scaled(self.fit.pen);
         let radius = body.radius * scale;
+        let kind = item.kind;
         let form = match kind {
+            _ if item.is_service => hexagon(place, radius.max(body.pad_x * scale)),
             ItemKind::Node if body.is_pill() => Form::Rect(place, place.w.min(place.h) / 2.0),
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
@@ -292,6 +294,20 @@ impl Boxes<'_> {
     }
 }
 
+/// The outline of a service: a box whose left and right ends are points of this length.
+pub(super) fn hexagon(place: Rect, point: f64) -> Form {
+    let (left, right, middle) = (place.x, place.right(), place.centre().y);
+    let at = Point::new;
+    polygon(&[
+        at(left, middle),
+        at(left + point, place.y),
+        at(right - point, place.y),
+        at(right, middle),
+        at(right - point, place.bottom()),
+        at(left + point, place.bottom()),
+    ])
+}
+
 /// The places on the outline of a box where its badge may stand, the best first: at its top right.
 pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
@@ -334,6 +350,9 @@ pub(crate) fn class(what: &str, shown: &Shown) -> String {
     if matches!(shown.mark, Some(Mark::Restarted)) {
         words.push("restarted");
     }
+    if shown.is_starved {
+        words.push("starved");
+    }
     words.dedup();
     words.join(" ")
 }
@@ -341,6 +360,7 @@ pub(crate) fn class(what: &str, shown: &Shown) -> String {
 pub(crate) fn title(item: &Item, shown: &Shown) -> String {
     let what = match item.kind {
         ItemKind::Node => "node",
+        _ if item.is_service => "service",
         ItemKind::Topic => "topic",
         ItemKind::Group => "topics",
         ItemKind::Namespace => "namespace",

@@ -5,6 +5,7 @@ use super::boxes::{Boxes, ItemBox, class, data, title};
 use super::item_id;
 use super::measured::{Tells, second_line, short_name};
 use super::options::{self, BoxLook};
+use super::topics::{called, fitted};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Text};
 use crate::draw::style::Style;
@@ -85,7 +86,12 @@ fn is_quiet(row: &CardRow) -> bool {
 fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
     let space = view.items[row.owner as usize].cluster;
     let inside = space.map_or("", |at| &*view.namespaces[at].name);
-    super::topics::fitted(short_name(&row.item.label, inside), fonts, size)
+    let name = fitted(short_name(&row.item.label, inside), fonts, size);
+    if row.item.is_service {
+        called(&name)
+    } else {
+        name
+    }
 }
 
 impl Line {
@@ -171,7 +177,7 @@ impl Boxes<'_> {
         let (row, shown) = *seen.first()?;
         let mut group = Group {
             id: format!("{owner}..{}", item_id(&row.item)),
-            class: class("topic", shown),
+            class: class(row.item.class(), shown),
             data: data(&row.item, shown),
             title: title(&row.item, shown),
             ..Group::default()

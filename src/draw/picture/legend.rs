@@ -1,7 +1,8 @@
 //! The legend: the meaning of the signs that occur, in one row, or more on a narrow page.
 
-use super::arrows::arrow_head;
+use super::arrows::Tip;
 use super::badge::badge;
+use super::boxes::hexagon;
 use super::options;
 use super::page::PageFrame;
 use crate::base::geometry::{Point, Rect};
@@ -18,12 +19,14 @@ use crate::view::{ArrowKind, ItemKind, Mark, Showing, Shown, View};
 pub(crate) enum LegendSign {
     Node,
     Topic,
+    Service,
     Group,
     Namespace,
     Row,
     Change(Mark),
     Box(State),
     Line(Degree),
+    Starved,
     Width,
 }
 
@@ -52,7 +55,18 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
     let percent = words::percent(rate_change);
     let all = [
         (kind(ItemKind::Node), LegendSign::Node, "node"),
-        (kind(ItemKind::Topic), LegendSign::Topic, "topic"),
+        (
+            view.items
+                .iter()
+                .any(|i| i.kind == ItemKind::Topic && !i.is_service),
+            LegendSign::Topic,
+            "topic",
+        ),
+        (
+            view.items.iter().any(|i| i.is_service) || view.arrows.iter().any(|a| a.is_service),
+            LegendSign::Service,
+            "service",
+        ),
         (kind(ItemKind::Group), LegendSign::Group, "group"),
         (
             kind(ItemKind::Namespace),
@@ -82,9 +96,18 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         degree(Degree::Stated, "stated"),
         degree(Degree::Inferred, "inferred"),
         (
+            any(&|s| s.is_starved),
+            LegendSign::Starved,
+            "gets nothing (quality of service)",
+        ),
+        (
             any(&|s| s.hz.is_some()),
             LegendSign::Width,
-            "thicker = higher rate",
+            if view.arrows.iter().any(|arrow| arrow.kilobytes.is_some()) {
+                "thicker = more bytes"
+            } else {
+                "thicker = higher rate"
+            },
         ),
     ];
     let present = all.into_iter().filter(|(occurs, _, _)| *occurs);
@@ -167,7 +190,7 @@ pub(crate) fn legend(
 
 fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: f64) {
     let arrow_of = |kind, degree, mark| {
-        options::of_arrow(style, &kind, &shown(State::Active, degree, mark))
+        options::of_arrow(style, &kind, &shown(State::Active, degree, mark), None)
             .stroke
             .scaled(unit)
     };
@@ -227,9 +250,18 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
                 group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
             }
         }
+        LegendSign::Service => group.shape(Shape {
+            form: hexagon(place, style.topic.pad_x * unit * 0.7),
+            fill: style.topic.fill,
+            stroke: Stroke::solid(style.topic.stroke, style.topic.width * unit),
+        }),
         LegendSign::Line(degree) => {
             let stroke = arrow_of(ArrowKind::Subscribe, *degree, None);
-            arrow(group, place, stroke, style.edge.arrow * unit);
+            arrow(group, place, stroke, (Tip::Arrow, style.edge.arrow * unit));
+        }
+        LegendSign::Starved => {
+            let stroke = arrow_of(ArrowKind::Subscribe, Degree::Stated, None);
+            arrow(group, place, stroke, (Tip::Stop, style.edge.arrow * unit));
         }
         LegendSign::Width => widths(group, style, place, unit),
     }
@@ -292,13 +324,13 @@ fn across(place: Rect) -> Form {
     line(Point::new(place.x, y), Point::new(place.right(), y))
 }
 
-fn arrow(group: &mut Group, place: Rect, stroke: Stroke, head: f64) {
+fn arrow(group: &mut Group, place: Rect, stroke: Stroke, (kind, head): (Tip, f64)) {
     let color = stroke.color;
     let shorter = Rect::new(place.x, place.y, place.w - head * 0.7, place.h);
     group.shape(Shape::line(across(shorter), stroke));
     let tip = Point::new(place.right(), place.centre().y);
     group.shape(Shape::filled(
-        arrow_head(tip, Point::new(1.0, 0.0), head),
+        kind.form(tip, Point::new(1.0, 0.0), head),
         color,
     ));
 }

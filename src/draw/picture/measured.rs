@@ -378,7 +378,10 @@ pub(crate) fn arrow_label(
     if shown.mark == Some(Mark::Removed) {
         return None;
     }
-    let topic = arrow.carries(shown).map_or_else(String::new, |t| t + " ");
+    let called = if arrow.is_service { "() " } else { " " };
+    let topic = arrow
+        .carries(shown)
+        .map_or_else(String::new, |t| t + called);
     if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
         return Some((topic + &words::rate_change(before, now), true));
     }

@@ -85,8 +85,13 @@ fn quiet_box(quiet: &Quiet) -> BoxLook {
     }
 }
 
-/// The paint of an arrow over which `hz` messages flow each second.
-pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowLook {
+/// The paint of an arrow over which `flow` messages or kilobytes flow each second.
+pub(crate) fn of_arrow(
+    style: &Style,
+    kind: &ArrowKind,
+    shown: &Shown,
+    flow: Option<f64>,
+) -> ArrowLook {
     let edge = &style.edge;
     let latched = shown.state == State::Latched;
     if shown.mark == Some(Mark::Away) {
@@ -97,7 +102,7 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         let width = match mark {
             Mark::Removed => change.width * 0.8,
             // As wide as its rate asks for, but never mistaken for one that did not change.
-            _ => (change.width * 0.65).max(width_of(style, shown.steady_hz)),
+            _ => (change.width * 0.65).max(width_of(style, flow)),
         };
         return ArrowLook {
             stroke: line(change.color, width, &change.dash),
@@ -117,7 +122,7 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
     let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
     let width = match shown.degree {
         Degree::Stated if !known => style.stated.width,
-        _ => width_of(style, shown.steady_hz),
+        _ => width_of(style, flow),
     };
     let dash: &[f64] = if shown.degree == Degree::Inferred {
         &style.inferred.dash
@@ -173,7 +178,9 @@ mod tests {
         let style = Style::builtin("light").unwrap();
         let width = |hz| {
             let shown = shown(State::Active, Degree::Measured, None, hz);
-            of_arrow(&style, &ArrowKind::Publish, &shown).stroke.width
+            of_arrow(&style, &ArrowKind::Publish, &shown, Some(hz))
+                .stroke
+                .width
         };
         assert!(width(0.0) < width(1.0) && width(1.0) < width(50.0) && width(50.0) < width(1e3));
         assert!(width(1e300) <= style.edge.most && width(f64::NAN) <= width(0.0));

@@ -133,6 +133,11 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let mut rows: Vec<Row> = Vec::new();
     for row in shown.by_rate().take(most) {
         let name = names.get(row.topic as usize).map_or("", String::as_str);
+        let name = &*if row.is_service {
+            called(name)
+        } else {
+            name.to_owned()
+        };
         let rate = rate(row).filter(|_| !is_whole && row.mark != Some(Mark::Removed));
         let is_split = rate
             .as_ref()
@@ -164,6 +169,14 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     rows
 }
 
+/// The words in the place of the rate of a topic whose receiver gets nothing.
+const STARVED: &str = "(gets nothing)";
+
+/// The name of a service, as it is drawn.
+pub(crate) fn called(name: &str) -> String {
+    format!("{name}()")
+}
+
 /// Whether messages run along a line, and whether against it.
 pub(crate) fn uses(shown: &Shown) -> [bool; 2] {
     let any = |way: usize| shown.topics.iter().any(|row| row.ways[way]);
@@ -174,6 +187,9 @@ pub(crate) fn uses(shown: &Shown) -> [bool; 2] {
 fn rate(row: &TopicRow) -> Option<String> {
     if let Some((before, now)) = row.rates {
         return Some(words::rate_change(before, now));
+    }
+    if row.is_starved {
+        return Some(STARVED.to_owned());
     }
     let rate = chips::rate_in_window(row.hz, row.count).filter(|_| row.ways != [true, true]);
     rate.or_else(|| (row.state == State::Latched).then(|| "(latched)".to_owned()))

@@ -166,10 +166,15 @@ impl Picture<'_> {
                 }
             }
         }
-        let parts = view.arrows.iter().zip(tracks).zip(&plan.links).zip(marks);
+        let arrows_shown = view.arrows.iter().zip(&view.arrows_shown);
+        let parts = arrows_shown.zip(tracks).zip(&plan.links).zip(marks);
         parts
-            .map(|(((arrow, track), link), marks)| {
-                let shown = plain(link.label.map(|_| 1.0));
+            .map(|((((arrow, showing), track), link), marks)| {
+                let is_starved = showing.looks().iter().all(|look| look.is_starved);
+                let shown = Shown {
+                    is_starved,
+                    ..plain(link.label.map(|_| 1.0))
+                };
                 UnionElement {
                     group: arrows.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),

@@ -104,6 +104,7 @@ fn a_graph_snapshot_names_everything() {
         [
             "Node /lidar",
             "Publish /lidar /scan",
+            "Quality /scan reliable volatile depth 10",
             "Snapshot snapshot /rosgraph",
             "Type /scan sensor_msgs/msg/LaserScan"
         ]
@@ -153,6 +154,9 @@ fn a_single_node_names_services_and_actions() {
             "Publish /nav /go/_action/feedback",
             "Publish /nav /go/_action/status",
             "Publish /nav /plan",
+            "Quality /go/_action/feedback reliable volatile depth 10",
+            "Quality /go/_action/status reliable volatile depth 10",
+            "Quality /plan reliable volatile depth 10",
             "Snapshot snapshot /nodl/observed_node /nav",
             "Type /clear std_srvs/srv/Empty",
             "Type /go/_action/feedback a/msg/T",

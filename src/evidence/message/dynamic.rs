@@ -86,10 +86,21 @@ impl MessageSchema {
     /// # Errors
     /// If it has another layout, or a type in it is unknown.
     pub(crate) fn read(&self, payload: &mut PayloadCursor<'_>) -> PayloadResult<MessageValue> {
-        let fields = self.0.first().map_or("", |(_, fields)| fields);
-        let value = self.fields(payload, fields, 0)?;
+        let value = self.read_begun(payload)?;
         payload.finish()?;
         Ok(value)
+    }
+
+    /// Parses the beginning of a payload.
+    ///
+    /// # Errors
+    /// As [`MessageSchema::read`].
+    pub(crate) fn read_begun(
+        &self,
+        payload: &mut PayloadCursor<'_>,
+    ) -> PayloadResult<MessageValue> {
+        let fields = self.0.first().map_or("", |(_, fields)| fields);
+        self.fields(payload, fields, 0)
     }
 
     fn fields(

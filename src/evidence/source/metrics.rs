@@ -2,7 +2,8 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::base::time::Span;
+use crate::evidence::claim::{Claim, Degree, Measurement, SourceId};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
@@ -23,18 +24,25 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     ],
 };
 
+/// Kinds of numbers in `statistics_msgs/msg/StatisticDataType`.
+const AVERAGE: usize = 1;
+const DEVIATION: usize = 4;
+const SAMPLES: usize = 5;
+
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let node = payload.string()?;
     let metric = payload.string()?;
-    payload.skip_string()?;
-    payload.time()?;
-    payload.time()?;
+    let unit = payload.string()?;
+    let span = Span::new(payload.time()?, payload.time()?);
+    let mut numbers = [f64::NAN; SAMPLES + 1];
     for _ in 0..payload.length(9)? {
-        payload.u8()?;
-        payload.f64()?;
+        let (kind, number) = (payload.u8()?, payload.f64()?);
+        if let Some(slot) = numbers.get_mut(usize::from(kind)) {
+            *slot = number;
+        }
     }
     payload.finish()?;
     if !node.is_empty() {
@@ -43,12 +51,42 @@ pub(crate) fn read(
         heard.claim(claim, Degree::Stated, || {
             format!("{node} tells of its {metric}")
         });
+        let nanos = |number: f64| {
+            let nanos = libm::round(number * 1e6);
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "less than 2^53 by the check"
+            )]
+            (unit == "ms" && nanos.abs() < 9e15).then_some(nanos as i64)
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, and NaN is 0"
+        )]
+        let count = numbers[SAMPLES] as u64;
+        heard.measure(Measurement {
+            topic: None,
+            publisher: None,
+            subscriber: Some(name),
+            span,
+            count,
+            drops: None,
+            bytes: None,
+            jitter_ns: nanos(numbers[DEVIATION]).filter(|_| metric == "message_period"),
+            age_ns: nanos(numbers[AVERAGE]).filter(|_| metric == "message_age"),
+        });
     }
     Ok(())
 }
 
 /// Adds the publications of the nodes named in metrics, whose names lack the namespace.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+    let mut measured = std::mem::take(&mut known.facts.measured);
+    for one in measured.iter_mut().filter(|one| one.topic.is_none()) {
+        one.subscriber = one.subscriber.map(|node| known.meant(node));
+    }
+    known.facts.measured = measured;
     for (fact, signs, ends) in known.claims(source) {
         if let Claim::Reports(node, topic) = fact.claim {
             let node = known.meant(node);

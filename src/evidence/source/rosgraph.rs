@@ -141,7 +141,7 @@ pub(crate) fn read_node(
     Ok(())
 }
 
-/// A message of this type, by the definition in the bag or the first form that uses the payload up exactly.
+/// A message of this type, by the definition in the bag or the first form that uses the payload up, best exactly.
 fn parsed(
     heard: &SourceContext<'_>,
     payload: &PayloadCursor<'_>,
@@ -159,11 +159,30 @@ fn parsed(
             .chain(form.iter().chain(COMMON).copied());
         Some(MessageSchema::of_fields(&all.collect::<Vec<_>>()))
     });
-    let read = |schema: MessageSchema| schema.read(&mut payload.clone()).ok();
-    own.into_iter()
-        .chain(forms)
-        .find_map(read)
-        .ok_or(payload.wrong("a graph"))
+    let all: Vec<MessageSchema> = own.into_iter().chain(forms).collect();
+    let whole = all
+        .iter()
+        .find_map(|schema| schema.read(&mut payload.clone()).ok());
+    // Some serializers leave room for more than they wrote, such as that of `rmw_fastrtps` for messages that programs
+    // write to a bag themselves.
+    let begun = || {
+        let mut begun = all
+            .iter()
+            .filter_map(|schema| schema.read_begun(&mut payload.clone()).ok());
+        begun.find(is_sound)
+    };
+    whole.or_else(begun).ok_or(payload.wrong("a graph"))
+}
+
+/// Whether every node has a name as ROS has them, which random bytes do not have.
+fn is_sound(value: &MessageValue) -> bool {
+    let nodes = match value.list("nodes") {
+        [] => std::slice::from_ref(value),
+        nodes => nodes,
+    };
+    let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '/' | '-');
+    let mut names = nodes.iter().map(|node| node.text("name"));
+    names.all(|name| name.len() > 1 && name.starts_with('/') && name.chars().all(is_name))
 }
 
 /// An end of a topic in a snapshot.
@@ -197,7 +216,9 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             continue;
         }
         let id = heard.name(name);
-        heard.say(now(Claim::Node(id)), || format!("{name} is in the graph"));
+        heard.say(now(Claim::Node(id)), || {
+            format!("{name} is in the graph{}", parameters(node))
+        });
         if !seen.insert(name) {
             let twice = || format!("{name} is twice in the graph");
             heard.claim(Claim::Duplicate(id), Degree::Stated, twice);
@@ -209,7 +230,17 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             } else {
                 (Claim::Subscribe(id, of), "subscribes to")
             };
-            heard.say(now(claim), || format!("{name} {verb} {topic}"));
+            let quality = qos.and_then(quality);
+            heard.say(now(claim), || {
+                let quality = quality
+                    .as_ref()
+                    .map_or_else(String::new, |q| format!(" ({q})"));
+                format!("{name} {verb} {topic}{quality}")
+            });
+            if let Some(quality) = quality.filter(|_| is_sent) {
+                let claim = Claim::Quality(of, heard.name(&quality));
+                heard.claim(claim, Degree::Stated, || format!("offered as {quality}"));
+            }
             if !heard.facts.text(kind).is_empty() {
                 heard.say(now(Claim::Type(of, kind)), String::new);
             }
@@ -294,6 +325,57 @@ fn kind<'a>(end: &'a MessageValue, field: &str) -> &'a str {
         Some(MessageValue::Text(kind)) => kind,
         Some(interface) => interface.text("name"),
         None => "",
+    }
+}
+
+/// A quality of service in the words of recordings: `reliable volatile depth 10`; `None` where it is not known.
+fn quality(qos: &MessageValue) -> Option<String> {
+    let word = |policy, words: [&'static str; 2]| match qos.field(policy) {
+        Some(MessageValue::Byte(value @ 1..=2)) => Some(words[usize::from(*value) - 1]),
+        _ => None,
+    };
+    let history = match (
+        word("history", ["keep_last", "keep_all"]),
+        qos.field("depth"),
+    ) {
+        (Some("keep_last"), Some(MessageValue::Number(Some(depth)))) => format!(" depth {depth}"),
+        (Some("keep_all"), _) => " keep_all".to_owned(),
+        _ => String::new(),
+    };
+    let reliability = word("reliability", ["reliable", "best_effort"])?;
+    let durability = word("durability", ["transient_local", "volatile"])?;
+    Some(format!("{reliability} {durability}{history}"))
+}
+
+/// The parameters of a node in words, with the values that are not numbers with a fraction or lists.
+fn parameters(node: &MessageValue) -> String {
+    let values = node.list("parameter_values").iter().map(Some);
+    let values = values.chain(std::iter::repeat(None));
+    let word = |value: &MessageValue| match (value.field("type")?, value) {
+        (MessageValue::Byte(1), value) => {
+            Some((value.field("bool_value")? != &MessageValue::Byte(0)).to_string())
+        }
+        (MessageValue::Byte(2), value) => match value.field("integer_value")? {
+            MessageValue::Number(number) => number.map(|number| number.to_string()),
+            _ => None,
+        },
+        (MessageValue::Byte(4), value) => Some(value.text("string_value").to_owned()),
+        _ => None,
+    };
+    let all = node
+        .list("parameters")
+        .iter()
+        .zip(values)
+        .map(|(parameter, value)| {
+            let value = value
+                .and_then(word)
+                .map_or_else(String::new, |word| format!(" = {word}"));
+            format!("{}{value}", parameter.text("name"))
+        });
+    let all: Vec<String> = all.collect();
+    match all.len() {
+        0 => String::new(),
+        _ => format!("; parameters: {}", all.join(", ")),
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
+use crate::base::name::SERVICE;
 use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
@@ -36,6 +37,19 @@ pub(crate) fn read(
     };
     let client = cursor::hex(client);
     let of = heard.stream.topic;
+    if let Some(node) = heard.stream.publisher
+        && !service.contains("/_action/")
+    {
+        let kind = heard.stream.connection.type_name.clone();
+        let kind = heard.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
+        let called = heard.name(service);
+        let end = match word {
+            "request sent" | "reply received" => Claim::Publish(node, called),
+            _ => Claim::Subscribe(node, called),
+        };
+        heard.claim(end, Degree::Measured, || format!("{service}: {word}"));
+        heard.claim(Claim::Type(called, kind), Degree::Measured, String::new);
+    }
     let (client_name, kind) = (heard.name(&client), heard.name(word));
     let words = || format!("{service}: {word}, client {client}");
     heard.claim(Claim::Topic(of), Degree::Measured, words);

@@ -42,7 +42,7 @@ pub(crate) fn read(
     let count = |n: i32| u64::try_from(n).ok();
     let [period, jitter, _, age, _, oldest] = durations;
     heard.measure(Measurement {
-        topic: of,
+        topic: Some(of),
         publisher: from,
         subscriber: to,
         span: Span::new(start, end),

@@ -53,7 +53,7 @@ pub(crate) fn read(
         };
         if kind == AGE && count > 0 {
             heard.measure(Measurement {
-                topic: of,
+                topic: Some(of),
                 publisher: None,
                 subscriber: Some(name),
                 // The collector reports once a second.

@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::error::{Error, Result};
+use crate::base::name::SERVICE;
 use crate::base::yaml;
 
 const HINT: &str =
@@ -59,10 +60,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
             }
         }
         _ if data.get("nodl_version").is_some() => {
-            // The file is named after the node: `planner.nodl.yaml`.
+            // The file is named after the node, `nav.planner.nodl.yaml` after `/nav/planner`.
             let name = crate::bag::file_name(path);
-            let name = name.split('.').next().unwrap_or_default();
-            topology.entries.extend(file.node_of_others(name, &data)?);
+            let name = name.strip_suffix(".yaml").or(name.strip_suffix(".yml"));
+            let name = name.unwrap_or_default();
+            let name = name.strip_suffix(".nodl").unwrap_or(name).replace('.', "/");
+            topology.entries.extend(file.node_of_others(&name, &data)?);
         }
         _ => return Err(file.wrong("nodes", "there is no mapping `nodes`")),
     }
@@ -150,7 +153,13 @@ impl<'a> TopologyYaml<'a> {
         };
         let mut entries = vec![entry(NamedElement::Node(node.clone()))];
         for (key, kind) in ENDS {
-            for topic in self.names(value.get(key), &node)? {
+            for (topic, own) in self.names(value.get(key), &node)? {
+                let is_service = matches!(kind, EndKind::Serves | EndKind::Calls);
+                let own = own.or_else(|| is_service.then(|| SERVICE.to_owned()));
+                let is_action = matches!(kind, EndKind::Acts | EndKind::Asks);
+                if let Some(own) = own.filter(|_| !is_action) {
+                    entries.push(entry(NamedElement::Type(topic.clone(), own)));
+                }
                 let publishes = |topic| NamedElement::Publish(node.clone(), topic);
                 let subscribes = |topic| NamedElement::Subscribe(node.clone(), topic);
                 let parts = || ["feedback", "status"].map(|part| format!("{topic}/_action/{part}"));
@@ -165,14 +174,18 @@ impl<'a> TopologyYaml<'a> {
         Ok(entries)
     }
 
-    /// The names in a list: texts, or mappings with a name; a private name is below its node.
-    fn names(&self, value: Option<&Value>, node: &str) -> Result<Vec<String>> {
+    /// The names in a list, with their types: texts, or mappings with a name; a private name is below its node.
+    fn names(&self, value: Option<&Value>, node: &str) -> Result<Vec<(String, Option<String>)>> {
         let name = |value: &Value| {
             let text = value.as_str().or(text_of(value, &["name", "topic_name"]))?;
-            Some(match text.strip_prefix('~') {
+            let name = match text.strip_prefix('~') {
                 Some(private) => format!("{node}/{}", private.trim_start_matches('/')),
                 None => resolved(text),
-            })
+            };
+            let kind = value.get("type").or(value.get("request_type"));
+            let kind = kind.and_then(|kind| kind.as_str().or(text_of(kind, &["name"])));
+            let kind = kind.map(|kind| kind.strip_suffix("_Request").unwrap_or(kind).to_owned());
+            Some((name, kind))
         };
         let names = match value {
             None | Some(Value::Null) => Some(Vec::new()),
@@ -229,6 +242,7 @@ mod tests {
             NamedElement::Publish(node, topic) => format!("{node} > {topic}"),
             NamedElement::Subscribe(node, topic) => format!("{node} < {topic}"),
             NamedElement::Node(name) | NamedElement::Topic(name) => name,
+            NamedElement::Type(topic, kind) => format!("{topic}: {kind}"),
         };
         entries.into_iter().map(line).collect()
     }
@@ -239,7 +253,13 @@ mod tests {
                     service_servers:\n  - {name: /clear, type: std_srvs/srv/Empty}\n";
         assert_eq!(
             lines("planner.nodl.yaml", nodl),
-            ["/planner", "/planner > /planner/plan", "/planner < /clear"]
+            [
+                "/planner",
+                "/planner/plan: nav_msgs/msg/Path",
+                "/planner > /planner/plan",
+                "/clear: std_srvs/srv/Empty",
+                "/planner < /clear"
+            ]
         );
         let rosgraph = "nodes:\n- name: /a\n  parameters: []\n  subscriptions:\n  - name: /t\n    qos: {depth: 1}\n\
                         - name: /b\n  action_clients:\n  - name: /go\n";

@@ -126,6 +126,11 @@ fn picture(sign: &LegendSign) -> String {
         LegendSign::Line(degree) => group(&format!("edge active {}", degree.word()), LINE),
         // Pages draw every topic as a box.
         LegendSign::Row => String::new(),
+        LegendSign::Service => group("topic", "<path d=\"M3 10l6 -6h18l6 6l-6 6h-18z\"/>"),
+        LegendSign::Starved => group(
+            "edge active stated",
+            "<path d=\"M3 10h24\"/><path d=\"M29 4V16\"/>",
+        ),
         LegendSign::Width => group("edge active w5", LINE),
     }
 }

@@ -10,6 +10,7 @@ use super::cdr::CdrWriter;
 use super::definitions::CHANNELS;
 use crate::base::name::OWN_NODE;
 use crate::base::time::Stamp;
+use crate::evidence::source::qos::{depth, policy};
 
 /// The channel of graphs.
 pub(crate) const GRAPH: usize = 0;
@@ -169,29 +170,14 @@ fn interface(cdr: &mut CdrWriter, kind: &str) {
 
 /// A quality of service from its text; the rest is unknown.
 fn quality(cdr: &mut CdrWriter, words: Option<&str>) {
-    let words: Vec<&str> = words.unwrap_or_default().split([' ', ',']).collect();
-    let place = |known: [&str; 2]| {
-        words
-            .iter()
-            .find_map(|word| known.iter().position(|k| k == word))
-    };
     // 1 and 2 are the two words of each policy, 3 is unknown.
-    let policy = |known| {
-        place(known)
-            .and_then(|at| u8::try_from(at + 1).ok())
-            .unwrap_or(3)
-    };
-    let depth = words.iter().position(|word| *word == "depth");
-    let depth = depth.and_then(|at| words.get(at + 1)?.parse::<u32>().ok());
+    let policy = |known| policy(words, known).map_or(3, |at| if at == 0 { 1 } else { 2 });
+    let depth = depth(words);
     cdr.u32(depth.unwrap_or(0));
     for _ in 0..4 {
         cdr.u32(0);
     }
-    cdr.u8(if depth.is_some() {
-        1
-    } else {
-        policy(["keep_last", "keep_all"])
-    });
+    cdr.u8(depth.map_or_else(|| policy(["keep_last", "keep_all"]), |_| 1));
     cdr.u8(policy(["reliable", "best_effort"]));
     cdr.u8(policy(["transient_local", "volatile"]));
     cdr.u8(4);

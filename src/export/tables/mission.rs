@@ -82,7 +82,7 @@ const EDGES: &[Column<Seen>] = of_elements! {
     WIN START END LENGTH WHAT NODE TOPIC STATE DEGREE EVIDENCE N HZ BYTES DROPS JITTER AGE FIRST LAST
 };
 const TOPICS: &[Column<Seen>] = of_elements! {
-    WIN START END LENGTH TOPIC TYPES STATE DEGREE EVIDENCE N BYTES HZ MEDIAN GAP DROPS JITTER AGE QOS FIRST LAST
+    WIN START END LENGTH TOPIC TYPES STATE DEGREE EVIDENCE N BYTES HZ MEDIAN GAP DROPS JITTER AGE SKEW QOS FIRST LAST
 };
 const NODES: &[Column<Seen>] = of_elements! {
     WIN START END LENGTH NODE ROLE STATE DEGREE EVIDENCE HZ MESSAGES_IN MESSAGES_OUT BYTES_IN BYTES_OUT TOPICS_IN
@@ -118,6 +118,7 @@ element_columns! {
     DROPS "drops" I64 |_, one| count(one.measures.drops);
     JITTER "jitter_s" F64 |_, one| float(one.measures.jitter_s);
     AGE "age_s" F64 |_, one| float(one.measures.age_s);
+    SKEW "skew" F64 |_, one| float(one.skew);
     MESSAGES_IN "messages_in" I64 |_, one| count(one.load.map(|load| load.messages_in));
     MESSAGES_OUT "messages_out" I64 |_, one| count(one.load.map(|load| load.messages_out));
     BYTES_IN "bytes_in" I64 |_, one| count(one.load.and_then(|load| load.bytes_in));

@@ -25,6 +25,8 @@ pub(super) struct Seen {
     pub(super) median: Option<f64>,
     pub(super) gap: Option<f64>,
     pub(super) measures: Measures,
+    /// The skew of a topic over all windows.
+    pub(super) skew: Option<f64>,
     pub(super) load: Option<NodeLoad>,
 }
 
@@ -43,6 +45,7 @@ impl Seen {
             median: None,
             gap: None,
             measures: Measures::default(),
+            skew: None,
             load: None,
         }
     }
@@ -81,6 +84,7 @@ pub(super) fn topics(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
     if has_runs {
         return runs(mission, |what| matches!(what, Element::Topic(_)), take);
     }
+    let skews = mission.skews();
     for (window, graph) in mission.each() {
         for state in &graph.topics {
             take(&Seen {
@@ -90,6 +94,7 @@ pub(super) fn topics(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
                 median: state.median_period_s,
                 gap: state.max_gap_s,
                 measures: state.measures,
+                skew: skews.get(state.id as usize).copied().flatten(),
                 ..Seen::new(Element::Topic(state.id), window, state.state, state.degree)
             });
         }
@@ -160,6 +165,7 @@ impl StateRun {
             median: self.row.median.value(),
             gap: self.row.gap.value(),
             measures: self.row.measures(),
+            skew: None,
             load: None,
         }
     }

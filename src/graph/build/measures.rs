@@ -6,11 +6,12 @@ use std::io;
 use super::history::History;
 use super::senders::sender;
 use super::windows::SortedWindows;
+use crate::base::name::is_quiet;
 use crate::base::time::Span;
 use crate::evidence::claim::{Measurement, age_of};
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
-use crate::graph::{Element, Measures};
+use crate::graph::{Element, Measures, NodeId, TopicId};
 
 /// Sums of one element in one window. A report belongs to windows by the share of its interval in each.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,8 +42,9 @@ impl WindowMeasures {
         windows: &SortedWindows<'_>,
     ) -> io::Result<Self> {
         let mut all = Self::default();
+        let only = only_topics(findings, history);
         for measured in &findings.measured {
-            all.report(measured, history, windows);
+            all.report(measured, &only, history, windows);
         }
         for (topic, streams) in &history.streams {
             let Some(id) = history.topic_ids.get(topic) else {
@@ -71,9 +73,22 @@ impl WindowMeasures {
     }
 
     /// Adds a report to its topic and to the edges that it is about.
-    fn report(&mut self, of: &Measurement, history: &History, windows: &SortedWindows<'_>) {
+    fn report(
+        &mut self,
+        of: &Measurement,
+        only: &BTreeMap<NodeId, Option<TopicId>>,
+        history: &History,
+        windows: &SortedWindows<'_>,
+    ) {
         let node = |name| history.node_ids.get(&name).copied();
-        let Some(topic) = history.topic_ids.get(&of.topic).copied() else {
+        let topic = match of.topic {
+            Some(topic) => history.topic_ids.get(&topic).copied(),
+            None => of
+                .subscriber
+                .and_then(node)
+                .and_then(|node| *only.get(&node)?),
+        };
+        let Some(topic) = topic else {
             return;
         };
         let elements = &history.elements;
@@ -111,6 +126,25 @@ impl WindowMeasures {
     pub(crate) fn bytes(&self, what: Element, at: usize) -> Option<u64> {
         self.0.get(&(what, at))?.bytes.map(whole)
     }
+}
+
+/// The topic of each node that subscribes to a single one besides housekeeping, if a measurement needs it.
+fn only_topics(findings: &Findings, history: &History) -> BTreeMap<NodeId, Option<TopicId>> {
+    let mut only = BTreeMap::new();
+    if findings.measured.iter().all(|one| one.topic.is_some()) {
+        return only;
+    }
+    let elements = &history.elements;
+    let is_quiet = |topic: TopicId| is_quiet(elements.topics[topic as usize].name.as_str());
+    for edge in elements
+        .subscribes
+        .iter()
+        .filter(|edge| !is_quiet(edge.topic))
+    {
+        let topic = only.entry(edge.node).or_insert(Some(edge.topic));
+        *topic = topic.filter(|topic| *topic == edge.topic);
+    }
+    only
 }
 
 impl MeasureSum {

@@ -19,7 +19,7 @@ pub struct FigureInfo {
 }
 
 /// The figures that fit, best first: lifelines if elements start or stop, else the map if edges are known.
-pub(super) fn figures(mission: &Mission) -> Vec<FigureInfo> {
+pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.ledger.phases.len();
     let fitting = [lives(mission), map(mission), steps(many)];
     let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();

@@ -155,11 +155,12 @@ const fn column(head: &'static str, is_right: bool, least: usize, gives: (u8, u8
     }
 }
 
-const TOPIC_COLUMNS: [Column; 5] = [
+const TOPIC_COLUMNS: [Column; 6] = [
     column("topic", false, 28, (0, 0)),
     column("type", false, 12, (2, 1)),
     column("messages", true, WHOLE, (0, 0)),
     column("rate", true, WHOLE, (0, 0)),
+    column("skew", true, WHOLE, (0, 3)),
     column("activity", false, 8, (1, 2)),
 ];
 
@@ -178,6 +179,11 @@ fn topics(topics: &[TopicInfo], width: Option<usize>) -> String {
             Cell::Type(visible(&topic.types.join(" ")).into_owned()),
             Cell::Text(topic.count.to_string()),
             Cell::Text(topic.hz.map_or_else(String::new, words::rate)),
+            Cell::Text(
+                topic
+                    .skew
+                    .map_or_else(String::new, |skew| format!("{skew:.2}")),
+            ),
             Cell::Bars(topic.activity.clone()),
         ]
     };

@@ -50,6 +50,7 @@ pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> St
 
 fn node(drawing: &DotView<'_>, item: &Item, shown: &Shown) -> String {
     let (shape, body) = look(drawing, item.kind);
+    let shape = if item.is_service { "hexagon" } else { shape };
     let change = drawing.colour(shown);
     let dead = matches!(shown.state, State::Silent | State::Declared);
     let line = match change {

@@ -1,0 +1,422 @@
+//! Tests of graphs from beside the bag and of what is written from them: services, starved subscribers, `NoDL`, bundles.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::support::cdr::Cdr;
+use crate::support::{ORIGIN, Recording, mcap};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// Runs the command in a folder; returns its exit code, its results and what else it said.
+fn bagreel(folder: &Path, args: &str) -> (Option<i32>, String, String) {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    let done = run
+        .current_dir(folder)
+        .args(args.split(' '))
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (done.status.code(), text(&done.stdout), text(&done.stderr))
+}
+
+/// Runs a command that must succeed; returns its results.
+fn done(folder: &Path, args: &str) -> String {
+    let (code, results, said) = bagreel(folder, args);
+    assert_eq!(code, Some(0), "{args}: {said}");
+    results
+}
+
+/// A folder with a recording.
+fn folder(bag: &Recording, options: &mcap::Options) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("r.mcap"), mcap::write(bag, options)).unwrap();
+    folder
+}
+
+/// Ten seconds of a lidar whose publisher is named.
+fn lidar() -> Recording {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/msg/LaserScan");
+    bag.send(scan, (0, 10_000), 100, &Cdr::default().u32(1).done());
+    bag
+}
+
+/// ROS 2, with the names of publishers.
+fn ros2() -> mcap::Options {
+    mcap::Options {
+        profile: "ros2",
+        publisher_key: Some("node"),
+        ..mcap::Options::default()
+    }
+}
+
+#[test]
+fn services_and_actions_of_a_file_are_drawn_between_nodes_and_hidden_on_request() {
+    let folder = folder(&lidar(), &ros2());
+    let folder = folder.path();
+    let yaml = "nodes:\n  /planner: {services: [/plan], actions: [/go], subscribes: [/scan]}\n\
+                \x20 /ui: {clients: [/plan], action_clients: [/go]}\n";
+    fs::write(folder.join("t.yaml"), yaml).unwrap();
+    let draw = |with: &str| {
+        done(
+            folder,
+            &format!(
+                "render r.mcap --topology t.yaml -p all --size 1280x720 -o - --format svg {with}"
+            ),
+        )
+    };
+    let all = draw("--mode all");
+    assert!(all.contains("class=\"topic service"), "no hexagon: {all}");
+    assert!(all.contains(">service</text>"), "no legend: {all}");
+    let nodes = draw("--mode nodes");
+    assert!(
+        nodes.contains("edge bundle service") || nodes.contains("edge bundle"),
+        "{nodes}"
+    );
+    assert!(nodes.contains("plan()"), "{nodes}");
+    let hidden = draw("--mode nodes --hide services");
+    assert!(
+        !hidden.contains("plan()") && hidden.contains("/go"),
+        "{hidden}"
+    );
+    let dot = done(
+        folder,
+        "render r.mcap --topology t.yaml -p all -o - --format dot --dot-profile plain",
+    );
+    assert!(dot.contains("label=\"/plan\", shape=hexagon"), "{dot}");
+    // Recorders leave services out: that none is in the bag is no news.
+    let (_, _, said) = bagreel(folder, "info r.mcap --topology t.yaml -v");
+    assert!(!said.contains("/plan"), "{said}");
+}
+
+/// The end of a topic in `rosgraph_msgs`, with its reliability.
+fn end(cdr: Cdr, topic: &str, kind: &str, reliability: u8) -> Cdr {
+    let hash = (0..32).fold(cdr.text(topic).text(kind).u8(1), |cdr, _| cdr.u8(0));
+    let zero = (0..4).fold(hash.u32(10), |cdr, _| cdr.u32(0));
+    zero.u8(1).u8(reliability).u8(2).u8(1).u32(0).u32(0)
+}
+
+/// A node of `rosgraph_msgs` with one parameter, at most one publisher and one subscription.
+fn node(cdr: Cdr, name: &str, sends: Option<&str>, hears: Option<(&str, u8)>) -> Cdr {
+    let cdr = cdr
+        .text(name)
+        .u32(1)
+        .text("use_sim_time")
+        .u8(1)
+        .text("")
+        .text("")
+        .u8(0)
+        .u8(0);
+    let cdr = cdr
+        .u32(0)
+        .u32(0)
+        .u32(1)
+        .u8(1)
+        .u8(1)
+        .u64(0)
+        .f64(0.0)
+        .text("");
+    let cdr = (0..5).fold(cdr, |cdr, _| cdr.u32(0));
+    let kind = "sensor_msgs/msg/LaserScan";
+    let cdr = match sends {
+        Some(topic) => end(cdr.u32(1), topic, kind, 2),
+        None => cdr.u32(0),
+    };
+    let cdr = match hears {
+        Some((topic, reliability)) => end(cdr.u32(1), topic, kind, reliability),
+        None => cdr.u32(0),
+    };
+    (0..4).fold(cdr, |cdr, _| cdr.u32(0))
+}
+
+/// A graph in which `/slam` asks for more than `/lidar` offers, with bytes after its end.
+fn graph(spare: usize) -> Vec<u8> {
+    let cdr = node(Cdr::default().u32(3), "/lidar", Some("/scan"), None);
+    let cdr = node(cdr, "/slam", None, Some(("/scan", 1)));
+    let mut graph = node(cdr, "/viewer", None, Some(("/scan", 2))).done();
+    graph.extend(vec![0xAB; spare]);
+    graph
+}
+
+/// The recording of such graphs.
+fn graphs(spare: usize) -> Recording {
+    let mut bag = lidar();
+    let graphs = bag.publisher("", "/rosgraph", "rosgraph_msgs/msg/Graph");
+    for second in [1, 5] {
+        bag.messages
+            .push((graphs, ORIGIN + second * SECOND, graph(spare)));
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    bag
+}
+
+#[test]
+fn a_starved_subscription_ends_in_a_bar_and_a_graph_tells_qualities_and_parameters() {
+    // Some serializers leave room at the end.
+    for spare in [0, 32] {
+        let folder = folder(&graphs(spare), &ros2());
+        let folder = folder.path();
+        let svg = done(
+            folder,
+            "render r.mcap --mode all -p all --size 1280x720 -o - --format svg",
+        );
+        let starved: Vec<&str> = svg.split("<g ").filter(|g| g.contains("starved")).collect();
+        assert!(
+            !starved.is_empty() && starved.iter().all(|g| g.contains("/slam")),
+            "{starved:?}"
+        );
+        assert!(
+            svg.contains("gets nothing (quality of service)"),
+            "no legend: {svg}"
+        );
+        let why = done(folder, "info r.mcap --why /slam /scan");
+        assert!(why.contains("(reliable volatile depth 10)"), "{why}");
+        let why = done(folder, "info r.mcap --why /lidar");
+        assert!(why.contains("parameters: use_sim_time = true"), "{why}");
+        let info: Value = serde_json::from_str(&done(folder, "info r.mcap --format json")).unwrap();
+        let topics = info["topics"].as_array().unwrap();
+        let scan = topics
+            .iter()
+            .find(|topic| topic["name"] == "/scan")
+            .unwrap();
+        assert_eq!(scan["qos"], "best_effort volatile depth 10");
+    }
+}
+
+#[test]
+fn a_recorded_graph_is_a_topology_for_another_bag() {
+    let folder = folder(&graphs(0), &ros2());
+    let folder = folder.path();
+    fs::rename(folder.join("r.mcap"), folder.join("graph.mcap")).unwrap();
+    fs::write(folder.join("r.mcap"), mcap::write(&lidar(), &ros2())).unwrap();
+    let why = done(
+        folder,
+        "info r.mcap --topology graph.mcap --why /slam /scan",
+    );
+    assert!(why.contains("graph.mcap"), "{why}");
+    let (code, _, said) = bagreel(folder, "info graph.mcap --topology r.mcap");
+    assert!(
+        code == Some(1) && said.contains("no graph is recorded"),
+        "{code:?} {said}"
+    );
+}
+
+#[test]
+fn introspection_names_the_client_and_the_server_if_the_recorder_names_publishers() {
+    let mut bag = lidar();
+    let event = |kind: u8| {
+        let info = (0..16).fold(Cdr::default().u8(kind).time(ORIGIN), Cdr::u8);
+        info.u64(1).u32(0).u32(0).done()
+    };
+    for (node, kind) in [("/ui", 0), ("/planner", 1), ("/planner", 2), ("/ui", 3)] {
+        let place = bag.publisher(node, "/plan/_service_event", "nav_msgs/srv/GetPlan_Event");
+        bag.messages.push((place, ORIGIN + SECOND, event(kind)));
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = folder(&bag, &ros2());
+    let why = done(folder.path(), "info r.mcap --why /plan /ui");
+    assert!(why.contains("/ui publishes /plan"), "{why}");
+    let why = done(folder.path(), "info r.mcap --why /plan /planner");
+    assert!(why.contains("/planner subscribes to /plan"), "{why}");
+}
+
+#[test]
+fn metrics_of_a_subscriber_are_those_of_its_only_topic() {
+    let mut bag = graphs(0);
+    let place = bag.publisher("", "/statistics", "statistics_msgs/msg/MetricsMessage");
+    for (metric, numbers) in [
+        ("message_age", [(1, 70.0), (5, 10.0)]),
+        ("message_period", [(4, 20.0), (5, 10.0)]),
+    ] {
+        for second in 1..10 {
+            let end = ORIGIN + second * SECOND;
+            let cdr = Cdr::default().text("slam").text(metric).text("ms");
+            let cdr = cdr.time(end - SECOND).time(end).u32(2);
+            let cdr = numbers
+                .iter()
+                .fold(cdr, |cdr, (kind, n)| cdr.u8(*kind).f64(*n));
+            bag.messages.push((place, end, cdr.done()));
+        }
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = folder(&bag, &ros2());
+    let json = done(folder.path(), "render r.mcap -p all -o - --format json");
+    let mission: Value = serde_json::from_str(&json).unwrap();
+    let edges = mission["windows"][0]["subscribes"].as_array().unwrap();
+    let slam = edges
+        .iter()
+        .find(|e| e["node"] == "/slam" && e["topic"] == "/scan")
+        .unwrap();
+    let near = |key: &str, truth: f64| (slam[key].as_f64().unwrap() - truth).abs() < truth * 0.01;
+    assert!(near("age_s", 0.07) && near("jitter_s", 0.02), "{slam}");
+}
+
+#[test]
+fn skew_is_the_coefficient_of_variation_of_the_rate() {
+    let mut bag = Recording::default();
+    let even = bag.publisher("/a", "/even", "std_msgs/msg/Empty");
+    let uneven = bag.publisher("/a", "/uneven", "std_msgs/msg/Empty");
+    bag.send(even, (0, 20_000), 100, &Cdr::default().done());
+    // 15 messages in each of the first ten seconds, then 5.
+    for (from, step) in [(0, 66), (10_000, 200)] {
+        let many = if step == 66 { 150 } else { 50 };
+        for n in 0..many {
+            bag.messages.push((
+                uneven,
+                ORIGIN + (from + n * step) * 1_000_000,
+                Cdr::default().done(),
+            ));
+        }
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = folder(&bag, &ros2());
+    done(folder.path(), "render r.mcap -p 5 -o x.csv");
+    let table = fs::read_to_string(folder.path().join("x.topics.csv")).unwrap();
+    let mut rows = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = rows.next().unwrap();
+    let at = |name: &str| heads.iter().position(|head| *head == name).unwrap();
+    let skews: BTreeMap<&str, f64> = rows
+        .map(|row| (row[at("topic")], row[at("skew")].parse().unwrap()))
+        .collect();
+    assert!(skews["/even"] < 0.01, "{skews:?}");
+    // Of 15.2, 14.8 and 5 messages per second in the whole windows.
+    assert!((skews["/uneven"] - 0.4043).abs() < 0.001, "{skews:?}");
+}
+
+#[test]
+fn a_nodl_document_per_node_is_a_topology_again() {
+    let folder = folder(&graphs(0), &ros2());
+    let folder = folder.path();
+    let yaml = "nodes:\n  /slam: {services: [{name: /reset, type: std_srvs/srv/Empty}]}\n  /ns/ui: {clients: [/reset]}\n";
+    fs::write(folder.join("t.yaml"), yaml).unwrap();
+    done(folder, "render r.mcap --topology t.yaml -o nodl/");
+    let files = fs::read_dir(folder.join("nodl")).unwrap();
+    let files: BTreeSet<String> = files
+        .map(|f| f.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let want = ["lidar", "ns.ui", "slam", "viewer"].map(|name| format!("{name}.nodl.yaml"));
+    assert_eq!(files, want.into());
+    let read = |name: &str| fs::read_to_string(folder.join("nodl").join(name)).unwrap();
+    let lidar = "nodl_version: 2\npublishers:\n  - name: /scan\n    type: sensor_msgs/msg/LaserScan\n    \
+                 qos: {history: KEEP_LAST, depth: 10, reliability: BEST_EFFORT, durability: VOLATILE}\n    \
+                 description: measured\n";
+    assert_eq!(read("lidar.nodl.yaml"), lidar);
+    let slam = "nodl_version: 2\nsubscriptions:\n  - name: /scan\n    type: sensor_msgs/msg/LaserScan\n    \
+                qos: {history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}\n    description: stated\n\
+                service_servers:\n  - name: /reset\n    type: std_srvs/srv/Empty\n    description: stated\n";
+    assert_eq!(read("slam.nodl.yaml"), slam);
+    let why = done(
+        folder,
+        "info r.mcap --topology nodl/ns.ui.nodl.yaml --why /ns/ui /reset",
+    );
+    assert!(why.contains("ns.ui.nodl.yaml"), "{why}");
+    let (code, _, said) = bagreel(folder, "render r.mcap -o - --format nodl");
+    assert!(code == Some(2) && said.contains("-o nodl/"), "{said}");
+    let (code, _, said) = bagreel(
+        folder,
+        "render r.mcap --topology nodl/ns.ui.nodl.yaml -o nodl/",
+    );
+    assert!(code == Some(2) && said.contains("overwrite"), "{said}");
+}
+
+/// The files of a folder.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let all = fs::read_dir(folder).unwrap().map(|file| file.unwrap());
+    let read = |file: fs::DirEntry| {
+        (
+            file.file_name().into_string().unwrap(),
+            fs::read(file.path()).unwrap(),
+        )
+    };
+    all.map(read).collect()
+}
+
+#[test]
+fn a_bundle_is_the_same_twice_and_its_numbers_follow_from_the_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    fs::create_dir(folder.join("runs")).unwrap();
+    fs::copy(example, folder.join("runs/w.bag")).unwrap();
+    fs::write(folder.join("runs/broken.bag"), b"#ROSBAG V2.0\nbroken").unwrap();
+    for out in ["a", "b"] {
+        let (code, _, said) = bagreel(folder, &format!("paper runs -p 10 -o {out}"));
+        assert_eq!(code, Some(3), "{said}");
+    }
+    let (a, b) = (files(&folder.join("a")), files(&folder.join("b")));
+    assert!(a == b, "{:?} {:?}", a.keys(), b.keys());
+    for name in [
+        "SHA256SUMS",
+        "commands.sh",
+        "survey.csv",
+        "CITATION.cff",
+        "README.md",
+        "w.lives.pdf",
+        "w.map.tex",
+    ] {
+        assert!(a.contains_key(name), "{name}: {:?}", a.keys());
+    }
+    // Computed anew from the windows of the mission's JSON.
+    let json = done(
+        folder,
+        "render runs/w.bag -p 10 -o - --format json --json windows",
+    );
+    let mission: Value = serde_json::from_str(&json).unwrap();
+    let name = |value: &Value, key: &str| value[key].as_str().unwrap().to_owned();
+    let is_tool = |name: &str| name.starts_with("/record_") || name == "/rosout";
+    let is_quiet = |topic: &str| {
+        ["/rosout", "/rosout_agg", "/clock", "/statistics"].contains(&topic)
+            || topic.ends_with("/parameter_updates")
+            || topic.ends_with("/parameter_descriptions")
+    };
+    let sets = mission["windows"].as_array().unwrap().iter().map(|window| {
+        let mut set = BTreeSet::new();
+        for node in window["nodes"].as_array().unwrap() {
+            set.insert((name(node, "name"), String::new()));
+        }
+        for list in ["publishes", "subscribes"] {
+            for edge in window[list].as_array().unwrap() {
+                set.insert((
+                    name(edge, "node"),
+                    format!("{list} {}", name(edge, "topic")),
+                ));
+            }
+        }
+        set.retain(|(node, edge)| {
+            !is_tool(node) && !is_quiet(edge.split(' ').nth(1).unwrap_or_default())
+        });
+        set
+    });
+    let sets: Vec<BTreeSet<(String, String)>> = sets.collect();
+    let distances = sets
+        .windows(2)
+        .map(|two| two[0].symmetric_difference(&two[1]).count());
+    let distances: Vec<String> = distances.map(|n| n.to_string()).collect();
+    let table = String::from_utf8(a["windows.csv"].clone()).unwrap();
+    let written: Vec<&str> = table
+        .lines()
+        .skip(2)
+        .map(|row| row.split(',').nth(10).unwrap())
+        .collect();
+    assert_eq!(written, distances);
+    let log = done(folder, "events runs/w.bag --format csv");
+    let summary = String::from_utf8(a["reconfiguration.csv"].clone()).unwrap();
+    let row: Vec<&str> = summary.lines().nth(1).unwrap().split(',').collect();
+    let (span, changes): (f64, f64) = (row[1].parse().unwrap(), row[4].parse().unwrap());
+    assert!(
+        (row[5].parse::<f64>().unwrap() - changes / span * 60.0).abs() < 1e-9,
+        "{row:?}"
+    );
+    assert_eq!(
+        log.lines().count() - 1,
+        row[4].parse::<usize>().unwrap(),
+        "{log}"
+    );
+}
