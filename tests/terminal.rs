@@ -225,12 +225,18 @@ fn only_results_and_messages_stay_on_the_screen() {
 #[test]
 fn results_fit_the_terminal() {
     let folder = folder();
+    fs::create_dir(folder.path().join("long")).unwrap();
+    for name in ["first", "second"] {
+        let name = format!("long/{name}_recording_of_the_morning.mcap");
+        fs::copy(COURIER, folder.path().join(name)).unwrap();
+    }
     for columns in [60, 80, 120] {
         for line in [
             "info W",
             "info W --why /map_server",
             "info C",
             "info E",
+            "info long",
             "diff W C",
             "events W",
             "events W --parts",

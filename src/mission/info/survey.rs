@@ -107,7 +107,7 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
     let columns = [
         column("bag", false, 20, 0),
         column("format", false, WHOLE, 4),
-        column("size", true, WHOLE, 0),
+        column("size", true, WHOLE, 6),
         column("start", false, 10, 5),
         column("span", true, WHOLE, 0),
         column("messages", true, WHOLE, 0),
