@@ -10,11 +10,13 @@ use bagreel::internals::base::notice::{Notice, NoticeKind};
 use bagreel::internals::base::time::Stamp;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use bagreel::{Output, Render};
-use support::tiny;
+use tests::support::tiny;
 
 #[allow(dead_code, unexpected_cfgs, reason = "shared with the tests")]
-#[path = "../support.rs"]
-mod support;
+#[path = ".."]
+mod tests {
+    pub mod support;
+}
 
 /// Calls `with` with a file of this name and content, in memory if the system has such a folder: it may take a second
 /// of processor time and one more per megabyte, though the code is instrumented.
