@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// For each window in the data: the indices of its headlines.
 fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
-    let ledger = mission["ledger"].as_array().unwrap();
+    let ledger = mission["events"].as_array().unwrap();
     let parts = ledger
         .iter()
         .flat_map(|e| e["parts"].as_array().into_iter().flatten());
@@ -339,7 +339,7 @@ fn settled(stem: &Path, expected: &[BTreeSet<u64>], digits: usize) {
 /// and the latter alone.
 fn lasting(mission: &Value) -> (Vec<BTreeSet<u64>>, Vec<BTreeSet<u64>>) {
     let headlines: BTreeSet<u64> = headlines(mission).into_iter().flatten().collect();
-    let ledger = mission["ledger"].as_array().unwrap().iter();
+    let ledger = mission["events"].as_array().unwrap().iter();
     let lasts = ledger.filter_map(|e| {
         let id = e["id"].as_u64().filter(|id| headlines.contains(id))?;
         let (from, to) = (e["time_ns"].as_i64()?, e["until_ns"].as_i64()?);

@@ -102,6 +102,10 @@ fn folder() -> tempfile::TempDir {
     let topology = "nodes:\n  /rviz: {subscribes: [/robot1/plan]}\n";
     fs::write(dir.path().join("topology.yaml"), topology).unwrap();
     copy(&examples.join("paper/phases.txt"), "phases.txt");
+    copy(
+        &root().join("docs/src/how-it-works.json"),
+        "how-it-works.json",
+    );
     fs::create_dir(dir.path().join("images")).unwrap();
     dir
 }
@@ -184,7 +188,9 @@ fn gallery_shows_what_its_commands_draw() {
         let (name, rest) = part.split_once(')').unwrap();
         let command = commands(rest)[0];
         assert!(
-            command.ends_with(&format!(" -o images/{name}")),
+            command
+                .replace("{n}", "0")
+                .ends_with(&format!(" -o images/{name}")),
             "{command}"
         );
         let output = run(command, dir.path());
@@ -205,7 +211,7 @@ fn gallery_shows_what_its_commands_draw() {
         Vec::<&str>::new(),
         "draw them anew with INSTA_UPDATE=always"
     );
-    assert_eq!(shown, 20);
+    assert_eq!(shown, 21);
     let files = fs::read_dir(images).unwrap();
     let bytes: u64 = files
         .map(|file| file.unwrap().metadata().unwrap().len())

@@ -17,15 +17,20 @@ struct Log {
 
 impl Log {
     fn of(bag: &Path) -> Self {
-        let rows = said(bag, &["events", "--format", "ndjson", "--parts", "--all"]);
-        let rows = rows
-            .lines()
-            .map(|row| serde_json::from_str::<Value>(row).unwrap());
+        let log = said(bag, &["events", "--format", "json", "--parts", "--all"]);
+        let mut log: Value = serde_json::from_str(&log).unwrap();
+        assert_eq!(log["schema"], "bagreel.events/2");
+        let Value::Array(rows) = log["events"].take() else {
+            panic!("the events are no list")
+        };
         let text = said(bag, &["events", "--parts", "--all"]);
         // A time of thirteen characters, two spaces, and the sentence, which is indented for parts.
         let sentence = |line: &str| line.chars().skip(15).collect::<String>();
         Self {
-            events: rows.map(|row| (row["id"].as_u64().unwrap(), row)).collect(),
+            events: rows
+                .into_iter()
+                .map(|row| (row["id"].as_u64().unwrap(), row))
+                .collect(),
             sentences: text
                 .lines()
                 .map(|line| sentence(line).trim().to_owned())

@@ -317,7 +317,7 @@ fn bars_and_jumps_count_headlines() {
     let pages = rendered(&running(&ROBOT, 50), &["html", "json"]);
     let data = data_of(&read(&pages, "x.html"));
     let mission: Value = serde_json::from_str(&read(&pages, "x.json")).unwrap();
-    let ledger = mission["ledger"].as_array().unwrap();
+    let ledger = mission["events"].as_array().unwrap();
     let parts: Vec<&Value> = ledger
         .iter()
         .filter_map(|e| e["parts"].as_array())

@@ -225,6 +225,7 @@ pub(super) enum EventsFormat {
     Text,
     Csv,
     Ndjson,
+    Json,
     Markdown,
 }
 

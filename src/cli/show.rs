@@ -45,6 +45,7 @@ pub(super) fn events(
         EventsFormat::Text => LogFormat::Text,
         EventsFormat::Csv => LogFormat::Csv,
         EventsFormat::Ndjson => LogFormat::Ndjson,
+        EventsFormat::Json => LogFormat::Json,
         EventsFormat::Markdown => LogFormat::Markdown,
     };
     match args.format {

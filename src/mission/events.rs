@@ -26,8 +26,10 @@ pub enum LogFormat {
     Text,
     /// A table with a head, times in nanoseconds since 1970.
     Csv,
-    /// An object per line, as in the ledger of an evolution.
+    /// An object per line, as in the `events` of a mission.
     Ndjson,
+    /// One object, schema `bagreel.events/2`, with these objects as a list.
+    Json,
     /// A table for a pull request or a report.
     Markdown,
 }
@@ -66,6 +68,12 @@ pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String 
         LogFormat::Text => String::new(),
         LogFormat::Csv => csv(mission, &rows),
         LogFormat::Ndjson => ndjson(mission, &rows),
+        LogFormat::Json => {
+            let rows = ndjson(mission, &rows);
+            let rows: Vec<&str> = rows.lines().collect();
+            let rows = rows.join(",\n");
+            format!("{{\"schema\": \"bagreel.events/2\", \"events\": [\n{rows}\n]}}\n")
+        }
         LogFormat::Markdown => markdown(mission, &with_switches(mission, rows)),
     }
 }

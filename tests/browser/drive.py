@@ -87,8 +87,8 @@ def compare_data(page, evolution):
 
 def headlines(evolution):
     """Per window, the entries that are told by themselves."""
-    parts = {part for e in evolution["ledger"] for part in e.get("parts", [])}
-    own = [e for e in evolution["ledger"] if not e["quiet"] and e["id"] not in parts]
+    parts = {part for e in evolution["events"] for part in e.get("parts", [])}
+    own = [e for e in evolution["events"] if not e["quiet"] and e["id"] not in parts]
     inside = lambda e, w: w["start_ns"] <= e["time_ns"] < w["end_ns"]
     return [[e for e in own if inside(e, w)] for w in evolution["windows"]]
 

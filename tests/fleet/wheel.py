@@ -80,10 +80,10 @@ def parts_make_the_whole():
 def missions_are_read():
     mission = bagreel.read(COURIER, period="10s")
     data = bagreel.to_dict(mission)
-    assert len(mission) == len(data["windows"]) > 2 and data["ledger"], mission
+    assert len(mission) == len(data["windows"]) > 2 and data["events"], mission
     tables = mission.tables()
     assert set(tables) == {"edges", "topics", "nodes", "changes", "ledger", "phases", "bags"}, tables
-    assert tables["ledger"].to_pyarrow().num_rows == len(data["ledger"])
+    assert tables["ledger"].to_pyarrow().num_rows == len(data["events"])
 
 
 def plans_name_every_bag():

@@ -1,11 +1,13 @@
-//! Nodes, topics and edges in JSON: in one window, or over the whole mission with their windows as columns. Each is one
-//! struct for writing and for reading; when read, everything except names is optional.
+//! Nodes, topics and edges in JSON: in one window, or over the whole mission, with their lives, stretches and, in the
+//! form of runs, their windows as columns. Each is one struct for writing and for reading; when read, everything except
+//! names is optional.
 
 use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
 use super::runs::JsonColumns;
+use super::sending::SendingJson;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{
@@ -14,6 +16,16 @@ use crate::graph::{
 
 /// A text, borrowed when written.
 pub(crate) type Text<'a> = Cow<'a, str>;
+
+/// An element over the whole mission.
+#[derive(Deserialize, Serialize)]
+#[serde(tag = "what", rename_all = "lowercase")]
+pub(crate) enum ElementJson<'a> {
+    Node(NodeJson<'a>),
+    Topic(TopicJson<'a>),
+    Publish(PublishJson<'a>),
+    Subscribe(PublishJson<'a>),
+}
 
 #[derive(Default, Deserialize, Serialize)]
 pub(crate) struct NodeJson<'a> {
@@ -33,13 +45,14 @@ pub(crate) struct NodeJson<'a> {
     pub(crate) columns: Option<Box<JsonColumns<'a>>>,
 }
 
-/// The times of an element, and the intervals in which it exists, in nanoseconds.
+/// The times of an element, and the intervals in which it exists, in nanoseconds. Windows leave out the intervals; up to
+/// schema 2 they were `runs` in each of them.
 #[derive(Default, Deserialize, Serialize)]
 pub(crate) struct LifeJson {
     pub(crate) first_ns: Option<i64>,
     pub(crate) last_ns: Option<i64>,
-    #[serde(default)]
-    pub(crate) runs: Vec<[i64; 2]>,
+    #[serde(default, alias = "runs", skip_serializing_if = "Vec::is_empty")]
+    pub(crate) lives: Vec<[i64; 2]>,
 }
 
 /// The numbers of a node in one window.
@@ -66,6 +79,10 @@ pub(crate) struct TopicJson<'a> {
     pub(crate) unknown_publishers: Option<u32>,
     #[serde(flatten)]
     pub(crate) life: LifeJson,
+    #[serde(flatten)]
+    pub(crate) sending: SendingJson,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) pauses: Vec<[i64; 2]>,
     #[serde(rename = "in", skip_serializing_if = "Option::is_none")]
     pub(crate) columns: Option<Box<JsonColumns<'a>>>,
 }
@@ -111,6 +128,8 @@ pub(crate) struct EdgeJson<'a> {
     pub(crate) numbers: Option<EdgeNumbers>,
     #[serde(flatten)]
     pub(crate) life: LifeJson,
+    #[serde(flatten)]
+    pub(crate) sending: SendingJson,
     #[serde(rename = "in", skip_serializing_if = "Option::is_none")]
     pub(crate) columns: Option<Box<JsonColumns<'a>>>,
 }
@@ -127,7 +146,7 @@ pub(crate) struct EdgeNumbers {
 }
 
 impl<'a> NodeJson<'a> {
-    /// A node, in the window that it has this state in.
+    /// A node in the window in which it has this state; in the whole mission without one.
     pub(crate) fn new(node: &'a Node, seen: Option<&'a NodeState>) -> Self {
         Self {
             name: node.name.as_str().into(),
@@ -135,7 +154,7 @@ impl<'a> NodeJson<'a> {
             state: seen.map(|s| s.state.word().into()),
             degree: seen.map(|s| s.degree.word().into()),
             evidence: words(node.evidence),
-            life: LifeJson::new(node.first, node.last, &node.runs),
+            life: LifeJson::new(node.first, node.last, lives(seen.is_some(), &node.runs)),
             numbers: seen.map(|s| NodeNumbers {
                 hz: s.hz,
                 lifecycle: s.lifecycle.as_deref().map(Text::from),
@@ -158,7 +177,7 @@ impl<'a> NodeJson<'a> {
 }
 
 impl<'a> TopicJson<'a> {
-    /// A topic, in the window that it has this state in.
+    /// A topic, as a node.
     pub(crate) fn new(topic: &'a Topic, seen: Option<&TopicState>) -> Self {
         Self {
             name: topic.name.as_str().into(),
@@ -176,7 +195,9 @@ impl<'a> TopicJson<'a> {
             }),
             qos: topic.qos.as_deref().map(Text::from),
             unknown_publishers: topic.unknown_publishers,
-            life: LifeJson::new(topic.first, topic.last, &topic.runs),
+            life: LifeJson::new(topic.first, topic.last, lives(seen.is_some(), &topic.runs)),
+            sending: SendingJson::default(),
+            pauses: Vec::new(),
             columns: None,
         }
     }
@@ -199,7 +220,7 @@ impl<'a> TopicJson<'a> {
 }
 
 impl<'a> PublishJson<'a> {
-    /// A publication, in the window that it has this state in.
+    /// A publication or subscription, as a node.
     pub(crate) fn new(edge: &'a Edge, elements: &'a Elements, seen: Option<&EdgeState>) -> Self {
         Self {
             node: elements.nodes[edge.node as usize].name.as_str().into(),
@@ -214,7 +235,8 @@ impl<'a> PublishJson<'a> {
                     bytes: s.bytes,
                     measures: s.measures,
                 }),
-                life: LifeJson::new(edge.first, edge.last, &edge.runs),
+                life: LifeJson::new(edge.first, edge.last, lives(seen.is_some(), &edge.runs)),
+                sending: SendingJson::default(),
                 columns: None,
             },
         }
@@ -244,13 +266,18 @@ impl EdgeJson<'_> {
 }
 
 impl LifeJson {
-    fn new(first: Option<Stamp>, last: Option<Stamp>, runs: &[Span]) -> Self {
+    fn new(first: Option<Stamp>, last: Option<Stamp>, lives: &[Span]) -> Self {
         Self {
             first_ns: first.map(|at| at.0),
             last_ns: last.map(|at| at.0),
-            runs: pairs(runs),
+            lives: pairs(lives),
         }
     }
+}
+
+/// The lives to write: none in a window.
+fn lives(is_window: bool, all: &[Span]) -> &[Span] {
+    if is_window { &[] } else { all }
 }
 
 pub(crate) fn words<'a>(evidence: Evidence) -> Vec<Text<'a>> {

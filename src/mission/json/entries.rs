@@ -75,6 +75,9 @@ pub(crate) struct EntryJson<'a> {
     evidence: Vec<Text<'a>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     parts: Vec<u32>,
+    /// The event that this one follows from: the one that lists it among its parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cause: Option<u32>,
     #[serde(default)]
     quiet: bool,
     weight: Option<u32>,
@@ -170,6 +173,7 @@ pub(crate) fn entries<'a>(
             degree: Some(entry.degree.word().into()),
             evidence: words(entry.evidence),
             parts: parts.get(&id).cloned().unwrap_or_default(),
+            cause: entry.part_of,
             quiet: entry.quiet,
             weight: Some(entry.weight),
         })

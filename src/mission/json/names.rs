@@ -117,7 +117,7 @@ fn learn(edge: &mut Edge, raw: &EdgeJson<'_>) {
     widen(&mut edge.first, &mut edge.last, &mut edge.runs, &raw.life);
 }
 
-/// Extends the lifetime of an element. The first intervals are kept: every window repeats all of them.
+/// Extends the lifetime of an element. The first intervals are kept: up to schema 2 every window repeats all of them.
 fn widen(
     first: &mut Option<Stamp>,
     last: &mut Option<Stamp>,
@@ -128,7 +128,7 @@ fn widen(
     *first = begins.into_iter().flatten().min();
     *last = (*last).max(life.last_ns.map(Stamp));
     if runs.is_empty() {
-        *runs = spans(&life.runs);
+        *runs = spans(&life.lives);
     }
 }
 

@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 pub(crate) use super::elements::{
-    EdgeJson, EdgeNumbers, LifeJson, NodeJson, NodeNumbers, PublishJson, SubscribeJson, Text,
-    TopicJson, TopicNumbers,
+    EdgeJson, EdgeNumbers, ElementJson, LifeJson, NodeJson, NodeNumbers, PublishJson,
+    SubscribeJson, Text, TopicJson, TopicNumbers,
 };
 use super::entries::{EntryJson, InterruptionRow, PhaseRow};
-use super::sending::SendingJson;
+use super::sending::OldSendingJson;
 use crate::mission::Places;
 
 #[derive(Default, Deserialize)]
@@ -22,6 +22,9 @@ pub(crate) struct Raw {
     pub(crate) step_ns: Option<i64>,
     pub(crate) windows: Vec<RawWindow>,
     #[serde(default)]
+    pub(crate) elements: Vec<ElementJson<'static>>,
+    // The elements up to schema 2, by kind.
+    #[serde(default)]
     pub(crate) nodes: Vec<NodeJson<'static>>,
     #[serde(default)]
     pub(crate) topics: Vec<TopicJson<'static>>,
@@ -29,8 +32,10 @@ pub(crate) struct Raw {
     pub(crate) publishes: Vec<PublishJson<'static>>,
     #[serde(default)]
     pub(crate) subscribes: Vec<PublishJson<'static>>,
-    pub(crate) sending: Option<SendingJson<'static>>,
+    pub(crate) sending: Option<OldSendingJson<'static>>,
     pub(crate) form: Option<String>,
+    pub(crate) events: Option<Vec<EntryJson<'static>>>,
+    /// The events up to schema 2.
     pub(crate) ledger: Option<Vec<EntryJson<'static>>>,
     #[serde(default)]
     pub(crate) interruptions: Vec<InterruptionRow>,

@@ -1,14 +1,15 @@
 //! Reads missions in JSON: our own, or a graph over time that another tool wrote with the same keys.
 //!
 //! Required are `schema`, the windows' times and the elements' names; other missing values are unknown, unknown keys
-//! are ignored. Changes are determined by the ledger; a mission without one is left for [`Mission::find_changes`].
+//! are ignored. Changes are determined by the events; a mission without any is left for [`Mission::find_changes`].
 
 use std::path::Path;
 
 use super::names::{Names, graph};
-use super::raw::{BagJson, NoticeJson, Raw, RawWindow};
+use super::raw::{BagJson, ElementJson, NoticeJson, Raw, RawWindow};
 use super::runs::JsonColumns;
-use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
+use super::sending::sending;
+use super::write::{OLD_SCHEMAS, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -29,15 +30,15 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
         hint: "`bagreel render BAG -o x.json` writes a mission".to_owned(),
     };
     let mut raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
-    if raw.schema != SCHEMA && raw.schema != OLD_SCHEMA {
+    if raw.schema != SCHEMA && !OLD_SCHEMAS.contains(&&*raw.schema) {
         return Err(bad(0, format!("schema `{}` is not `{SCHEMA}`", raw.schema)));
     }
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
-    let ledger = raw.ledger.take();
+    let events = raw.events.take().or(raw.ledger.take());
     let phases = super::entries::phases(std::mem::take(&mut raw.phases));
     let interruptions = super::entries::interruptions(&raw.interruptions);
     let mut mission = build(raw, &spans).map_err(|reason| bad(0, reason))?;
-    if let Some(rows) = ledger {
+    if let Some(rows) = events {
         let entries = super::entries::read(&rows, &mission.elements);
         let nothing = || {
             bad(
@@ -82,7 +83,15 @@ pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
     build(raw, &spans)
 }
 
-fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
+fn build(mut raw: Raw, spans: &[Span]) -> Result<Mission, String> {
+    for element in std::mem::take(&mut raw.elements) {
+        match element {
+            ElementJson::Node(node) => raw.nodes.push(node),
+            ElementJson::Topic(topic) => raw.topics.push(topic),
+            ElementJson::Publish(edge) => raw.publishes.push(edge),
+            ElementJson::Subscribe(edge) => raw.subscribes.push(edge),
+        }
+    }
     let mut names = Names::default();
     raw.windows.iter().for_each(|w| names.window(w));
     names.elements(&raw.nodes, &raw.topics, &raw.publishes);
@@ -145,7 +154,7 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         }),
         period,
         step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
-        sending: raw.sending.unwrap_or_default().sending(&elements)?,
+        sending: sending(raw.sending, &raw.topics, &raw.publishes, &elements)?,
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
@@ -266,6 +275,43 @@ mod tests {
             String::from_utf8(first).unwrap(),
             String::from_utf8(second).unwrap()
         );
+    }
+
+    #[test]
+    fn keys_of_schema_2_mean_the_same() {
+        let columns = r#""in": {"windows": [[0, 0]], "state": [["silent", 1]]}"#;
+        let event = r#"{"kind": "started", "what": "node", "name": "/a", "time_ns": 2}"#;
+        let both = r#""form": "runs", "windows": [{"start_ns": 0, "end_ns": 10}]"#;
+        let old = format!(
+            r#"{{"schema": "bagreel.evolution/2", {both}, "ledger": [{event}],
+            "nodes": [{{"name": "/a", "runs": [[2, 10]], {columns}}}],
+            "topics": [{{"name": "/t", {columns}}}],
+            "publishes": [{{"node": "/a", "topic": "/t", {columns}}}],
+            "sending": {{"senders": [{{"topic": "/t", "node": "/a", "latched": true, "stretches": [[2, 9, 8, 1, 1]]}}],
+                "pauses": [{{"topic": "/t", "spans": [[3, 5]]}}]}}}}"#
+        );
+        let new = format!(
+            r#"{{"schema": "bagreel.mission/3", {both}, "events": [{event}], "elements": [
+            {{"what": "node", "name": "/a", "lives": [[2, 10]], {columns}}},
+            {{"what": "topic", "name": "/t", "pauses": [[3, 5]], {columns}}},
+            {{"what": "publish", "node": "/a", "topic": "/t", "latched": true, "stretches": [[2, 9, 8, 1, 1]], {columns}}}]}}"#
+        );
+        let written = |text: &str| {
+            let mut bytes = Vec::new();
+            write_json(&read(text).unwrap(), &mut bytes).unwrap();
+            String::from_utf8(bytes).unwrap()
+        };
+        let read_anew = written(&new);
+        assert_eq!(written(&old), read_anew);
+        let compact: String = read_anew.split_whitespace().collect();
+        for kept in [
+            r#""lives":[[2,10]]"#,
+            r#""latched":true,"stretches":[[2,9,8,1,1]]"#,
+            r#""pauses":[[3,5]]"#,
+            r#""state":"silent""#,
+        ] {
+            assert!(compact.contains(kept), "{kept}: {read_anew}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! ```text
 //! "form": "runs",
 //! "windows": [{"index": 0, "start_ns": …, "end_ns": …, "messages": …, "changes": […]}, …],
-//! "topics": [{"name": "/scan", "types": […], …, "in": {"windows": [[0, 99], [120, 35999]],
+//! "elements": [{"what": "topic", "name": "/scan", "types": […], …, "in": {"windows": [[0, 99], [120, 35999]],
 //!   "state": [["active", 35979]], "degree": [["measured", 35979]], "count": [9, [10, 700], 11, …], …}}, …]
 //! ```
 //!

@@ -1,109 +1,133 @@
-//! The sending of a mission as JSON, so that phases and figures from a file equal those from its bag.
+//! The stretches of senders in JSON, so that phases and figures from a file equal those from its bag.
 //!
 //! ```text
-//! "sending": {"senders": [{"topic": "/scan", "node": "/lidar", "latched": false,
-//!     "stretches": [[first_ns, last_ns, messages, period_ns, flags], …]}, …],
-//!   "pauses": [{"topic": "/scan", "spans": [[from_ns, to_ns], …]}, …]}
+//! {"what": "publish", "node": "/lidar", "topic": "/scan", …, "latched": true,
+//!     "stretches": [[first_ns, last_ns, messages, period_ns, flags], …]}
+//! {"what": "topic", "name": "/scan", …, "stretches": […], "pauses": [[from_ns, to_ns], …]}
 //! ```
 //!
-//! `node` is `null` for all unknown senders together. Flags are 1 for messages at even intervals, plus 2 if the
-//! stretch begins where the previous one ends. `pauses` are the longest ones between two messages.
+//! The stretches of a topic are those of all unknown senders together. Flags are 1 for messages at even intervals, plus 2
+//! if the stretch begins where the previous one ends. `pauses` are the longest ones between two messages. Up to schema 2
+//! these were lists of their own, in `sending`.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{Text, pairs, spans};
+use super::elements::{PublishJson, Text, TopicJson, spans};
 use crate::base::time::Stamp;
-use crate::graph::Elements;
 use crate::graph::history::{Sender, Sending, Stretch};
-
-#[derive(Default, Deserialize, Serialize)]
-#[serde(default)]
-pub(crate) struct SendingJson<'a> {
-    senders: Vec<SenderJson<'a>>,
-    pauses: Vec<PausesJson<'a>>,
-}
+use crate::graph::{Elements, NodeId, TopicId};
 
 /// A stretch: first and last message, their number, the usual period, flags.
 type StretchJson = (i64, i64, u64, i64, u8);
 
-#[derive(Deserialize, Serialize)]
-struct SenderJson<'a> {
-    topic: Text<'a>,
-    node: Option<Text<'a>>,
-    #[serde(default)]
+/// The messages of a sender on a topic.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(default)]
+pub(crate) struct SendingJson {
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     latched: bool,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     stretches: Vec<StretchJson>,
 }
 
-#[derive(Deserialize, Serialize)]
+/// The sending of a mission up to schema 2.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct OldSendingJson<'a> {
+    senders: Vec<SenderJson<'a>>,
+    pauses: Vec<PausesJson<'a>>,
+}
+
+#[derive(Deserialize)]
+struct SenderJson<'a> {
+    topic: Text<'a>,
+    node: Option<Text<'a>>,
+    #[serde(flatten)]
+    sending: SendingJson,
+}
+
+#[derive(Deserialize)]
 struct PausesJson<'a> {
     topic: Text<'a>,
     spans: Vec<[i64; 2]>,
 }
 
-impl<'a> SendingJson<'a> {
-    pub(super) fn new(sending: &Sending, elements: &'a Elements) -> Self {
-        let topic = |id: u32| Text::from(elements.topics[id as usize].name.as_str());
-        let node = |id: u32| Text::from(elements.nodes[id as usize].name.as_str());
+/// The senders by topic and node; `None` stands for all unknown ones.
+pub(super) fn senders(sending: &Sending) -> BTreeMap<(TopicId, Option<NodeId>), &Sender> {
+    let senders = sending.senders.iter();
+    senders.map(|one| ((one.topic, one.node), one)).collect()
+}
+
+impl From<Option<&Sender>> for SendingJson {
+    fn from(sender: Option<&Sender>) -> Self {
         let stretch = |s: &Stretch| {
             let flags = u8::from(s.is_even) + 2 * u8::from(s.is_joined);
             (s.first.0, s.last.0, s.count, s.period, flags)
         };
-        let senders = sending.senders.iter().map(|sender| SenderJson {
-            topic: topic(sender.topic),
-            node: sender.node.map(node),
+        sender.map_or_else(Self::default, |sender| Self {
             latched: sender.is_latched,
             stretches: sender.stretches.iter().map(stretch).collect(),
-        });
-        let pauses = (0..).zip(&sending.pauses).map(|(id, spans)| PausesJson {
-            topic: topic(id),
-            spans: pairs(spans),
-        });
-        Self {
-            senders: senders.collect(),
-            pauses: pauses.collect(),
-        }
-    }
-
-    /// The sending of a mission with these names. Senders and topics that are in no window are ignored.
-    ///
-    /// # Errors
-    /// The mistake in the stretches.
-    pub(super) fn sending(self, elements: &Elements) -> Result<Sending, String> {
-        let mut all: BTreeMap<(u32, Option<u32>), Sender> = BTreeMap::new();
-        for raw in self.senders {
-            let node = raw.node.as_deref().map(|name| elements.node(name));
-            let (Some(topic), None | Some(Some(_))) = (elements.topic(&raw.topic), node) else {
-                continue;
-            };
-            let stretches: Vec<Stretch> = raw.stretches.into_iter().map(stretch).collect();
-            let is_whole = |s: &Stretch| s.first <= s.last && s.count > 0 && s.period >= 0;
-            let ascend = |pair: &[Stretch]| pair[0].last <= pair[1].first;
-            if !stretches.iter().all(is_whole) || !stretches.windows(2).all(ascend) {
-                return Err(format!("the stretches of `{}` do not ascend", raw.topic));
-            }
-            let sender = Sender {
-                topic,
-                node: node.flatten(),
-                is_latched: raw.latched,
-                stretches,
-            };
-            all.insert((topic, sender.node), sender);
-        }
-        let mut pauses = Vec::new();
-        for raw in self.pauses {
-            if let Some(topic) = elements.topic(&raw.topic) {
-                pauses.resize(elements.topics.len(), Vec::new());
-                pauses[topic as usize] = spans(&raw.spans);
-            }
-        }
-        Ok(Sending {
-            senders: all.into_values().collect(),
-            pauses,
         })
     }
+}
+
+/// The sending of a mission with these names. Senders and topics that are in no window are ignored.
+///
+/// # Errors
+/// The mistake in the stretches.
+pub(super) fn sending(
+    old: Option<OldSendingJson<'_>>,
+    topics: &[TopicJson<'_>],
+    publishes: &[PublishJson<'_>],
+    elements: &Elements,
+) -> Result<Sending, String> {
+    let old = old.unwrap_or_default();
+    let unnamed = topics.iter().map(|one| (&one.name, None, &one.sending));
+    let named = publishes
+        .iter()
+        .map(|one| (&one.topic, Some(&one.node), &one.edge.sending));
+    let earlier = old
+        .senders
+        .iter()
+        .map(|one| (&one.topic, one.node.as_ref(), &one.sending));
+    let mut all: BTreeMap<(TopicId, Option<NodeId>), Sender> = BTreeMap::new();
+    for (name, node, sent) in unnamed.chain(named).chain(earlier) {
+        let node = node.map(|name| elements.node(name));
+        let (Some(topic), None | Some(Some(_))) = (elements.topic(name), node) else {
+            continue;
+        };
+        if sent.stretches.is_empty() {
+            continue;
+        }
+        let stretches: Vec<Stretch> = sent.stretches.iter().copied().map(stretch).collect();
+        let is_whole = |s: &Stretch| s.first <= s.last && s.count > 0 && s.period >= 0;
+        let ascend = |pair: &[Stretch]| pair[0].last <= pair[1].first;
+        if !stretches.iter().all(is_whole) || !stretches.windows(2).all(ascend) {
+            return Err(format!("the stretches of `{name}` do not ascend"));
+        }
+        let sender = Sender {
+            topic,
+            node: node.flatten(),
+            is_latched: sent.latched,
+            stretches,
+        };
+        all.insert((topic, sender.node), sender);
+    }
+    let mut pauses = Vec::new();
+    let own = topics.iter().filter(|one| !one.pauses.is_empty());
+    let own = own.map(|one| (&one.name, &one.pauses));
+    for (name, found) in own.chain(old.pauses.iter().map(|one| (&one.topic, &one.spans))) {
+        if let Some(topic) = elements.topic(name) {
+            pauses.resize(elements.topics.len(), Vec::new());
+            pauses[topic as usize] = spans(found);
+        }
+    }
+    Ok(Sending {
+        senders: all.into_values().collect(),
+        pauses,
+    })
 }
 
 fn stretch((first, last, count, period, flags): StretchJson) -> Stretch {

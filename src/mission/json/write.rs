@@ -1,4 +1,4 @@
-//! Writes a mission as JSON, schema `bagreel.evolution/2`, window by window without a second copy in memory.
+//! Writes a mission as JSON, schema `bagreel.mission/3`, window by window without a second copy in memory.
 
 use std::io::{BufWriter, Write};
 
@@ -6,20 +6,20 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
 use super::changes::ChangeRow;
-use super::elements::Text;
+use super::elements::{ElementJson, Text, pairs};
 use super::entries::{InterruptionRow, PhaseRow, entries};
 use super::lines::LineFormatter;
 use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, TopicJson};
 use super::runs::JsonColumns;
-use super::sending::SendingJson;
+use super::sending::{SendingJson, senders};
 use crate::bag::Report;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
 use crate::mission::{Mission, Places, Window};
 
 /// The schema that is written and read.
-pub(crate) const SCHEMA: &str = "bagreel.evolution/2";
-/// The schema without a ledger, which is still read.
-pub(crate) const OLD_SCHEMA: &str = "bagreel.evolution/1";
+pub(crate) const SCHEMA: &str = "bagreel.mission/3";
+/// Earlier schemas, which are still read: without events, and without a list of elements.
+pub(crate) const OLD_SCHEMAS: [&str; 2] = ["bagreel.evolution/1", "bagreel.evolution/2"];
 
 /// Writes the whole mission as JSON, ending in a new line. Lists are sorted by name, times are nanoseconds since 1970,
 /// unknown values are `null`.
@@ -103,7 +103,10 @@ impl Serialize for Json<'_> {
         map.serialize_entry("messages", &mission.messages)?;
         map.serialize_entry("period_ns", &mission.period.nanos())?;
         map.serialize_entry("step_ns", &mission.step.nanos())?;
-        map.serialize_entry("ledger", &List(entries(&mission.ledger, &mission.elements)))?;
+        // Under its old key, too, for one release.
+        for key in ["events", "ledger"] {
+            map.serialize_entry(key, &List(entries(&mission.ledger, &mission.elements)))?;
+        }
         if !mission.ledger.interruptions.is_empty() {
             let all = mission.ledger.interruptions.iter();
             map.serialize_entry("interruptions", &List(all.map(InterruptionRow::from)))?;
@@ -116,16 +119,16 @@ impl Serialize for Json<'_> {
             graph,
             elements: all,
         };
+        let elements = elements(mission, self.is_runs());
+        map.serialize_entry("elements", &List(elements))?;
         if self.is_runs() {
             let windows = mission.windows.iter().map(|w| window((w, None)));
             map.serialize_entry("windows", &List(windows))?;
-            elements(mission, &mut map)?;
         } else {
             let windows = mission.windows.iter();
             let windows = windows.zip(mission.graphs.iter().map(Some)).map(window);
             map.serialize_entry("windows", &List(windows))?;
         }
-        map.serialize_entry("sending", &SendingJson::new(&mission.sending, all))?;
         if let Some(places) = places {
             map.serialize_entry("layout", places)?;
         }
@@ -200,29 +203,41 @@ impl<'a> Serialize for WindowOf<'a> {
     }
 }
 
-/// Writes the lists of all elements, each with its windows as columns, into the map of the mission.
-fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Result<(), M::Error> {
-    let all = &mission.elements;
-    let columns = |what| Some(Box::new(JsonColumns::of(&mission.graphs, what)));
-    let nodes = (0..).zip(&all.nodes).map(|(id, node)| NodeJson {
-        columns: columns(Element::Node(id)),
-        ..NodeJson::new(node, None)
-    });
-    map.serialize_entry("nodes", &List(nodes))?;
-    let topics = (0..).zip(&all.topics).map(|(id, topic)| TopicJson {
-        columns: columns(Element::Topic(id)),
-        ..TopicJson::new(topic, None)
-    });
-    map.serialize_entry("topics", &List(topics))?;
-    let edge = |(what, edge)| {
+/// All elements over the whole mission, with their windows as columns if these are wanted.
+fn elements(mission: &Mission, is_runs: bool) -> impl Iterator<Item = ElementJson<'_>> + Clone {
+    let (all, senders) = (&mission.elements, senders(&mission.sending));
+    let columns = move |what| is_runs.then(|| Box::new(JsonColumns::of(&mission.graphs, what)));
+    let sent = move |topic, node| senders.get(&(topic, node)).copied().into();
+    let edge = move |what, edge, sending| {
         let mut json = PublishJson::new(edge, all, None);
         json.edge.columns = columns(what);
+        json.edge.sending = sending;
         json
     };
-    let publishes = (0..).map(Element::Publish).zip(&all.publishes);
-    map.serialize_entry("publishes", &List(publishes.map(edge)))?;
-    let subscribes = (0..).map(Element::Subscribe).zip(&all.subscribes);
-    map.serialize_entry("subscribes", &List(subscribes.map(edge)))
+    let nodes = (0..).zip(&all.nodes).map(move |(id, node)| {
+        ElementJson::Node(NodeJson {
+            columns: columns(Element::Node(id)),
+            ..NodeJson::new(node, None)
+        })
+    });
+    let unnamed = sent.clone();
+    let topics = (0..).zip(&all.topics).map(move |(id, topic)| {
+        let pauses = mission.sending.pauses.get(id as usize);
+        ElementJson::Topic(TopicJson {
+            columns: columns(Element::Topic(id)),
+            sending: unnamed(id, None),
+            pauses: pauses.map_or_else(Vec::new, |spans| pairs(spans)),
+            ..TopicJson::new(topic, None)
+        })
+    });
+    let publishes = (0..).zip(&all.publishes).map(move |(id, one)| {
+        let sending = sent(one.topic, Some(one.node));
+        ElementJson::Publish(edge(Element::Publish(id), one, sending))
+    });
+    let subscribes = (0..).zip(&all.subscribes).map(move |(id, one)| {
+        ElementJson::Subscribe(edge(Element::Subscribe(id), one, SendingJson::default()))
+    });
+    nodes.chain(topics).chain(publishes).chain(subscribes)
 }
 
 fn head<M: SerializeMap>(window: &Window, map: &mut M) -> Result<(), M::Error> {

@@ -190,7 +190,7 @@ impl WindowLife {
         LifeJson {
             first_ns: self.first.map(|at| at.0),
             last_ns: self.last.map(|at| at.0),
-            runs: Vec::new(),
+            lives: Vec::new(),
         }
     }
 
@@ -281,7 +281,7 @@ fn window(
                     ..EdgeNumbers::default()
                 }),
                 life: life.json(),
-                columns: None,
+                ..EdgeJson::default()
             },
         }
     });
