@@ -124,6 +124,10 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "export/tables",
         ],
     ),
+    // Widths of texts, and the outlines and names of fonts in a PDF.
+    ("skrifa", &["draw/text", "draw/paint/pdf"]),
+    // What browsers and PDF readers unpack.
+    ("flate2", &["draw/paint/pdf", "export/html"]),
     // Reads bags, writes the graph.
     ("mcap", &["bag/mcap", "export/mcap"]),
     // Launch files, and the answers of a ROS master.

@@ -82,7 +82,7 @@ pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String 
 pub(crate) fn headlines(mission: &Mission, format: LogFormat) -> Vec<LogRow<'_>> {
     let rows = chosen(mission, LogOptions::default());
     match format {
-        LogFormat::Csv | LogFormat::Ndjson => rows,
+        LogFormat::Csv | LogFormat::Ndjson | LogFormat::Json => rows,
         LogFormat::Text | LogFormat::Markdown => with_switches(mission, rows),
     }
 }

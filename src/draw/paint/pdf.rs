@@ -1,19 +1,16 @@
 //! Scenes as the pages of one PDF: vectors, text as text, each font embedded once.
 
-use harfrust::{Direction, FontRef, ShapeOptions, ShaperData, UnicodeBuffer};
-use krilla::color::rgb;
-use krilla::configure::{ConfigurationBuilder, PdfVersion};
-use krilla::destination::XyzDestination;
-use krilla::geom::{self, PathBuilder, Transform};
-use krilla::metadata::Metadata;
-use krilla::num::NormalizedF32;
-use krilla::outline::{Outline, OutlineNode};
-use krilla::page::PageSettings;
-use krilla::paint::{Fill, LineCap, LineJoin, Stroke, StrokeDash};
-use krilla::surface::Surface;
-use krilla::text::{Font, GlyphId, KrillaGlyph};
-use krilla::{Document, SerializeSettings};
+mod font;
 
+use std::io::Write as _;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use pdf_writer::types::{LineCapStyle, LineJoinStyle};
+use pdf_writer::writers::Resources;
+use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect as PdfRect, Ref, TextStr};
+
+use self::font::PdfFont;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{self, Form, Group, Piece, Scene, Shape, Step, Text};
 use crate::draw::style::Color;
@@ -25,6 +22,7 @@ const PT_PER_PX: f64 = 0.75;
 const PT_PER_MM: f64 = 72.0 / 25.4;
 /// The distance of the controls of a quarter of a circle from its ends, in radii.
 const QUARTER: f64 = 0.552_284_75;
+
 /// A page and its entry in the outline.
 pub(crate) struct PdfPage {
     /// The drawing on the page.
@@ -36,175 +34,262 @@ pub(crate) struct PdfPage {
 /// The document as a file's bytes. Pages are drawn as they come, so that only their vectors are held.
 ///
 /// # Errors
-/// The reason for which the writer of PDF refuses it, in its own words.
+/// The reason for which a font cannot be embedded.
 pub(crate) fn write(
-    sheets: impl Iterator<Item = PdfPage>,
+    pages: impl Iterator<Item = PdfPage>,
     fonts: &Fonts,
 ) -> std::result::Result<Vec<u8>, String> {
-    // What every TeX takes as a figure.
-    let version = ConfigurationBuilder::new().with_version(PdfVersion::Pdf15);
-    let mut document = Document::new_with(SerializeSettings {
-        configuration: version.finish().map_err(|e| format!("{e:?}"))?,
-        ..SerializeSettings::default()
-    });
-    let faces = fonts.files().map(PdfFace::read).collect();
-    let pen = PdfPen { fonts, faces };
-    let mut outline = Outline::new();
+    let faces = fonts.files().map(PdfFont::read).collect();
+    let mut pen = PdfPen { fonts, faces };
     let mut title = None;
-    for (place, sheet) in sheets.enumerate() {
-        let scene = &sheet.scene;
-        let per_px = match scene.width_mm {
-            Some(mm) => mm * PT_PER_MM / scene.size.w.max(1.0),
-            None => PT_PER_PX,
-        };
-        let size = geom::Size::from_wh(f(scene.size.w * per_px), f(scene.size.h * per_px));
-        let size = size.ok_or("a page without a size")?;
-        let mut page = document.start_page_with(PageSettings::new(size));
-        let mut surface = page.surface();
-        surface.push_transform(&Transform::from_scale(f(per_px), f(per_px)));
-        pen.page(&mut surface, scene);
-        surface.pop();
-        surface.finish();
-        page.finish();
-        let top = XyzDestination::new(place, geom::Point::from_xy(0.0, 0.0));
-        outline.push_child(OutlineNode::new(sheet.entry, top));
-        title.get_or_insert(sheet.scene.title);
+    let mut drawn = Vec::new();
+    for page in pages {
+        drawn.push(pen.page(&page.scene, page.entry));
+        title.get_or_insert(page.scene.title);
     }
-    document.set_outline(outline);
-    let metadata = Metadata::new()
-        .creator("bagreel".to_owned())
-        .language("en".to_owned());
-    document.set_metadata(metadata.title(title.unwrap_or_default()));
-    document.finish().map_err(|e| e.to_string())
+    let mut file = PdfFile {
+        pdf: Pdf::new(),
+        last: 0,
+    };
+    // What every TeX takes as a figure.
+    file.pdf.set_version(1, 5);
+    let [catalog, tree, outline, info] = file.ids();
+    let mut used = Vec::new();
+    for (place, face) in pen.faces.iter().enumerate() {
+        if let Some(face) = face.as_ref().filter(|face| face.is_used()) {
+            let ids: [Ref; 5] = file.ids();
+            face.write(&mut file.pdf, ids[0])?;
+            used.push((name('F', place), ids[0]));
+        }
+    }
+    let pages: Vec<Ref> = drawn
+        .iter()
+        .map(|page| file.page(page, tree, &used))
+        .collect();
+    let count = i32::try_from(pages.len()).unwrap_or(i32::MAX);
+    file.pdf
+        .pages(tree)
+        .kids(pages.iter().copied())
+        .count(count);
+    file.outline(outline, &drawn, &pages);
+    file.pdf
+        .catalog(catalog)
+        .pages(tree)
+        .outlines(outline)
+        .lang(TextStr("en"));
+    file.pdf
+        .document_info(info)
+        .title(TextStr(&title.unwrap_or_default()))
+        .creator(TextStr("bagreel"));
+    Ok(file.pdf.finish())
 }
 
-/// A length for krilla.
+/// A drawn page.
+struct DrawnPage {
+    /// Its width and height in points.
+    size: (f32, f32),
+    /// The size of its scene in pixels.
+    scene: PdfRect,
+    content: Vec<u8>,
+    /// The groups that are drawn faded, each with its opacity.
+    faded: Vec<(f32, Vec<u8>)>,
+    entry: String,
+}
+
+/// A document that is being written.
+struct PdfFile {
+    pdf: Pdf,
+    last: i32,
+}
+
+impl PdfFile {
+    fn ids<const N: usize>(&mut self) -> [Ref; N] {
+        std::array::from_fn(|_| {
+            self.last += 1;
+            Ref::new(self.last)
+        })
+    }
+
+    fn page(&mut self, drawn: &DrawnPage, tree: Ref, fonts: &[(String, Ref)]) -> Ref {
+        let [id, content] = self.ids();
+        let faded: Vec<[Ref; 2]> = drawn.faded.iter().map(|_| self.ids()).collect();
+        let pdf = &mut self.pdf;
+        let mut page = pdf.page(id);
+        page.parent(tree)
+            .media_box(PdfRect::new(0.0, 0.0, drawn.size.0, drawn.size.1))
+            .contents(content);
+        if !faded.is_empty() {
+            let mut group = page.group();
+            group.transparency().isolated(true);
+            group.color_space().device_rgb();
+        }
+        let mut resources = page.resources();
+        add_fonts(&mut resources, fonts);
+        let mut all = resources.x_objects();
+        for (place, [form, _]) in faded.iter().enumerate() {
+            all.pair(Name(name('X', place).as_bytes()), *form);
+        }
+        all.finish();
+        let mut all = resources.ext_g_states();
+        for (place, [_, state]) in faded.iter().enumerate() {
+            all.pair(Name(name('G', place).as_bytes()), *state);
+        }
+        all.finish();
+        resources.finish();
+        page.finish();
+        pdf.stream(content, &drawn.content)
+            .filter(Filter::FlateDecode);
+        for ([form, state], (opacity, content)) in faded.iter().zip(&drawn.faded) {
+            let mut form = pdf.form_xobject(*form, content);
+            form.filter(Filter::FlateDecode);
+            form.bbox(drawn.scene);
+            form.group().transparency();
+            add_fonts(&mut form.resources(), fonts);
+            form.finish();
+            pdf.ext_graphics(*state)
+                .stroking_alpha(*opacity)
+                .non_stroking_alpha(*opacity);
+        }
+        id
+    }
+
+    /// An entry per page.
+    fn outline(&mut self, id: Ref, drawn: &[DrawnPage], pages: &[Ref]) {
+        let entries: Vec<[Ref; 1]> = pages.iter().map(|_| self.ids()).collect();
+        let mut outline = self.pdf.outline(id);
+        if let (Some([first]), Some([last])) = (entries.first(), entries.last()) {
+            let count = i32::try_from(entries.len()).unwrap_or(i32::MAX);
+            outline.first(*first).last(*last).count(count);
+        }
+        outline.finish();
+        for (place, (page, [entry])) in drawn.iter().zip(&entries).enumerate() {
+            let mut item = self.pdf.outline_item(*entry);
+            item.parent(id).title(TextStr(&page.entry));
+            if let Some([before]) = place.checked_sub(1).and_then(|at| entries.get(at)) {
+                item.prev(*before);
+            }
+            if let Some([after]) = entries.get(place + 1) {
+                item.next(*after);
+            }
+            if let Some(target) = pages.get(place) {
+                item.dest().page(*target).xyz(0.0, page.size.1, None);
+            }
+        }
+    }
+}
+
+fn add_fonts(resources: &mut Resources<'_>, fonts: &[(String, Ref)]) {
+    let mut all = resources.fonts();
+    for (name, font) in fonts {
+        all.pair(Name(name.as_bytes()), *font);
+    }
+}
+
+/// The name of a resource.
+fn name(kind: char, place: usize) -> String {
+    format!("{kind}{place}")
+}
+
+/// Bytes as `FlateDecode` reads them.
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut all = ZlibEncoder::new(Vec::new(), Compression::default());
+    // Writing to memory does not fail.
+    let _ = all.write_all(bytes);
+    all.finish().unwrap_or_default()
+}
+
+/// A length on a page.
 #[expect(clippy::cast_possible_truncation, reason = "lengths on a page")]
 fn f(length: f64) -> f32 {
     length as f32
 }
 
-fn point(p: Point) -> geom::Point {
-    geom::Point::from_xy(f(p.x), f(p.y))
-}
-
-/// The pen that draws scenes on a page.
+/// The pen that draws scenes on pages.
 struct PdfPen<'a> {
     fonts: &'a Fonts,
     /// The fonts in the order of [`Fonts::files`]; `None` for one that cannot be read.
-    faces: Vec<Option<PdfFace<'a>>>,
-}
-
-/// A font as the document embeds it and as its text is shaped.
-struct PdfFace<'a> {
-    embedded: Font,
-    font: FontRef<'a>,
-    shaper: ShaperData,
-}
-
-impl<'a> PdfFace<'a> {
-    fn read(file: &'a [u8]) -> Option<Self> {
-        let embedded = Font::new(file.to_vec().into(), 0)?;
-        let font = FontRef::from_index(file, 0).ok()?;
-        let shaper = ShaperData::new(&font);
-        Some(Self {
-            embedded,
-            font,
-            shaper,
-        })
-    }
-
-    /// The glyphs of a text from left to right, in em.
-    fn shape(&self, text: &str) -> Vec<KrillaGlyph> {
-        let mut buffer = UnicodeBuffer::new();
-        buffer.push_str(text);
-        buffer.guess_segment_properties();
-        buffer.set_direction(Direction::LeftToRight);
-        let shaper = self.shaper.shaper(&self.font).build();
-        let out = shaper.shape(buffer, ShapeOptions::new());
-        let em = self.embedded.units_per_em();
-        let (infos, positions) = (out.glyph_infos(), out.glyph_positions());
-        let glyphs = infos
-            .iter()
-            .zip(positions)
-            .enumerate()
-            .map(|(at, (info, to))| {
-                let later = infos[at..].iter().find(|next| next.cluster > info.cluster);
-                let end = later.map_or(text.len(), |next| next.cluster as usize);
-                KrillaGlyph::new(
-                    GlyphId::new(info.glyph_id),
-                    to.x_advance as f32 / em,
-                    to.x_offset as f32 / em,
-                    to.y_offset as f32 / em,
-                    to.y_advance as f32 / em,
-                    info.cluster as usize..end,
-                    None,
-                )
-            });
-        glyphs.collect()
-    }
+    faces: Vec<Option<PdfFont<'a>>>,
 }
 
 impl PdfPen<'_> {
-    fn page(&self, surface: &mut Surface<'_>, scene: &Scene) {
+    fn page(&mut self, scene: &Scene, entry: String) -> DrawnPage {
+        let per_px = match scene.width_mm {
+            Some(mm) => mm * PT_PER_MM / scene.size.w.max(1.0),
+            None => PT_PER_PX,
+        };
+        let size = (f(scene.size.w * per_px), f(scene.size.h * per_px));
+        let mut content = Content::new();
+        let (mut faded, scale) = (Vec::new(), f(per_px));
+        content.transform([scale, 0.0, 0.0, -scale, 0.0, size.1]);
         let all = Rect::new(0.0, 0.0, scene.size.w, scene.size.h);
-        shape(
-            surface,
-            &Shape::filled(Form::Rect(all, 0.0), scene.background),
-        );
+        let ground = Shape::filled(Form::Rect(all, 0.0), scene.background);
+        shape(&mut content, &ground);
         for group in &scene.groups {
-            let faded = group.fade.0 < 1.0;
-            if faded {
-                surface.push_opacity(opacity(group.fade.0));
+            if group.fade.0 >= 1.0 {
+                self.group(&mut content, group);
+                continue;
             }
-            self.group(surface, group);
-            if faded {
-                surface.pop();
-            }
+            let mut own = Content::new();
+            self.group(&mut own, group);
+            content
+                .save_state()
+                .set_parameters(Name(name('G', faded.len()).as_bytes()))
+                .x_object(Name(name('X', faded.len()).as_bytes()))
+                .restore_state();
+            faded.push((f(group.fade.0.clamp(0.0, 1.0)), packed(&own.finish())));
+        }
+        DrawnPage {
+            size,
+            scene: PdfRect::new(0.0, 0.0, f(scene.size.w), f(scene.size.h)),
+            content: packed(&content.finish()),
+            faded,
+            entry,
         }
     }
 
-    fn group(&self, surface: &mut Surface<'_>, group: &Group) {
+    fn group(&mut self, content: &mut Content, group: &Group) {
         for piece in &group.pieces {
             match piece {
-                Piece::Shape(piece) => shape(surface, piece),
-                Piece::Text(text) => self.text(surface, text),
+                Piece::Shape(piece) => shape(content, piece),
+                Piece::Text(text) => self.text(content, text),
             }
         }
     }
 
-    fn text(&self, surface: &mut Surface<'_>, text: &Text) {
+    fn text(&mut self, content: &mut Content, text: &Text) {
         let width = self.fonts.width(&text.text, text.size, text.weight);
         let start = Point::new(text.at.x - text.anchor.before(width), text.at.y);
+        content.save_state();
         if let Some((color, width)) = text.halo {
-            // As an outline, so that the words are found once and not twice.
-            surface.set_fill(None);
             let halo = scene::Stroke::solid(color, width);
-            surface.set_stroke(stroke(&halo, LineJoin::Round));
-            self.words(surface, text, start, true);
+            if stroke(content, &halo, LineJoinStyle::RoundJoin) {
+                // As an outline, so that the words are found once and not twice.
+                self.words(content, text, start, true);
+                content.stroke();
+            }
         }
-        surface.set_stroke(None);
-        surface.set_fill(fill(text.color));
-        self.words(surface, text, start, false);
+        if fill(content, text.color) {
+            self.words(content, text, start, false);
+        }
+        content.restore_state();
     }
 
     /// Writes a text, piece by piece where its characters are in several fonts.
-    fn words(&self, surface: &mut Surface<'_>, text: &Text, start: Point, outlined: bool) {
+    fn words(&mut self, content: &mut Content, text: &Text, start: Point, outlined: bool) {
         let mut at = start;
         let mut rest = text.text.as_str();
         while let Some(first) = rest.chars().next() {
             let file = self.fonts.file_of(first, text.weight);
             let other = |c: char| self.fonts.file_of(c, text.weight) != file;
             let (run, after) = rest.split_at(rest.find(other).unwrap_or(rest.len()));
-            if let Some(Some(face)) = self.faces.get(file) {
-                surface.draw_glyphs(
-                    point(at),
-                    &face.shape(run),
-                    face.embedded.clone(),
-                    run,
-                    f(text.size),
-                    outlined,
-                );
+            let (place, size) = ((f(at.x), f(at.y)), f(text.size));
+            match self.faces.get_mut(file) {
+                Some(Some(face)) if outlined => face.outline(content, run, place, size),
+                Some(Some(face)) => {
+                    let name = name('F', file);
+                    face.show(content, Name(name.as_bytes()), run, place, size);
+                }
+                _ => {}
             }
             at.x += self.fonts.width(run, text.size, text.weight);
             rest = after;
@@ -212,75 +297,80 @@ impl PdfPen<'_> {
     }
 }
 
-fn opacity(value: f64) -> NormalizedF32 {
-    NormalizedF32::new(f(value.clamp(0.0, 1.0))).unwrap_or(NormalizedF32::ONE)
+/// Sets what areas are filled with; whether there is something.
+fn fill(content: &mut Content, color: Color) -> bool {
+    let Some([r, g, b]) = color.rgb().map(shares) else {
+        return false;
+    };
+    content.set_fill_rgb(r, g, b);
+    true
 }
 
-fn fill(color: Color) -> Option<Fill> {
-    let [r, g, b] = color.rgb()?;
-    Some(Fill {
-        paint: rgb::Color::new(r, g, b).into(),
-        ..Fill::default()
-    })
+/// Red, green and blue from 0 to 1.
+fn shares(rgb: [u8; 3]) -> [f32; 3] {
+    rgb.map(|value| f32::from(value) / 255.0)
 }
 
-fn stroke(stroke: &scene::Stroke, line_join: LineJoin) -> Option<Stroke> {
-    let [r, g, b] = stroke.color.rgb().filter(|_| stroke.width > 0.0)?;
-    let dashed = stroke.dash.iter().any(|d| *d > 0.0);
-    // SVG repeats an odd number of dashes to make it even; PDF does the same by itself.
-    let dash = dashed.then(|| StrokeDash {
-        array: stroke.dash.iter().map(|d| f(*d)).collect(),
-        offset: 0.0,
-    });
-    let round = dashed && stroke.is_round();
-    Some(Stroke {
-        paint: rgb::Color::new(r, g, b).into(),
-        width: f(stroke.width),
-        line_cap: if round { LineCap::Round } else { LineCap::Butt },
-        line_join,
-        // As SVG has it.
-        miter_limit: 4.0,
-        dash,
-        ..Stroke::default()
-    })
-}
-
-fn shape(surface: &mut Surface<'_>, shape: &Shape) {
-    let (fill, stroke) = (fill(shape.fill), stroke(&shape.stroke, LineJoin::Miter));
-    if fill.is_none() && stroke.is_none() {
-        return;
+/// Sets the line that paths are drawn with; whether there is one.
+fn stroke(content: &mut Content, stroke: &scene::Stroke, join: LineJoinStyle) -> bool {
+    let rgb = stroke.color.rgb().filter(|_| stroke.width > 0.0);
+    let Some([r, g, b]) = rgb.map(shares) else {
+        return false;
+    };
+    // As SVG has it.
+    let miter_limit = 4.0;
+    content
+        .set_stroke_rgb(r, g, b)
+        .set_line_width(f(stroke.width))
+        .set_line_join(join)
+        .set_miter_limit(miter_limit);
+    if stroke.dash.iter().any(|d| *d > 0.0) {
+        // SVG repeats an odd number of dashes to make it even; PDF does the same by itself.
+        content.set_dash_pattern(stroke.dash.iter().map(|d| f(*d)), 0.0);
+        if stroke.is_round() {
+            content.set_line_cap(LineCapStyle::RoundCap);
+        }
     }
-    if let Some(path) = path(&shape.form) {
-        surface.set_fill(fill);
-        surface.set_stroke(stroke);
-        surface.draw_path(&path);
-    }
+    true
 }
 
-fn path(form: &Form) -> Option<geom::Path> {
-    let mut path = PathBuilder::new();
+fn shape(content: &mut Content, shape: &Shape) {
+    content.save_state();
+    let filled = fill(content, shape.fill);
+    let lined = stroke(content, &shape.stroke, LineJoinStyle::MiterJoin);
+    if (filled || lined) && path(content, &shape.form) {
+        match (filled, lined) {
+            (true, true) => content.fill_nonzero_and_stroke(),
+            (true, false) => content.fill_nonzero(),
+            _ => content.stroke(),
+        };
+    }
+    content.restore_state();
+}
+
+/// Adds a path; whether there is one.
+fn path(content: &mut Content, form: &Form) -> bool {
     match form {
         Form::Rect(rect, radius) => {
             let most = rect.w.min(rect.h) / 2.0;
-            rounded(&mut path, *rect, radius.min(most), radius.min(most));
+            rounded(content, *rect, radius.min(most), radius.min(most));
         }
-        Form::Ellipse(rect) => rounded(&mut path, *rect, rect.w / 2.0, rect.h / 2.0),
-        Form::Path(steps) => steps.iter().for_each(|step| add(&mut path, *step)),
+        Form::Ellipse(rect) => rounded(content, *rect, rect.w / 2.0, rect.h / 2.0),
+        Form::Path(steps) => steps.iter().for_each(|step| add(content, *step)),
     }
-    path.finish()
+    !matches!(form, Form::Path(steps) if steps.is_empty())
 }
 
-fn add(path: &mut PathBuilder, step: Step) {
+fn add(content: &mut Content, step: Step) {
     match step {
-        Step::Move(p) => path.move_to(f(p.x), f(p.y)),
-        Step::Line(p) => path.line_to(f(p.x), f(p.y)),
-        Step::Curve([a, b, p]) => path.cubic_to(f(a.x), f(a.y), f(b.x), f(b.y), f(p.x), f(p.y)),
-        Step::Close => path.close(),
-    }
+        Step::Move(p) => content.move_to(f(p.x), f(p.y)),
+        Step::Line(p) => content.line_to(f(p.x), f(p.y)),
+        Step::Curve([a, b, p]) => content.cubic_to(f(a.x), f(a.y), f(b.x), f(b.y), f(p.x), f(p.y)),
+        Step::Close => content.close_path(),
+    };
 }
-
 /// A rectangle with corners of these radii; an ellipse where they are half its sides.
-fn rounded(path: &mut PathBuilder, rect: Rect, rx: f64, ry: f64) {
+fn rounded(content: &mut Content, rect: Rect, rx: f64, ry: f64) {
     let (left, top, right, bottom) = (rect.x, rect.y, rect.right(), rect.bottom());
     let (kx, ky) = (rx * (1.0 - QUARTER), ry * (1.0 - QUARTER));
     let at = Point::new;
@@ -314,5 +404,5 @@ fn rounded(path: &mut PathBuilder, rect: Rect, rx: f64, ry: f64) {
     steps
         .iter()
         .filter(wanted)
-        .for_each(|step| add(path, *step));
+        .for_each(|step| add(content, *step));
 }
