@@ -13,6 +13,7 @@ pub(crate) mod given;
 mod kinds;
 pub(crate) mod message;
 pub(crate) mod numbers;
+pub(crate) mod offsets;
 pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod source;
@@ -34,8 +35,8 @@ use source::{
     NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery, duplicate,
     dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, messages_lost, metrics,
     only_publisher, parameter_events, payload, private_name, qos, qos_overrides, recorder,
-    rosgraph, rosout, rosout_ros2, rosout_rule, service_event, sim_time, sister, statistics,
-    tf_pair, topic_statistics,
+    rosgraph, rosout, rosout_ros2, rosout_rule, selected, service_event, sim_time, sister,
+    statistics, tf_pair, topic_statistics,
 };
 
 /// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
@@ -239,7 +240,7 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "payload",
         about: "messages passed on byte by byte from input to output",
-        conclude: &[payload::conclude],
+        conclude: &[payload::conclude, selected::conclude],
         ..NOTHING
     },
     Source {

@@ -37,7 +37,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],
-        &["conclude", "given"],
+        &["conclude", "given", "offsets"],
     ]),
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["ledger"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),

@@ -98,8 +98,8 @@ impl Healthy {
     }
 }
 
-/// One line per mission: the number of headlines, the restarts, the interruptions, the notes.
-fn shown(name: &str, recordings: &[Recording]) -> String {
+/// The mission of some recordings, read with these changes to the reading of their paths.
+fn mission(recordings: &[Recording], change: impl FnOnce(&mut Reading, &[PathBuf])) -> Mission {
     let folder = tempfile::tempdir().unwrap();
     let place = |(at, recording): (usize, &Recording)| -> PathBuf {
         let path = folder.path().join(format!("{at}.bag"));
@@ -107,7 +107,14 @@ fn shown(name: &str, recordings: &[Recording]) -> String {
         path
     };
     let paths: Vec<PathBuf> = recordings.iter().enumerate().map(place).collect();
-    let mission = read(&Reading::of(paths)).unwrap();
+    let mut reading = Reading::of(paths.clone());
+    change(&mut reading, &paths);
+    read(&reading).unwrap()
+}
+
+/// One line per mission: the number of headlines, the restarts, the interruptions, the notes.
+fn shown(name: &str, recordings: &[Recording]) -> String {
+    let mission = mission(recordings, |_, _| {});
     let mut line = format!("{name}:");
     for kind in Kind::ALL {
         let entries = mission.ledger.entries.iter();
@@ -256,4 +263,61 @@ fn clock_faults_are_attributed_to_the_recorder() {
     ];
     let lines = all.iter().map(|(name, recordings)| shown(name, recordings));
     insta::assert_snapshot!("clocks", lines.collect::<String>());
+}
+
+#[test]
+fn two_robots_with_the_same_names_are_told_apart_by_a_namespace() {
+    let healthy = Healthy::new();
+    let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
+    let both = [
+        healthy.copy(|_, at| Some(at)),
+        healthy.copy(|_, at| Some(at + 5_012_345_678)),
+    ];
+    let both = mission(&both, |reading, paths| {
+        reading
+            .namespaces
+            .push((paths[1].clone(), "/second".to_owned()));
+    });
+    let nodes = |mission: &Mission| mission.elements.nodes.len();
+    assert_eq!(nodes(&both), 2 * nodes(&alone));
+    let count = |mission: &Mission, kind: Kind| {
+        let entries = mission.ledger.entries.iter();
+        entries
+            .filter(|e| e.kind == kind && e.is_headline())
+            .count()
+    };
+    // A restart that has the very headers of another is taken for one of a relay.
+    for kind in [Kind::Stopped, Kind::HandedOver, Kind::Rate] {
+        assert_eq!(
+            count(&both, kind),
+            2 * count(&alone, kind),
+            "{}",
+            kind.word()
+        );
+    }
+    let says = |text: &str| both.notices.iter().any(|n| n.text.contains(text));
+    assert!(says("ahead of") && !says("restarts are unknown"));
+}
+
+#[test]
+fn the_offset_of_a_clock_is_estimated_from_what_two_recorded() {
+    let healthy = Healthy::new();
+    let late = |topic: &str, at: i64| (topic != "/robot1/scan").then_some(at + 350_000_000);
+    let recordings = [
+        healthy.copy(|topic, at| (topic != "/robot2/scan").then_some(at)),
+        healthy.copy(late),
+    ];
+    let notes = |offset: i64| -> Vec<String> {
+        let mission = mission(&recordings, |reading, paths| {
+            reading.offsets.push((paths[1].clone(), offset));
+        });
+        let notes = mission.notices.iter().map(|n| n.text.clone());
+        notes.filter(|text| text.contains("the clock of")).collect()
+    };
+    let found = notes(0);
+    assert!(
+        found.len() == 1 && found[0].contains("1.bag=-0.350s"),
+        "{found:?}"
+    );
+    assert_eq!(notes(-350_000_000), [] as [&str; 0]);
 }

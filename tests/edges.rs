@@ -415,7 +415,10 @@ fn well_known_nodes_keep_their_contracts() {
 
 #[test]
 fn a_contract_claims_no_more_publishers_than_the_bag_counts() {
-    let nodes = [("/rplidar_node", "a.cpp"), ("/urg_node", "b.cpp")];
+    let nodes = [
+        ("/rplidar_node", "rplidar_node.cpp"),
+        ("/urg_node", "urg_node.cpp"),
+    ];
     let mut bag = logging(&nodes, &[("/scan", "sensor_msgs/msg/LaserScan")]);
     let offer =
         "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
@@ -428,7 +431,7 @@ fn a_contract_claims_no_more_publishers_than_the_bag_counts() {
 #[test]
 fn unnamed_publishers_are_counted() {
     let mut bag = logging(
-        &[("/rplidar_node", "a.cpp")],
+        &[("/rplidar_node", "rplidar_node.cpp")],
         &[("/scan", "sensor_msgs/msg/LaserScan")],
     );
     let offer =
@@ -444,7 +447,7 @@ fn unnamed_publishers_are_counted() {
     assert_eq!(unknown, [None, Some(2)]);
     assert_eq!(edges(&bag, "unknown"), ["/scan ? ×2 > /scan declared"]);
     // The box implies nothing about its topic's lifetime.
-    let mut bag = logging(&[("/boss", "a.cpp")], &[]);
+    let mut bag = logging(&[("/boss", "rplidar_node.cpp")], &[]);
     let scan = bag.topic2("/scan", "sensor_msgs/msg/LaserScan");
     bag.publishers[scan].qos = offer.to_owned();
     bag.at(scan, 30_000, vec![0, 1, 0, 0, 9]);
@@ -461,7 +464,7 @@ fn unnamed_publishers_are_counted() {
 #[test]
 fn unnamed_publishers_have_a_box_only_while_counted() {
     let topics = [("/scan", "sensor_msgs/msg/LaserScan")];
-    let mut bag = logging(&[("/rplidar_node", "a.cpp")], &topics);
+    let mut bag = logging(&[("/rplidar_node", "rplidar_node.cpp")], &topics);
     assert!(edges(&bag, "unknown").is_empty());
     let offer =
         "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
@@ -483,7 +486,15 @@ fn a_unique_type_identifies_its_program() {
             "/turtlesim ? > /turtle1/pose declared"
         ]
     );
-    let bag = logging(&[("/turtlesim", "a.cpp")], &topics);
+    let with = [topics[0], ("/turtle1/cmd_vel", "geometry_msgs/msg/Twist")];
+    assert_eq!(
+        edges(&logging(&[("/boss", "a.cpp")], &with), "owned_type"),
+        [
+            "/turtlesim ? > /turtle1/pose declared",
+            "/turtle1/cmd_vel > /turtlesim ? declared"
+        ]
+    );
+    let bag = logging(&[("/turtlesim", "turtle_frame.cpp")], &topics);
     assert!(edges(&bag, "owned_type").is_empty());
 }
 

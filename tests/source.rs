@@ -551,6 +551,76 @@ fn reasons_against_a_declaration_are_reported() {
 }
 
 #[test]
+fn a_node_that_did_not_run_is_left_out_whole() {
+    let talker = node("talker", "out", "in");
+    let other_type = talker.replace(
+        "\n\ndef",
+        "\n        self.create_publisher(String, 'number', 1)\n\ndef",
+    );
+    let old = "import rospy\nfrom std_msgs.msg import String\nrospy.init_node('talker')\n\
+               rospy.Publisher('out', String)\nrospy.Subscriber('in', String, cb)\n";
+    let publisher = node("boss", "out", "gone");
+    for (nodes, boss, code, says) in [
+        (
+            &["/boss"][..],
+            &*publisher,
+            &*talker,
+            "what its node publishes may come from elsewhere",
+        ),
+        (
+            &[],
+            "",
+            &other_type,
+            "a topic of its node has another type in the bag",
+        ),
+        (
+            &[],
+            "",
+            old,
+            "its node is written for the other version of ROS",
+        ),
+    ] {
+        let topics = [
+            ("/out", STRING),
+            ("/in", STRING),
+            ("/number", "std_msgs/msg/Int8"),
+        ];
+        let files = [PACKAGE, ("p/p/talker.py", code), ("p/p/boss.py", boss)];
+        let folder = folder(&topics, nodes, &files);
+        let found = edges(folder.path(), &["--infer", "source"]);
+        assert!(
+            !found.iter().any(|edge| edge.contains("talker")),
+            "{says}: {found:?}"
+        );
+        let text = said(folder.path(), &["--infer", "source"]);
+        assert!(text.contains(says), "{says}: {text}");
+    }
+}
+
+#[test]
+fn slashless_topics_of_an_own_writer_are_at_the_root() {
+    let files = [PACKAGE, ("p/p/talker.py", &*node("talker", "out", "in"))];
+    let folder = folder(&[("out", STRING), ("/in", STRING)], &["/talker"], &files);
+    assert_eq!(
+        edges(folder.path(), &[]),
+        set(&["/talker -> out", "/in -> /talker"])
+    );
+}
+
+#[test]
+fn a_node_of_a_launch_file_takes_its_edges_from_the_code_once() {
+    let files = [PACKAGE, ("p/p/talker.py", &*node("talker", "out", "in"))];
+    let folder = folder(&[("/out", STRING), ("/in", STRING)], &[], &files);
+    let launch = r#"<launch><node pkg="p" exec="talker" name="talker"/></launch>"#;
+    fs::write(folder.path().join("all.launch.xml"), launch).unwrap();
+    let more = ["--infer", "source", "--topology", "all.launch.xml"];
+    assert_eq!(
+        edges(folder.path(), &more),
+        set(&["/talker -> /out", "/in -> /talker"])
+    );
+}
+
+#[test]
 fn types_owned_by_another_program_are_not_inferred() {
     let code = node("fake", "turtle1/pose", "in")
         .replace("std_msgs.msg import String", "turtlesim.msg import Pose")

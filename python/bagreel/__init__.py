@@ -128,6 +128,7 @@ def render(
     outputs: Paths,
     *,
     offset: Iterable[str] = (),
+    ns: Iterable[str] = (),
     verify: bool = False,
     format: str | None = None,  # noqa: A002
     period: str | None = None,
@@ -185,7 +186,7 @@ def render(
     """Draws and writes outputs, as `bagreel render` does; the options are those of the command, a list where one may be
     repeated. Returns the files, of which a notebook shows the first. Raises `BagreelError` with what the command said.
     """
-    offset, topology = list(offset), list(topology)
+    offset, ns, topology = list(offset), list(ns), list(topology)
     collapse, expand, link = list(collapse), list(expand), list(link)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
@@ -211,6 +212,7 @@ def figure(
     ns_filter: str | None = None,
     topic_filter: str | None = None,
     offset: Iterable[str] = (),
+    ns: Iterable[str] = (),
     verify: bool = False,
     roles: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
@@ -221,7 +223,7 @@ def figure(
     """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of who talks to whom, or the
     reconfigurations one by one, as wide as `width` says (88mm).
     """
-    offset, topology = list(offset), list(topology)
+    offset, ns, topology = list(offset), list(ns), list(topology)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("figure", bags, output=outputs, **options)
@@ -273,6 +275,7 @@ def events(
     parts: bool = False,
     all: bool = False,  # noqa: A002
     offset: Iterable[str] = (),
+    ns: Iterable[str] = (),
     start: str | None = None,
     end: str | None = None,
     roles: bool = False,
@@ -283,7 +286,7 @@ def events(
 
     `parts` adds what each entry consists of, `all` housekeeping and the recorder.
     """
-    offset, topology = list(offset), list(topology)
+    offset, ns, topology = list(offset), list(ns), list(topology)
     _, text = run("events", bags, format="ndjson", **given(locals(), "bags"))
     return [json.loads(line) for line in text.splitlines()]
 

@@ -1,5 +1,6 @@
 //! Names of nodes and topics, kept as recorded, cheap to clone, ordered.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
@@ -107,16 +108,24 @@ pub fn is_recorder(node: &str) -> bool {
         || last.starts_with("_ros2cli_")
 }
 
+/// A name in a namespace, unless that is empty or the name lies in it already.
+pub(crate) fn in_space<'a>(space: &str, name: &'a str) -> Cow<'a, str> {
+    let is_inside = || {
+        name.strip_prefix(space)
+            .is_some_and(|rest| rest.starts_with('/'))
+    };
+    if space.is_empty() || is_inside() {
+        return Cow::Borrowed(name);
+    }
+    Cow::Owned(format!("{space}/{}", name.trim_start_matches('/')))
+}
+
 /// Whether a node or topic is hidden by default: log, clock, parameters, statistics, recorder events.
 pub fn is_quiet(name: &str) -> bool {
-    const EXACT: [&str; 5] = [
-        "/rosout",
-        "/rosout_agg",
-        "/parameter_events",
-        "/clock",
-        "/statistics",
-    ];
+    const EXACT: [&str; 3] = ["/parameter_events", "/clock", "/statistics"];
     EXACT.contains(&name)
+        // In a namespace, if there are several masters.
+        || ["rosout", "rosout_agg"].contains(&last_part(name))
         || name.ends_with("/parameter_updates")
         || name.ends_with("/parameter_descriptions")
         || name.starts_with("/events/")
@@ -138,6 +147,14 @@ mod tests {
         assert!(is_recorder("/record_1795170682045") && is_recorder("/rosbag2_recorder"));
         assert!(is_recorder("/_ros2cli_42"));
         assert!(!is_recorder("/record_player") && !is_recorder("/record_"));
+    }
+
+    #[test]
+    fn a_name_is_put_into_a_namespace_once() {
+        assert_eq!(in_space("/r2", "/scan"), "/r2/scan");
+        assert_eq!(in_space("/r2", "/r2/scan"), "/r2/scan");
+        assert_eq!(in_space("/r2", "/r2d2"), "/r2/r2d2");
+        assert_eq!(in_space("", "scan"), "scan");
     }
 
     #[test]

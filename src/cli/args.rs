@@ -16,7 +16,7 @@ use crate::base::time::{Moment, Period};
 use crate::export::tables::TableFormat;
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Cut, Length};
-use values::{align, cut, length, moment, offset, period, share};
+use values::{align, cut, length, moment, namespace, offset, period, share};
 
 /// The version, and in packages the commit that they are built of: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
 const VERSION: &str = match option_env!("BAGREEL_VERSION") {
@@ -238,6 +238,9 @@ pub(super) struct Inputs {
     /// Correct the clock of the computer that recorded a bag: `robot2.bag=+0.35s`; once per bag.
     #[arg(long, value_name = "BAG=TIME", value_parser = offset, help_heading = "Time")]
     pub(super) offset: Vec<(PathBuf, i64)>,
+    /// Put the names of a bag in a namespace: `robot2.bag=/robot2`; once per bag.
+    #[arg(long, value_name = "BAG=NAMESPACE", value_parser = namespace)]
+    pub(super) ns: Vec<(PathBuf, String)>,
     /// Read everything again with a second, independent reader and compare.
     #[arg(long)]
     pub(super) verify: bool,

@@ -76,6 +76,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let inputs = Inputs {
         bags: vec![what.to_owned()],
         offset: Vec::new(),
+        ns: Vec::new(),
         verify: false,
     };
     let time = TimeArgs {

@@ -290,6 +290,7 @@ fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Readin
     let inputs = Inputs {
         bags: bags.to_vec(),
         offset: Vec::new(),
+        ns: Vec::new(),
         verify: false,
     };
     let time = TimeArgs {

@@ -19,6 +19,7 @@ pub(super) fn reading(
     Ok(Reading {
         inputs: inputs.bags.iter().map(Input::parse).collect(),
         offsets: inputs.offset.clone(),
+        namespaces: inputs.ns.clone(),
         verify: inputs.verify,
         division: Division {
             length: time.period.unwrap_or(Length::Auto),

@@ -4,7 +4,7 @@
 //! themselves take no more room than their (compressed) times.
 
 use std::cell::Cell;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::sync::Arc;
 
@@ -210,6 +210,10 @@ pub(crate) struct Claims {
     pub(crate) offers: BTreeMap<usize, u32>,
     /// Texts that nodes log, and texts in messages.
     pub(crate) spoken: LoggedTexts,
+    /// The namespaces of recordings; empty for one without.
+    pub(crate) spaces: BTreeSet<String>,
+    /// Nodes of which some log record comes from a file of Python, until their lists are settled.
+    pub(crate) rospy: BTreeSet<Name>,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
     /// The number of bytes of all texts.

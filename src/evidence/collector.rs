@@ -11,6 +11,7 @@ pub use services::Service;
 use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
+use crate::base::name::in_space;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
@@ -120,6 +121,8 @@ pub struct Collector {
     notices: Notices,
     /// The stream of each connection of each bag.
     bags: Vec<Vec<usize>>,
+    /// The namespace of the names in the last bag.
+    space: String,
     /// The bags of which payloads are read for more than comparisons.
     read: BTreeSet<usize>,
 }
@@ -135,7 +138,18 @@ impl Collector {
 
     /// The sink for the next bag; `progress` gets the reader's progress (bytes done, bytes in all).
     pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
+        self.bag_in("", progress)
+    }
+
+    /// As [`Collector::bag`], with all names of nodes and topics in a namespace; empty for none.
+    pub(crate) fn bag_in<'a>(
+        &'a mut self,
+        space: &str,
+        progress: &'a mut dyn FnMut(u64, u64),
+    ) -> BagSink<'a> {
         self.bags.push(Vec::new());
+        self.facts.spaces.insert(space.to_owned());
+        space.clone_into(&mut self.space);
         self.on(progress)
     }
 
@@ -195,6 +209,7 @@ impl Collector {
             if let Some(announced) = row.announced {
                 announced(&mut SourceContext {
                     facts: &mut self.facts,
+                    space: &self.space,
                     stream,
                     place,
                     source,
@@ -213,6 +228,7 @@ impl Collector {
         if self.stamped[place] {
             let mut heard = SourceContext {
                 facts: &mut self.facts,
+                space: &self.space,
                 stream,
                 place,
                 source: 0,
@@ -226,6 +242,7 @@ impl Collector {
         for (source, read) in &self.readers[place] {
             let mut heard = SourceContext {
                 facts: &mut self.facts,
+                space: &self.space,
                 stream,
                 place,
                 source: *source,
@@ -264,6 +281,7 @@ impl Collector {
         }
         let mut heard = SourceContext {
             facts: &mut self.facts,
+            space: &self.space,
             stream: &self.streams[place],
             place,
             source: 0,
@@ -307,10 +325,12 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
+        source::rosout::settle(&mut self.facts);
         let Belief { span, jump } = believed(self.messages.days());
         self.notices
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
-        let judged = publishers::judge(&mut self.streams, &mut self.facts, &mut self.messages);
+        let (streams, facts) = (&mut self.streams, &mut self.facts);
+        let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers);
         self.notices.extend(judged.map_err(spool_error)?);
         if self.facts.dropped > 0 {
             self.notices.add(Notice {
@@ -381,13 +401,16 @@ impl BagSink<'_> {
 impl Sink for BagSink<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         let all = &mut *self.collector;
-        let topic = all.facts.name(connection.topic.as_str());
+        let topic = all
+            .facts
+            .name(&in_space(&all.space, connection.topic.as_str()));
         let publisher = connection.publisher.as_ref();
+        let publisher = publisher.map(|p| in_space(&all.space, p.as_str()));
         let stream = Stream {
             bag: self.bag,
             connection: connection.clone(),
             topic,
-            publisher: publisher.map(|p| all.facts.name(p.as_str())),
+            publisher: publisher.map(|p| all.facts.name(&p)),
             speaker: None,
             latched: is_held(connection),
             trust: Reliability::Whole,

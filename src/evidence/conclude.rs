@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::collector::{Recorded, spool_error};
 use super::values::StatedValues;
 use crate::base::error::Result;
-use crate::base::name::is_service;
+use crate::base::name::{is_service, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
@@ -21,6 +21,7 @@ use crate::evidence::proof::{
 };
 use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
+use crate::evidence::topology::substitution::ANONYMOUS;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 
@@ -188,7 +189,7 @@ fn concluded<'a>(
     }
     let strange = strangers(&known, &options.topology.entries);
     for entry in &options.topology.entries {
-        told(&mut known, entry, (start, end));
+        told(&mut known, entry, (start, end), &recorded.messages);
     }
     let mut notices = Notices::new();
     notices.extend(options.topology.notices.iter().cloned());
@@ -335,8 +336,22 @@ fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
 }
 
 /// Adds an entry of the user's file.
-fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Stamp)) {
-    let mut name = |text: &String| known.facts.name(text);
+fn told(
+    known: &mut Conclusions<'_>,
+    entry: &TopologyEntry,
+    mission: (Stamp, Stamp),
+    messages: &Stamps,
+) {
+    let mut name = |text: &String| match text.split_once(ANONYMOUS) {
+        None => known.facts.name(text),
+        Some((stem, _)) => {
+            let nodes = known.nodes().iter().copied();
+            let run = nodes
+                .filter(|node| is_run_of(&known.text(*node), stem))
+                .min();
+            run.unwrap_or_else(|| known.facts.name(stem))
+        }
+    };
     let what = match &entry.element {
         NamedElement::Node(node) => ElementKey::Node(name(node)),
         NamedElement::Topic(topic) => ElementKey::Topic(name(topic)),
@@ -369,12 +384,49 @@ fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Sta
             text: entry.place.clone(),
         });
     }
-    known.prove(Proof {
+    let proof = |when| Proof {
         what,
         source,
         degree,
         when,
+    };
+    known.prove(proof(when));
+    // Nobody knows when it was launched: while others in its namespace live.
+    if entry.declared
+        && let Some(neighbour) = neighbour(known, what, messages)
+    {
+        known.prove(proof(Validity::Like(ElementKey::Node(neighbour))));
+    }
+}
+
+/// Whether a node has the anonymous name that a launch file makes of `stem`: with a host, a process and a number.
+fn is_run_of(node: &str, stem: &str) -> bool {
+    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    let suffix = node
+        .strip_prefix(stem)
+        .and_then(|rest| rest.strip_prefix('_'));
+    let mut parts = suffix.unwrap_or_default().rsplit('_');
+    parts.next().is_some_and(is_number) && parts.next().is_some_and(is_number)
+}
+
+/// The node in the same namespace as a node, or as that of an edge, that publishes for the longest time; `None` at the
+/// root.
+fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Option<Name> {
+    let node = match what {
+        ElementKey::Node(node) | ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => {
+            node
+        }
+        ElementKey::Topic(_) => return None,
+    };
+    let text = known.text(node);
+    let space = namespace(&text);
+    let streams = known.streams.iter().filter_map(|stream| {
+        let of = stream.publisher.filter(|of| *of != node)?;
+        let (first, last) = messages.bounds(stream.times)?;
+        let is_near = !space.trim_matches('/').is_empty() && namespace(&known.text(of)) == space;
+        is_near.then(|| (last.since(first), of))
     });
+    streams.max().map(|(_, of)| of)
 }
 
 /// Puts every node under the name of its role; returns the names that changed.

@@ -31,9 +31,9 @@ impl Evidence {
         Self(self.0 | other.0)
     }
 
-    /// Whether all of it is evidence without times: source code, and stand-ins for nodes without a name.
+    /// Whether all of it is evidence without times: source code, launch files, and stand-ins for nodes without a name.
     pub fn is_timeless(self) -> bool {
-        self.is_within(&["source", "source_only", "unknown", "owned_type"])
+        self.is_within(&["source", "source_only", "launch", "unknown", "owned_type"])
     }
 
     /// Whether all of it is evidence of stand-ins for nodes that the bag does not name.

@@ -88,6 +88,13 @@ impl Numbers {
         is_counter && !self.fell.iter().any(|at| from < *at && *at <= to)
     }
 
+    /// Whether all of `count` messages are of one sender at a time: their numbers grow, and begin again only after gaps.
+    pub(crate) fn is_one_counter(&self, count: u64) -> bool {
+        let again = self.fell.len() as u64;
+        let begun = self.falls.len() as u64;
+        self.read == count && count > 1 && again == begun && self.grew + again + 1 == count
+    }
+
     /// The number of the message at this time, if it was kept.
     pub(crate) fn at(&self, time: Stamp) -> Option<Number> {
         let last = self.last.filter(|(at, _)| *at == time);
@@ -125,6 +132,20 @@ mod tests {
         assert_eq!(told(&[7, 8, 9, 12]), [true, true]);
         assert_eq!(told(&[7, 8, 3, 4]), [false, true]);
         assert_eq!(told(&[0, 0, 0, 0]), [false, false]);
+    }
+
+    #[test]
+    fn the_numbers_of_two_senders_are_no_counter() {
+        let is_one = |numbers: &[u32]| {
+            let mut all = Numbers::default();
+            for (at, number) in (0..).zip(numbers) {
+                all.add(Stamp(at * 2_000_000_000), &payload(*number, 5));
+            }
+            all.is_one_counter(numbers.len() as u64)
+        };
+        assert!(is_one(&[7, 8, 10, 1, 2]));
+        assert!(!is_one(&[7, 101, 8, 102]));
+        assert!(!is_one(&[7, 7, 7]));
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub(crate) enum Reliability {
     Whole,
     /// It published the first message; the others may be from any node.
     First,
+    /// It published every message, as far as other evidence shows.
+    Likely,
     /// It published messages of the topic earlier, and was gone before these.
     Gone,
     /// It played back messages that others published earlier.

@@ -8,7 +8,9 @@ use std::io;
 
 use crate::base::name::is_player;
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Claims, Name};
+use crate::evidence::numbers::Numbers;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::times::Stamps;
 
@@ -21,6 +23,7 @@ pub(crate) fn judge(
     streams: &mut Vec<Stream>,
     facts: &mut Claims,
     messages: &mut Stamps,
+    numbers: &BTreeMap<usize, Numbers>,
 ) -> io::Result<Vec<Notice>> {
     let named = NamedTopics::new(facts);
     let mut notices = Vec::new();
@@ -29,15 +32,15 @@ pub(crate) fn judge(
         bags.entry(stream.bag).or_default().push(at);
     }
     for of_bag in bags.values() {
-        if rewritten(streams, of_bag, &named, facts) {
+        if rewritten(streams, of_bag, &named) {
             notices.push(Notice::new(NoticeKind::Rewritten, REWRITTEN));
             for at in of_bag {
-                let stream = &mut streams[*at];
-                if stream
-                    .publisher
-                    .is_some_and(|node| named.by_others(stream.topic, node))
+                let stream = &streams[*at];
+                if let Some(node) = stream.publisher
+                    && named.by_others(stream.topic, node)
+                    && !is_alone(stream, node, (&named, facts), (messages, numbers.get(at)))?
                 {
-                    stream.trust = Reliability::First;
+                    streams[*at].trust = Reliability::First;
                 }
             }
             successors::part(streams, of_bag, &named, facts, messages)?;
@@ -48,7 +51,7 @@ pub(crate) fn judge(
             let by_player = stream
                 .publisher
                 .is_some_and(|node| is_player(&facts.text(node)));
-            if by_player && &*facts.text(stream.topic) != "/rosout" {
+            if by_player && stream.connection.topic.as_str() != "/rosout" {
                 played = true;
                 stream.trust = Reliability::Player;
             }
@@ -103,15 +106,51 @@ impl NamedTopics {
     }
 }
 
+/// The longest time from the start of a node to its first message on a topic of its own, in nanoseconds.
+const SOON_NS: i64 = 5_000_000_000;
+
+/// Whether the numbers in the headers of a topic show that one node sent all its messages: they are one counter, and
+/// where it begins again this node shows itself and no other that names the topic begins.
+fn is_alone(
+    stream: &Stream,
+    node: Name,
+    (named, facts): (&NamedTopics, &Claims),
+    (messages, numbers): (&Stamps, Option<&Numbers>),
+) -> io::Result<bool> {
+    let count = messages.count(stream.times);
+    let Some(numbers) = numbers.filter(|numbers| numbers.is_one_counter(count)) else {
+        return Ok(false);
+    };
+    let shown = |of: Name| {
+        let claims = facts.list.iter();
+        claims.filter(move |fact| successors::shown(fact.claim) == Some(of))
+    };
+    let mut signs = Vec::new();
+    for fact in shown(node) {
+        signs.extend(facts.times.times(fact.times)?);
+    }
+    let first = |of: Name| {
+        let bounds = shown(of).filter_map(|fact| facts.times.bounds(fact.times));
+        bounds.map(|(first, _)| first).min()
+    };
+    let others = named.nodes(stream.topic).filter(|other| *other != node);
+    let others: Vec<Stamp> = others.filter_map(first).collect();
+    Ok(numbers.falls.iter().all(|(last, next)| {
+        let soon = next.plus(-SOON_NS)..next.plus(SOON_NS);
+        let is_back = signs.iter().any(|sign| sign > last && soon.contains(sign));
+        is_back && !others.iter().any(|first| soon.contains(first))
+    }))
+}
+
 /// Whether a bag has no topic with two publishers, and one log connection used by several nodes.
-fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics, facts: &Claims) -> bool {
+fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics) -> bool {
     let mut topics = BTreeSet::new();
     if !of_bag.iter().all(|at| topics.insert(streams[*at].topic)) {
         return false;
     }
     let log = of_bag
         .iter()
-        .find(|at| &*facts.text(streams[**at].topic) == "/rosout");
+        .find(|at| streams[**at].connection.topic.as_str() == "/rosout");
     let host = log.and_then(|at| streams[*at].publisher);
     host.is_some_and(|host| named.guests.contains_key(&host))
 }

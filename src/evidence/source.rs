@@ -28,6 +28,7 @@ pub(crate) mod rosgraph;
 pub(crate) mod rosout;
 pub(crate) mod rosout_ros2;
 pub(crate) mod rosout_rule;
+pub(crate) mod selected;
 pub(crate) mod service_event;
 pub(crate) mod sim_time;
 pub(crate) mod sister;
@@ -35,6 +36,7 @@ pub(crate) mod statistics;
 pub(crate) mod tf_pair;
 pub(crate) mod topic_statistics;
 
+use crate::base::name::in_space;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Claims, Degree, Measurement, Name, SourceId, Statement};
@@ -77,6 +79,8 @@ pub(crate) const NOTHING: Source = Source {
 /// The input of a source, and the collection of its claims.
 pub(crate) struct SourceContext<'a> {
     pub(crate) facts: &'a mut Claims,
+    /// The namespace of the names in this recording; empty for none.
+    pub(crate) space: &'a str,
     pub(crate) stream: &'a Stream,
     /// The stream's place among all streams.
     pub(crate) place: usize,
@@ -86,9 +90,13 @@ pub(crate) struct SourceContext<'a> {
 }
 
 impl SourceContext<'_> {
-    /// The name of a text.
+    /// The name of a text; a resolved name is put into the namespace of its recording.
     pub(crate) fn name(&mut self, text: &str) -> Name {
-        self.facts.name(text)
+        if text.starts_with('/') {
+            self.facts.name(&in_space(self.space, text))
+        } else {
+            self.facts.name(text)
+        }
     }
 
     /// Adds a statistic of an interval, which ends now if it has no length.

@@ -19,6 +19,15 @@ impl Spread {
         self.squares += lag * lag;
     }
 
+    /// Both sets of lags as one.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            sum: self.sum + other.sum,
+            squares: self.squares + other.squares,
+        }
+    }
+
     /// The mean in seconds; 0 without lags.
     pub(crate) fn mean(&self) -> f64 {
         self.sum / self.count.max(1.0)

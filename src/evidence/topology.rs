@@ -8,7 +8,7 @@ mod dot;
 pub(crate) mod launch;
 #[cfg(feature = "source")]
 mod python;
-mod substitution;
+pub(crate) mod substitution;
 mod tree;
 mod yaml;
 

@@ -13,57 +13,93 @@ use crate::evidence::source::contract::Owners;
 
 /// Adds a box for every recorded topic that lacks publishers.
 pub(crate) fn conclude(known: &mut Conclusions<'_>) {
+    let topics = known.topics_of(|_| true);
+    let is_shown = |topic: &Name| {
+        let text = known.text(*topic);
+        !is_quiet(&text) && !text.split('/').any(|part| part.starts_with('_'))
+    };
+    let topics: Vec<Name> = topics.into_iter().filter(is_shown).collect();
     let owners = Owners::new();
-    for topic in known.topics_of(|_| true) {
-        let text = known.text(topic);
-        if is_quiet(&text) || text.split('/').any(|part| part.starts_with('_')) {
-            continue;
-        }
+    for topic in &topics {
+        owned(known, &owners, *topic);
+    }
+    for topic in topics {
         let named = known.publishers(topic).count();
         let offered = known.offers(topic).map_or(0, |n| n as usize);
-        let owner = owners
-            .node(&known.kind(topic), &text)
-            .filter(|_| named == 0);
         let missing = offered.saturating_sub(named);
-        if let Some(owner) = owner {
-            let kind = known.kind(topic);
-            add(known, "owned_type", &format!("{owner} ?"), topic, &|| {
-                format!(
-                    "nothing names the publisher of {text}; only {owner} is known to publish {kind}"
-                )
+        let is_owned = known
+            .publishers(topic)
+            .any(|node| is_box(&known.text(node)));
+        if missing == 0 || is_owned {
+            continue;
+        }
+        let text = known.text(topic);
+        let times = if missing > 1 {
+            format!(" ×{missing}")
+        } else {
+            String::new()
+        };
+        let node = known.facts.name(&format!("{text} ?{times}"));
+        let edge = ElementKey::Publish(node, topic);
+        add(known, "unknown", node, edge, &|| {
+            let counted = count(offered, "publisher");
+            format!("the recording counts {counted} of {text}, of which nothing names {missing}")
+        });
+    }
+}
+
+/// Whether a name is that of a box for an unknown node.
+fn is_box(name: &str) -> bool {
+    name.ends_with(" ?")
+}
+
+/// Adds the box of the program that alone publishes the type of a topic, with what else it publishes and subscribes.
+fn owned(known: &mut Conclusions<'_>, owners: &Owners, topic: Name) {
+    let (text, kind) = (known.text(topic), known.kind(topic));
+    let Some(owner) = owners.node(&kind, &text) else {
+        return;
+    };
+    if known.publishers(topic).next().is_some() {
+        return;
+    }
+    let node = known.facts.name(&format!("{owner} ?"));
+    let why =
+        format!("nothing names the publisher of {text}; only {owner} is known to publish {kind}");
+    add(
+        known,
+        "owned_type",
+        node,
+        ElementKey::Publish(node, topic),
+        &|| why.clone(),
+    );
+    for (publishes, other) in owners.others(known, &kind, &owner) {
+        let (verb, edge) = if publishes {
+            ("publishes", ElementKey::Publish(node, other))
+        } else {
+            ("subscribes to", ElementKey::Subscribe(other, node))
+        };
+        let is_free = !publishes || known.publishers(other).next().is_none();
+        if is_free && !known.knows(edge) {
+            let of = known.text(other);
+            add(known, "owned_type", node, edge, &|| {
+                format!("{why}; it {verb} {of} as well")
             });
-        } else if missing > 0 {
-            let times = if missing > 1 {
-                format!(" ×{missing}")
-            } else {
-                String::new()
-            };
-            add(
-                known,
-                "unknown",
-                &format!("{text} ?{times}"),
-                topic,
-                &|| {
-                    let counted = count(offered, "publisher");
-                    format!(
-                        "the recording counts {counted} of {text}, of which nothing names {missing}"
-                    )
-                },
-            );
         }
     }
 }
 
-/// Adds a box with its edge.
+/// Adds a box with an edge.
 fn add(
     known: &mut Conclusions<'_>,
     word: &str,
-    name: &str,
-    topic: Name,
+    node: Name,
+    edge: ElementKey,
     words: &dyn Fn() -> String,
 ) {
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
-    let node = known.facts.name(name);
+    let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
+        return;
+    };
     // It appears and vanishes with its topic, about whose life it says nothing.
     let topics = || Validity::Like(ElementKey::Topic(topic));
     let life = if word == "unknown" {
@@ -71,8 +107,7 @@ fn add(
     } else {
         Validity::Whole
     };
-    let edge = (ElementKey::Publish(node, topic), topics());
-    for (what, when) in [(ElementKey::Node(node), life), edge] {
+    for (what, when) in [(ElementKey::Node(node), life), (edge, topics())] {
         let proof = Proof {
             what,
             source,

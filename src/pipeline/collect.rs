@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::inputs::{check_offsets, each_once, in_time, known_span};
+use super::inputs::{check_named, each_once, in_time, known_span, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report};
@@ -11,6 +11,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::collector::{self, Collector, Recorded};
+use crate::evidence::offsets::{ClockOffset, offsets};
 use crate::graph::window;
 
 /// The bags of a mission, read.
@@ -29,7 +30,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     };
     let (inputs, twice) = each_once(&reading.inputs)?;
     let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
-    check_offsets(reading, &inputs)?;
+    check_named(reading, &inputs)?;
     let readers = bag::open_each(inputs.clone(), &options).zip(&inputs);
     let readers = readers.map(|(reader, input)| Ok(in_time(reading, input, reader?)));
     let mut readers = readers.collect::<Result<Vec<_>>>()?;
@@ -40,16 +41,17 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     let range = known
         .map(|span| window::range(&reading.division, span))
         .transpose()?;
+    let spaces: Vec<String> = inputs.iter().map(|i| space_of(reading, i)).collect();
     let mut collector = Collector::new(affordable(reading));
     let mut reports = Vec::new();
     let mut seams = Vec::new();
     let (mut before, mut size) = (0, 0);
-    for reader in &mut readers {
+    for (reader, space) in readers.iter_mut().zip(&spaces) {
         let mut progress = |done, total: u64| {
             size = total;
             watch.progress(before + done, whole.max(before + total));
         };
-        let mut sink = collector.bag(&mut progress);
+        let mut sink = collector.bag_in(space, &mut progress);
         let mut watched = Watched::new(&mut sink);
         reports.push(reader.read(range, &mut watched)?);
         seams.push(watched.seams());
@@ -59,9 +61,10 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     let is_pipe = inputs.iter().any(Input::is_pipe);
     if !is_straight && !is_pipe {
         collector = Collector::new(affordable(reading));
-        for (reader, seams) in readers.iter_mut().zip(&seams) {
+        let all = readers.iter_mut().zip(&spaces).zip(&seams);
+        for ((reader, space), seams) in all {
             let mut progress = |done, total| watch.progress(done, total);
-            let mut sink = collector.bag(&mut progress);
+            let mut sink = collector.bag_in(space, &mut progress);
             reader.read(range, &mut Straightened::new(seams, &mut sink))?;
         }
     }
@@ -70,6 +73,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded.mark_outside(range.start <= known.start);
     }
     recorded.notices.extend(twice);
+    recorded.notices.extend(apart(&recorded, &inputs)?);
     recorded.falls = seams
         .iter()
         .flat_map(|seams| straight::falls(seams, !is_pipe))
@@ -97,6 +101,28 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded,
         range,
     })
+}
+
+/// Notices about recorders whose clocks differ, by the messages that two of them recorded.
+fn apart(recorded: &Recorded, inputs: &[Input]) -> Result<Vec<Notice>> {
+    let offsets = offsets(recorded).map_err(collector::spool_error)?;
+    let notice = |offset: ClockOffset| {
+        let [own, other] = [offset.bag, offset.other].map(|at| inputs[at].name());
+        let seconds = offset.ahead as f64 / 1e9;
+        let length = words::duration(offset.ahead.abs());
+        let side = if offset.ahead > 0 {
+            "ahead of"
+        } else {
+            "behind"
+        };
+        let count = words::count(offset.messages, "message");
+        let text = format!(
+            "the clock of `{own}` is {length} {side} that of `{other}` by {count} that both recorded: `--offset {own}={:+.3}s` corrects it",
+            -seconds
+        );
+        Notice::new(NoticeKind::Note, text)
+    };
+    Ok(offsets.into_iter().map(notice).collect())
 }
 
 /// The beginning of the notice about a clock that was set back.

@@ -57,7 +57,15 @@ pub(super) fn in_time(
     }
 }
 
-/// Whether an offset for `name` is for this input.
+/// The namespace of what an input recorded; empty for none.
+pub(super) fn space_of(reading: &Reading, input: &Input) -> String {
+    let own = reading.namespaces.iter().rev();
+    let mut own = own.filter(|(name, _)| is_of(name, input));
+    own.next()
+        .map_or_else(String::new, |(_, space)| space.clone())
+}
+
+/// Whether what is given for `name` is for this input.
 fn is_of(name: &Path, input: &Input) -> bool {
     match input {
         Input::Path(path) => path.starts_with(name) || path.file_name() == Some(name.as_os_str()),
@@ -66,17 +74,25 @@ fn is_of(name: &Path, input: &Input) -> bool {
     }
 }
 
-/// Refuses an offset that is for none of the inputs.
-pub(super) fn check_offsets(reading: &Reading, inputs: &[Input]) -> Result<()> {
+/// Refuses an offset or a namespace that is for none of the inputs.
+pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
+    let offsets = reading
+        .offsets
+        .iter()
+        .map(|(name, _)| (name, "offset", "+0.35s"));
+    let spaces = reading
+        .namespaces
+        .iter()
+        .map(|(name, _)| (name, "ns", "/robot2"));
     let is_used = |name: &Path| inputs.iter().any(|input| is_of(name, input));
-    match reading.offsets.iter().find(|(name, _)| !is_used(name)) {
+    match offsets.chain(spaces).find(|(name, ..)| !is_used(name)) {
         None => Ok(()),
-        Some((name, _)) => Err(Error::usage(
+        Some((name, option, value)) => Err(Error::usage(
             format!(
-                "`--offset` names `{}`, which is not among the bags",
+                "`--{option}` names `{}`, which is not among the bags",
                 name.display()
             ),
-            "write the bag as it is given: `--offset run_2.bag=+0.35s`",
+            format!("write the bag as it is given: `--{option} run_2.bag={value}`"),
         )),
     }
 }

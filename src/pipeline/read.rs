@@ -36,6 +36,9 @@ pub struct Reading {
     /// The times by which the clocks of recorders were wrong, in nanoseconds: they are added to the times of those
     /// inputs that have this path or name, or lie in this folder.
     pub offsets: Vec<(PathBuf, i64)>,
+    /// The namespaces of the names in some inputs, such as `/robot2`, found as in `offsets`: two robots may use the same
+    /// names.
+    pub namespaces: Vec<(PathBuf, String)>,
     /// Whether to read everything again with a second reader and compare.
     pub verify: bool,
     /// The division of time into windows.
@@ -65,6 +68,7 @@ impl Default for Reading {
         Self {
             inputs: Vec::new(),
             offsets: Vec::new(),
+            namespaces: Vec::new(),
             verify: false,
             division: Division::default(),
             skip_unchanged: false,
@@ -340,7 +344,7 @@ fn doubled(history: &History) -> Option<Notice> {
     let name = |id: &u32| format!("`{}`", history.elements.nodes[*id as usize].name);
     let names: Vec<String> = history.doubled.iter().map(name).collect();
     let text = format!(
-        "several recordings have messages of the same nodes at the same time, so their restarts are unknown: {}",
+        "several recordings have messages of the same nodes at the same time, so their restarts are unknown: {}; `--ns BAG=/robot2` puts those of a bag in a namespace",
         words::some_of(&names, NAMED)
     );
     (!names.is_empty()).then(|| Notice::new(NoticeKind::Note, text))

@@ -33,6 +33,21 @@ pub(super) fn offset(text: &str) -> Result<(PathBuf, i64), String> {
     parsed.ok_or_else(|| "write a bag and a time, such as `robot2.bag=+0.35s`".to_owned())
 }
 
+/// A bag and the namespace of its names.
+pub(super) fn namespace(text: &str) -> Result<(PathBuf, String), String> {
+    let is_name = |part: &str| {
+        !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+    };
+    let parsed = text.rsplit_once('=').filter(|(bag, space)| {
+        let parts = space
+            .strip_prefix('/')
+            .map(|space| space.split('/').all(is_name));
+        !bag.is_empty() && parts == Some(true)
+    });
+    let parsed = parsed.map(|(bag, space)| (PathBuf::from(bag), space.to_owned()));
+    parsed.ok_or_else(|| "write a bag and a namespace, such as `robot2.bag=/robot2`".to_owned())
+}
+
 pub(super) fn align(text: &str) -> Result<Align, String> {
     match text {
         "bag" => Ok(Align::Bag),

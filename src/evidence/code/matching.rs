@@ -224,7 +224,8 @@ impl RecordedTopics {
                 .collect(),
         };
         for stream in known.streams {
-            let topic = known.text(stream.topic).to_string();
+            // Some programs write their own bags with names as they are written in the code.
+            let topic = format!("/{}", known.text(stream.topic).trim_start_matches('/'));
             let (_, types) = all
                 .topics
                 .entry(topic)
@@ -237,6 +238,21 @@ impl RecordedTopics {
         all
     }
 
+    /// Whether a topic of a program, if it ran as this node, was recorded with another type.
+    pub(super) fn contradicts(&self, instance: &Instance, node: &str) -> bool {
+        instance.declared.iter().any(|placed| {
+            let declaration = &placed.declaration;
+            let written = declaration.topic.as_ref();
+            let name =
+                written.map(|topic| remapped(&resolved(node, topic), node, &instance.remaps));
+            let recorded = name.and_then(|name| self.topics.get(&name));
+            let is_known = !declaration.types.is_empty();
+            is_known
+                && recorded
+                    .is_some_and(|(_, kinds)| !declaration.types.iter().any(|t| kinds.contains(t)))
+        })
+    }
+
     /// The recorded topic of this name, if one of the types is its own.
     pub(super) fn topic(&self, name: &str, types: &[String]) -> Option<Name> {
         let (topic, recorded) = self.topics.get(name)?;
@@ -247,10 +263,12 @@ impl RecordedTopics {
 /// Nodes by their names, with the words of the sources that name them.
 type NamedNodes = BTreeMap<String, (Name, BTreeSet<&'static str>)>;
 
-/// The nodes that the bag names by more than a declaration.
+/// The nodes that the bag names by more than a declaration, and those of launch files that the user gives.
 fn named(known: &Conclusions<'_>) -> NamedNodes {
     let mut named = NamedNodes::new();
-    for proof in known.proofs.iter().filter(|p| p.degree != Degree::Declared) {
+    let launch = row("launch");
+    let is_named = |p: &&Proof| p.degree != Degree::Declared || p.source == launch;
+    for proof in known.proofs.iter().filter(is_named) {
         let node = match proof.what {
             ElementKey::Node(node)
             | ElementKey::Publish(node, _)

@@ -11,6 +11,7 @@ use super::Code;
 use super::declaration::Role;
 use super::matching::{Match, RecordedTopics, matches, resolved, row};
 use super::workspace::{FileDeclaration, Instance};
+use crate::bag::Encoding;
 use crate::base::name::last_part;
 use crate::base::words::{count, worded};
 use crate::evidence::claim::{Degree, Name};
@@ -22,11 +23,13 @@ worded! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub(super) enum NotDrawn {
         SeveralPlaces = "several places can be meant",
-        /// The other topics of its node fit another declaration too, so it may not have run.
+        /// What its node publishes has another publisher or fits another declaration too, so it may not have run.
         Disputed = "what its node publishes may come from elsewhere",
         KnownPublisher = "its publishers are known",
         /// Messages of this type are published by one well-known program.
         OwnedType = "its type is another program's own",
+        OtherType = "a topic of its node has another type in the bag",
+        OtherRos = "its node is written for the other version of ROS",
         OtherLaunchFile = "another launch file fits better",
         /// A launch file of the same system starts the recorded nodes without this one.
         Alternative = "a launch file that fits too does without its node",
@@ -89,7 +92,8 @@ pub(super) fn conclude(
     let disputed: BTreeSet<&str> = judged
         .iter()
         .filter(|(role, reason, _)| {
-            *role == Role::Publishes && *reason == Some(NotDrawn::SeveralPlaces)
+            let is_other = [NotDrawn::SeveralPlaces, NotDrawn::KnownPublisher];
+            *role == Role::Publishes && reason.is_some_and(|reason| is_other.contains(&reason))
         })
         .flat_map(|(.., candidates)| candidates.iter().map(|c| c.node.as_str()))
         .collect();
@@ -303,13 +307,35 @@ fn reason(
     if launches.do_without(&only.found.instance.program) {
         return Some(NotDrawn::Alternative);
     }
+    if bag.recorded.contradicts(only.found.instance, &only.node) {
+        return Some(NotDrawn::OtherType);
+    }
+    if is_of_other_ros(only.found.instance, known) {
+        return Some(NotDrawn::OtherRos);
+    }
     if only.share.0 * 2 < only.share.1 {
         return Some(NotDrawn::FewTopics);
     }
     (bag.logged && only.found.instance.logs).then_some(NotDrawn::WouldHaveLogged)
 }
 
-/// Adds the node, with a question mark, and its edge.
+/// Whether the calls of a program are those of ROS 1 and the bag is of ROS 2, or the reverse.
+fn is_of_other_ros(instance: &Instance, known: &Conclusions<'_>) -> bool {
+    const ROS1: [&str; 4] = ["advertise", "subscribe", "Publisher(", "Subscriber("];
+    let texts = || {
+        instance
+            .declared
+            .iter()
+            .map(|d| d.declaration.text.as_str())
+    };
+    let is_ros2 = texts().any(|text| text.starts_with("create_"));
+    let is_ros1 = !is_ros2 && texts().any(|text| ROS1.iter().any(|call| text.starts_with(call)));
+    let mut streams = known.streams.iter();
+    let of_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
+    if of_ros1 { is_ros2 } else { is_ros1 }
+}
+
+/// Adds the node, with a question mark, and its edge, which lives with its topic.
 fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
     let edge = candidate.found.role.edge(node, candidate.found.topic);
@@ -318,7 +344,7 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
         count(code.packages, "package"),
         words(known, candidate)
     );
-    let basis = Validity::Like(ElementKey::Node(node));
+    let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
         let proof = Proof {
             what,

@@ -2,8 +2,9 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::declaration::{Call, Class, FileCode, Made, short, type_of};
+use super::declaration::{Call, Class, Declaration, FileCode, Made, short, type_of};
 use super::texts::{DEEPEST, LONGEST, TextValues, most_work};
 use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
 
@@ -20,6 +21,8 @@ pub(super) fn read(text: &str) -> FileCode {
         texts: TextValues::default(),
         classes: vec![Class::default()],
         open: Vec::new(),
+        loops: Vec::new(),
+        bound: BTreeMap::new(),
     };
     reader.visit_all(PythonReader::look);
     reader.visit_all(PythonReader::take);
@@ -41,7 +44,14 @@ struct PythonReader<'a> {
     classes: Vec<Class>,
     /// The ends of the enclosing classes, with the indices of the classes.
     open: Vec<(usize, usize)>,
+    /// Loops: the text that is repeated, the variables and the items.
+    loops: Vec<(Range<usize>, Node<'a>, Node<'a>)>,
+    /// The values of the variables in the current turn of the enclosing loops.
+    bound: BTreeMap<&'a str, Node<'a>>,
 }
+
+/// The most turns of the loops around a call that are followed.
+const MOST_TURNS: usize = 64;
 
 impl<'a> PythonReader<'a> {
     /// Visits every element, with the enclosing classes in `open`.
@@ -92,6 +102,16 @@ impl<'a> PythonReader<'a> {
                 let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
                 if let [Some(left), Some(right)] = sides {
                     self.texts.set(self.text(left), right);
+                }
+            }
+            "for_statement" | "for_in_clause" => {
+                let repeated = match node.kind() {
+                    "for_statement" => node.child_by_field_name("body"),
+                    _ => node.parent(),
+                };
+                let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
+                if let (Some(repeated), [Some(left), Some(right)]) = (repeated, sides) {
+                    self.loops.push((repeated.byte_range(), left, right));
                 }
             }
             "default_parameter" | "typed_default_parameter" => {
@@ -188,14 +208,72 @@ impl<'a> PythonReader<'a> {
         }
         self.remark(name, object, &full, &given);
         if let Some(made) = made(name, &full) {
-            let call = Call {
-                made,
-                topic: self.topic(&given),
-                types: self.types(&given),
-                line: line(node),
-                text: short(&format!("{name}{}", self.parsed.field(node, "arguments"))),
+            let mut declared: Vec<Declaration> = Vec::new();
+            for turn in self.turns(node) {
+                self.bound = turn;
+                let call = Call {
+                    made,
+                    topic: self.topic(&given),
+                    types: self.types(&given),
+                    line: line(node),
+                    text: short(&format!("{name}{}", self.parsed.field(node, "arguments"))),
+                };
+                let new = call.declarations().into_iter();
+                declared.extend(
+                    new.filter(|one| !declared.contains(one))
+                        .collect::<Vec<_>>(),
+                );
+            }
+            self.bound.clear();
+            self.class().declarations.extend(declared);
+        }
+    }
+
+    /// The values of the variables of the loops around an element, for each turn; one without any outside loops.
+    fn turns(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
+        let mut turns = vec![BTreeMap::new()];
+        let around = self.loops.iter();
+        for (_, left, right) in around.filter(|(body, ..)| body.contains(&node.start_byte())) {
+            let items = self.items(*right, 0);
+            if items.is_empty() || items.len() * turns.len() > MOST_TURNS {
+                continue;
+            }
+            let with = |turn: &BTreeMap<&'a str, Node<'a>>, item: Node<'a>| {
+                let mut turn = turn.clone();
+                let targets = match left.kind() {
+                    "identifier" => vec![(*left, item)],
+                    _ => children(*left).into_iter().zip(parts(item)).collect(),
+                };
+                turn.extend(
+                    targets
+                        .into_iter()
+                        .map(|(name, value)| (self.text(name), value)),
+                );
+                turn
             };
-            self.class().declarations.extend(call.declarations());
+            let next = turns
+                .iter()
+                .flat_map(|turn| items.iter().map(move |item| with(turn, *item)));
+            turns = next.collect();
+        }
+        turns
+    }
+
+    /// The items of a literal that a loop goes over, or of one that a name stands for.
+    fn items(&self, node: Node<'a>, depth: usize) -> Vec<Node<'a>> {
+        let again = |node: Option<Node<'a>>| match node {
+            Some(node) if depth < DEEPEST => self.items(node, depth + 1),
+            _ => Vec::new(),
+        };
+        match node.kind() {
+            "list" | "tuple" | "set" | "dictionary" => children(node),
+            "parenthesized_expression" => again(node.named_child(0)),
+            "identifier" | "attribute" => again(self.texts.get(self.text(node))),
+            "call" if self.called(node).0 == "items" => {
+                let function = node.child_by_field_name("function");
+                again(function.and_then(|f| f.child_by_field_name("object")))
+            }
+            _ => Vec::new(),
         }
     }
 
@@ -284,6 +362,7 @@ impl<'a> PythonReader<'a> {
     }
 
     fn type_name(&self, node: Node<'a>) -> Vec<String> {
+        let node = self.bound.get(self.text(node)).copied().unwrap_or(node);
         if !["identifier", "attribute"].contains(&node.kind()) {
             return Vec::new();
         }
@@ -333,7 +412,10 @@ impl<'a> PythonReader<'a> {
             "binary_operator" if self.text(field("operator")?) == "+" => {
                 Some(again(field("left")?)? + &again(field("right")?)?)
             }
-            "identifier" => again(self.texts.get(self.text(node))?),
+            "identifier" => {
+                let bound = self.bound.get(self.text(node)).copied();
+                again(bound.or_else(|| self.texts.get(self.text(node)))?)
+            }
             "attribute" => match self.texts.get(self.text(node)) {
                 Some(value) => again(value),
                 // `….get_parameter('x').value`, `….get_parameter_value().string_value`
@@ -375,6 +457,14 @@ impl<'a> CallArguments<'a> {
             .iter()
             .find(|(n, _)| *n == name)
             .map(|(_, node)| *node)
+    }
+}
+
+/// The parts of an item of a loop: of a pair, or of an entry of a dictionary.
+fn parts(item: Node<'_>) -> Vec<Node<'_>> {
+    match item.kind() {
+        "tuple" | "list" | "pair" => children(item),
+        _ => Vec::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bag::Encoding;
-use crate::evidence::claim::Claim;
+use crate::evidence::claim::{Claim, Claims, Degree, Statement};
 
 /// A payload under construction.
 pub(super) struct Payload {
@@ -123,8 +123,9 @@ pub(super) fn claims(
     publisher: Option<&str>,
     payload: &Payload,
 ) -> Vec<String> {
-    let (collector, want) = hear(topic, kind, publisher, payload);
+    let (mut collector, want) = hear(topic, kind, publisher, payload);
     assert_eq!(want, Want::Payload);
+    source::rosout::settle(&mut collector.facts);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
     let facts = &collector.facts;
     let line = |claim: Claim| {
@@ -164,6 +165,27 @@ fn rospy_names_what_it_publishes_and_subscribes() {
             "Node /a",
             "Snapshot topics of /a"
         ]
+    );
+}
+
+#[test]
+fn one_python_record_makes_a_node_one_of_rospy() {
+    let mut facts = Claims::default();
+    let [script, driver, topic] = ["/a", "/b", "/scan"].map(|name| facts.name(name));
+    for node in [script, driver] {
+        let said = Statement {
+            claim: Claim::Lists(node, topic),
+            degree: Degree::Stated,
+            snapshot: None,
+        };
+        facts.add(0, said, Some(Stamp(5)));
+    }
+    facts.rospy.insert(script);
+    source::rosout::settle(&mut facts);
+    let claims: Vec<Claim> = facts.list.iter().map(|fact| fact.claim).collect();
+    assert_eq!(
+        claims,
+        [Claim::Lists(script, topic), Claim::Publish(driver, topic)]
     );
 }
 

@@ -3,12 +3,12 @@
 //!
 //! A node that other evidence shows again and again counts as gone where all of it stops for good at the time at which
 //! its topic fell silent, for longer than ever before. Messages that come after that silence are not known to be its
-//! own.
+//! own: they are of the only node that names the topic and begins with them, if there is one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use super::NamedTopics;
+use super::{NamedTopics, SOON_NS};
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
@@ -25,23 +25,32 @@ pub(super) fn part(
     facts: &mut Claims,
     messages: &mut Stamps,
 ) -> io::Result<()> {
-    let ends = {
+    let (ends, heirs) = {
         let mut bag = RewrittenBag::new(streams, of_bag, facts, messages);
-        bag.ends(named)?
+        let ends = bag.ends(named)?;
+        let heirs: Vec<Option<Name>> = ends.iter().map(|end| bag.heir(named, end)).collect();
+        (ends, heirs)
     };
     let mut gone: BTreeMap<Name, Stamp> = BTreeMap::new();
-    for end in ends {
+    for (end, heir) in ends.into_iter().zip(heirs) {
         let last = gone.entry(end.node).or_insert(end.time);
         *last = end.time.max(*last);
         let stream = &mut streams[end.stream];
-        let own = stream.trust == Reliability::Whole && stream.publisher == Some(end.node);
+        let is_known = stream.trust == Reliability::Whole || heir.is_some();
+        let own = is_known && stream.publisher == Some(end.node);
         if let Some(next) = end.next.filter(|_| own) {
             let times = messages.split(stream.times, next)?;
-            let rest = Stream {
+            let mut rest = Stream {
                 times,
                 trust: Reliability::Gone,
                 ..stream.clone()
             };
+            if let Some(heir) = heir {
+                // What fell silent with its node was sent by it alone.
+                stream.trust = Reliability::Likely;
+                rest.trust = Reliability::Likely;
+                rest.publisher = Some(heir);
+            }
             streams.push(rest);
         }
     }
@@ -176,6 +185,20 @@ impl<'a> RewrittenBag<'a> {
         }))
     }
 
+    /// The only node that names the topic of an end and was first seen when its messages came again.
+    fn heir(&self, named: &NamedTopics, end: &NodeEnd) -> Option<Name> {
+        let next = end.next?;
+        let begins = |node: &Name| {
+            let signs = self.told.get(node).into_iter().flatten();
+            let bounds = signs.filter_map(|id| self.facts.times.bounds(*id));
+            let first = bounds.map(|(first, _)| first).min();
+            first.is_some_and(|first| first.since(next).abs() <= SOON_NS)
+        };
+        let nodes = named.nodes(self.streams[end.stream].topic);
+        let mut new = nodes.filter(|node| *node != end.node && begins(node));
+        new.next().filter(|_| new.next().is_none())
+    }
+
     /// The times of all signs of a node, without the messages of one stream, sorted.
     fn signs(&self, node: Name, except: usize) -> io::Result<Vec<Stamp>> {
         let mut signs = Vec::new();
@@ -217,7 +240,7 @@ impl<'a> RewrittenBag<'a> {
 }
 
 /// The node that a claim shows to be there.
-fn shown(claim: Claim) -> Option<Name> {
+pub(super) fn shown(claim: Claim) -> Option<Name> {
     match claim {
         Claim::Node(node)
         | Claim::Publish(node, _)

@@ -29,6 +29,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             Reliability::Whole | Reliability::Player => {
                 known.prove(proof(edge, Validity::Messages(at)));
             }
+            Reliability::Likely => known.prove(Proof {
+                degree: Degree::Inferred,
+                ..proof(edge, Validity::Messages(at))
+            }),
             Reliability::First => known.prove(Proof {
                 // The tool that wrote this header knows it of no other message.
                 degree: Degree::Stated,

@@ -1,8 +1,8 @@
 //! Contracts of well-known nodes: the topics that a node of a known package publishes and subscribes under its default
 //! names, as `contracts.csv` lists it. It counts where the bag names the node and has the topic with that type.
 //!
-//! A row with source files is for nodes whose log records come from one of them, by its name or, if the row names none,
-//! whatever they are called; a node of that name that logs from other files only is another program.
+//! Each row names the source files that its program logs from: a node of that name that logs from other files only is
+//! another program. A row without a node's name is for every node that logs from one of its files.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -38,7 +38,7 @@ pub(crate) fn read(
 struct Contract {
     /// The node's own name, without a namespace; empty for any.
     node: String,
-    /// The source files that it logs from; empty if not known.
+    /// The source files that it logs from.
     files: Vec<String>,
     /// The version of ROS, `1` or `2`; empty for either.
     ros: String,
@@ -84,9 +84,7 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
-    let mut streams = known.streams.iter();
-    let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
-    let foreign = if is_ros1 { "2" } else { "1" };
+    let foreign = foreign(known);
     let nodes = known.nodes().clone();
     let mut publishers: BTreeMap<Name, Vec<(Name, Contract)>> = BTreeMap::new();
     for contract in contracts().into_iter().filter(|c| c.ros != foreign) {
@@ -115,6 +113,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (topic, nodes) in publishers {
         publish(source, known, topic, &nodes);
     }
+}
+
+/// The version of ROS whose rows do not apply.
+fn foreign(known: &Conclusions<'_>) -> &'static str {
+    let mut streams = known.streams.iter();
+    let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
+    if is_ros1 { "2" } else { "1" }
 }
 
 /// Adds the publishers of a topic, unless there would be more than the bag counts.
@@ -147,23 +152,49 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
     )
 }
 
-/// The types that one well-known program alone publishes.
+/// The well-known programs, and the types that one of them alone publishes.
 pub(crate) struct Owners(Vec<Contract>);
 
 impl Owners {
     /// Reads the table.
     pub(crate) fn new() -> Self {
-        Self(contracts().into_iter().filter(|c| c.owns).collect())
+        Self(contracts())
     }
 
     /// The default name of the node that publishes messages of this type: in the namespace in which it would publish
     /// `topic`.
     pub(crate) fn node(&self, kind: &str, topic: &str) -> Option<String> {
-        let row = self.0.iter().find(|c| c.kind == kind)?;
+        let row = self.0.iter().find(|c| c.owns && c.kind == kind)?;
         let space = topic.strip_suffix(row.topic.as_str());
         let space = space.filter(|_| !row.topic.starts_with('/'));
         let space = space.map_or("", |space| space.trim_end_matches('/'));
         Some(format!("{space}/{}", row.node))
+    }
+
+    /// The recorded topics that the owner of a type, with this name, publishes (true) and subscribes as well.
+    pub(crate) fn others(
+        &self,
+        known: &Conclusions<'_>,
+        kind: &str,
+        node: &str,
+    ) -> Vec<(bool, Name)> {
+        let foreign = foreign(known);
+        let owner = self.0.iter().find(|c| c.owns && c.kind == kind);
+        let is_other = |row: &&Contract| {
+            let is_same =
+                |owner: &Contract| (&owner.node, &owner.package) == (&row.node, &row.package);
+            row.ros != foreign && owner.is_some_and(is_same)
+        };
+        let recorded = |row: &Contract| {
+            let topic = known.facts.known(&resolved(&row.topic, node));
+            let topic = topic.filter(|topic| known.kind(*topic) == row.kind)?;
+            Some((row.publishes, topic))
+        };
+        self.0
+            .iter()
+            .filter(is_other)
+            .filter_map(recorded)
+            .collect()
     }
 }
 
@@ -183,10 +214,10 @@ fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
 /// Whether a row applies to a node of this name that logs from these files.
 fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>) -> bool {
     let own = |files: &BTreeSet<Arc<str>>| contract.files.iter().any(|f| files.contains(&**f));
-    match (contract.node.is_empty(), contract.files.is_empty()) {
-        (true, _) => files.is_some_and(own),
-        (false, true) => last_part(node) == contract.node,
-        (false, false) => last_part(node) == contract.node && files.is_none_or(own),
+    if contract.node.is_empty() {
+        files.is_some_and(own)
+    } else {
+        last_part(node) == contract.node && files.is_none_or(own)
     }
 }
 
@@ -217,10 +248,7 @@ mod tests {
                 "line {line}"
             );
             assert!(["", "1", "2"].contains(&&*contract.ros), "line {line}");
-            assert!(
-                !contract.node.is_empty() || !contract.files.is_empty(),
-                "line {line}"
-            );
+            assert!(!contract.files.is_empty(), "line {line}");
             assert!(contract.kind.matches('/').count() == 1, "line {line}");
         }
     }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::SourceContext;
+use crate::base::name::in_space;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, PayloadCursor};
@@ -44,7 +45,8 @@ pub(crate) fn read(
         && record.text.len() <= LONGEST
         && !record.file.ends_with("recorder.cpp")
     {
-        heard.facts.spoken.say(time, &record.logger, record.text);
+        let logger = in_space(heard.space, &record.logger);
+        heard.facts.spoken.say(time, &logger, record.text);
     }
     Ok(())
 }

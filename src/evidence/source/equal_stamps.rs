@@ -2,14 +2,16 @@
 //! again and again, subscribes that input.
 //!
 //! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs are possible
-//! and nothing tells them apart, no claim is made.
+//! and nothing tells them apart, no claim is made, and none about a simulation, in which all that is sent in one step
+//! has one stamp.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
 use crate::bag::{Connection, Encoding};
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Name, SourceId};
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Claim, ClaimRecord, Name, SourceId};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::definition::outline;
 use crate::evidence::proof::{Conclusions, ElementKey};
@@ -129,6 +131,9 @@ struct Flows {
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
+    if is_simulated(known) {
+        return;
+    }
     let flows = flows(known);
     for (output, flow) in flows.all.iter().enumerate() {
         let copied = flow
@@ -141,7 +146,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let Some(input) = input(known, &flows, output) else {
             continue;
         };
-        let (topic, matches) = (flows.all[input].topic, flows.pairs[&(output, input)].before);
+        let (topic, matches) = input;
         for node in &flow.nodes {
             let basis = ElementKey::Publish(*node, flow.topic);
             known.infer(source, ElementKey::Subscribe(topic, *node), basis, |known| {
@@ -155,35 +160,104 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// The flow that an output answers, if only one is possible.
-fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize> {
+/// Whether nodes run by simulated time.
+fn is_simulated(known: &Conclusions<'_>) -> bool {
+    let is_clock = |topic: Name| known.kind(topic) == "rosgraph_msgs/Clock";
+    let has_clock = known.streams.iter().any(|s| is_clock(s.topic));
+    let sets = |fact: &ClaimRecord| {
+        SOURCES
+            .get(fact.source)
+            .is_some_and(|s| s.word == "sim_time")
+    };
+    let is_set = |fact: &&ClaimRecord| matches!(fact.claim, Claim::Subscribe(..)) && sets(fact);
+    has_clock || known.facts.list.iter().any(|fact| is_set(&fact))
+}
+
+/// The topic that an output answers, if only one is possible, and the number of messages that carry its stamp.
+fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name, u64)> {
     let flow = &flows.all[output];
     let own = flows.pairs.range((output, 0)..=(output, usize::MAX));
-    let good = own.filter(|((_, input), pair)| {
-        flows.all[*input].topic != flow.topic
+    // All publishers of a topic are one input.
+    let mut topics: BTreeMap<Name, (usize, StampPair, u64)> = BTreeMap::new();
+    for ((_, input), pair) in own {
+        let back = flows.pairs.get(&(*input, output)).map_or(0, |p| p.before);
+        let of = topics
+            .entry(flows.all[*input].topic)
+            .or_insert((*input, StampPair::default(), 0));
+        of.1.equal += pair.equal;
+        of.1.before += pair.before;
+        of.1.lag = of.1.lag.and(pair.lag);
+        of.2 += back;
+    }
+    let good = topics.into_iter().filter(|(topic, (input, pair, back))| {
+        *topic != flow.topic
             && pair.before >= FEWEST
             && pair.before * 100 >= flow.messages * SHARE
             && pair.before * 100 >= pair.equal * ORDERED
+            && back * 100 <= pair.equal * (100 - ORDERED)
+            && can_feed(&flows.all[*input].kind, &flow.kind)
             && !flow
                 .nodes
                 .iter()
-                .any(|n| known.knows(ElementKey::Publish(*n, flows.all[*input].topic)))
+                .any(|n| known.knows(ElementKey::Publish(*n, *topic)))
     });
-    let good: Vec<(usize, StampPair)> = good.map(|((_, input), pair)| (*input, *pair)).collect();
+    let good: Vec<(usize, StampPair)> = good.map(|(_, (input, pair, _))| (input, pair)).collect();
     let most = good.iter().map(|(_, pair)| pair.before).max()?;
     let best: Vec<_> = good
         .into_iter()
         .filter(|(_, pair)| pair.before * 100 >= most * AS_GOOD)
         .collect();
     let best = without_siblings(flows, flow, best)?;
-    if let [(only, _)] = best[..] {
-        return Some(only);
+    let found = |(at, pair): &(usize, StampPair)| (flows.all[*at].topic, pair.before);
+    if let [only] = &best[..] {
+        return Some(found(only));
     }
     let clear = |(at, pair): &&(usize, StampPair)| {
         let mut others = best.iter().filter(|(other, _)| other != at);
         others.all(|(_, other)| pair.lag.is_clearly_less(&other.lag))
     };
-    best.iter().find(clear).map(|(at, _)| *at)
+    best.iter().find(clear).map(found)
+}
+
+/// Measurements that sensors send, and what is made of nothing but messages of its own row: no camera image is computed
+/// from a laser scan.
+const SENSED: [&[&str]; 4] = [
+    &[
+        "sensor_msgs/Image",
+        "sensor_msgs/CompressedImage",
+        "stereo_msgs/DisparityImage",
+    ],
+    &["sensor_msgs/Imu", "sensor_msgs/MagneticField"],
+    &["sensor_msgs/JointState"],
+    &["sensor_msgs/NavSatFix"],
+];
+/// Scans and clouds, which are computed from images too.
+const CLOUDS: [&str; 3] = [
+    "sensor_msgs/LaserScan",
+    "sensor_msgs/PointCloud",
+    "sensor_msgs/PointCloud2",
+];
+/// Packages whose messages describe a robot's surroundings or its state, not what a program of its own defines.
+const COMMON: [&str; 4] = ["sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/"];
+
+/// Whether messages of one type may be computed from those of another. The calibration of a camera alone is the basis
+/// of nothing else.
+fn can_feed(input: &str, output: &str) -> bool {
+    const CALIBRATION: &str = "sensor_msgs/CameraInfo";
+    let is_common = COMMON.iter().any(|package| input.starts_with(package));
+    let row = SENSED.iter().find(|row| row.contains(&output));
+    if input == CALIBRATION {
+        return output == CALIBRATION;
+    }
+    if !is_common || input == output {
+        return true;
+    }
+    if CLOUDS.contains(&output) {
+        return CLOUDS.contains(&input) || SENSED[0].contains(&input);
+    }
+    // A depth image may be one of a cloud.
+    let is_depth = |row: &[&str]| row == SENSED[0] && input == "sensor_msgs/PointCloud2";
+    row.is_none_or(|row| row.contains(&input) || is_depth(row))
 }
 
 /// The input among flows that one publisher sends with one stamp: the one of the output's type, else the only one that
@@ -312,4 +386,29 @@ fn compare(
 /// Whether two flows come from different senders, as far as is known.
 fn is_other(one: &StampFlow, other: &StampFlow) -> bool {
     one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_type_is_computed_from_what_may_feed_it_only() {
+        for (input, output, may) in [
+            ("sensor_msgs/Image", "sensor_msgs/Image", true),
+            ("sensor_msgs/Image", "sensor_msgs/PointCloud2", true),
+            ("sensor_msgs/LaserScan", "geometry_msgs/PoseStamped", true),
+            ("vision_msgs/Detection2DArray", "sensor_msgs/Image", true),
+            (
+                "sensor_msgs/CameraInfo",
+                "vision_msgs/Detection2DArray",
+                false,
+            ),
+            ("sensor_msgs/LaserScan", "sensor_msgs/Image", false),
+            ("nav_msgs/Odometry", "sensor_msgs/LaserScan", false),
+            ("sensor_msgs/JointState", "sensor_msgs/Imu", false),
+        ] {
+            assert_eq!(can_feed(input, output), may, "{input} to {output}");
+        }
+    }
 }

@@ -256,28 +256,35 @@ impl PayloadWalk {
     }
 }
 
-/// The flows of the same type by others that had enough of an output's messages first.
+/// The flows of the same type by others that had enough of an output's messages first. Where neither clearly was the
+/// first, a complete list of the other's topics decides.
 fn inputs(
-    known: &Conclusions<'_>,
+    known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
     matches: &Matches,
     output: usize,
     node: Name,
 ) -> Vec<usize> {
-    let kind = |topic: Name| known.kind(topic);
     let before = |a, b| matches.pairs.get(&(a, b)).map_or(0, |pair| pair.before);
-    let is_input = |input: &usize| {
-        let (topic, _) = flows[*input];
-        let often = before(*input, output);
-        topic != flows[output].0
-            && kind(topic) == kind(flows[output].0)
-            && often >= FEWEST
-            && often >= FIRST * before(output, *input)
-            && !known.knows(ElementKey::Publish(node, topic))
-    };
+    let (to, _) = flows[output];
     let own = matches.origins.get(&output).into_iter().flatten();
     let from: BTreeSet<usize> = own.flat_map(|(from, _)| from).copied().collect();
-    from.into_iter().filter(is_input).collect()
+    let mut inputs = Vec::new();
+    for input in from {
+        let (topic, sender) = flows[input];
+        let (often, back) = (before(input, output), before(output, input));
+        let is_known = known.knows(ElementKey::Publish(node, topic));
+        if topic == to || known.kind(topic) != known.kind(to) || often < FEWEST || is_known {
+            continue;
+        }
+        let is_undecided = back < FIRST * often;
+        let is_input = often >= FIRST * back
+            || is_undecided && sender.is_some_and(|of| known.denies(ElementKey::Subscribe(to, of)));
+        if is_input {
+            inputs.push(input);
+        }
+    }
+    inputs
 }
 
 /// The number of different messages of an output that one of these inputs had just before, or just after.

@@ -1,7 +1,7 @@
 //! Log records of ROS 1: a node is alive, and the topics it names as its own.
 //!
-//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the file
-//! that logged.
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes; a node is of rospy if any of its
+//! records comes from a file of Python.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use super::SourceContext;
 use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
+use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
 
@@ -52,13 +52,23 @@ pub(crate) fn read(
             heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
         }
     }
-    let claim = if is_rospy(file) {
-        Claim::Lists
-    } else {
-        Claim::Publish
-    };
-    list(heard, (name, message), &topics, claim);
+    if is_rospy(file) {
+        heard.facts.rospy.insert(node);
+    }
+    list(heard, (name, message), &topics);
     Ok(())
+}
+
+/// Takes the lists of nodes of roscpp for what they are: lists of publications.
+pub(crate) fn settle(facts: &mut Claims) {
+    let rospy = std::mem::take(&mut facts.rospy);
+    for fact in &mut facts.list {
+        if let Claim::Lists(node, topic) = fact.claim
+            && !rospy.contains(&node)
+        {
+            fact.claim = Claim::Publish(node, topic);
+        }
+    }
 }
 
 /// Whether a record is of rospy, which names the file without its folder; a script need not end in `.py`.
@@ -73,20 +83,16 @@ fn is_rospy(file: &str) -> bool {
 
 /// Takes the list of topics in a log record of a node, with its text. It is whole: what is in an earlier one and not in
 /// this one is no longer the node's.
-fn list(
-    heard: &mut SourceContext<'_>,
-    (name, message): (&str, &str),
-    topics: &[&str],
-    claim: fn(Name, Name) -> Claim,
-) {
+fn list(heard: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[&str]) {
     let node = heard.name(name);
-    let list = heard.name(&format!("topics of {name}"));
+    let list = format!("topics of {}", heard.facts.text(node));
+    let list = heard.name(&list);
     for topic in topics {
         let words = || format!("{name} logs with {topic} in its list of topics: {message}");
-        let claim = claim(node, heard.name(topic));
+        let topic = heard.name(topic);
         heard.say(
             Statement {
-                claim,
+                claim: Claim::Lists(node, topic),
                 degree: Degree::Stated,
                 snapshot: Some(list),
             },

@@ -2,7 +2,8 @@
 //! `/rosout_agg`.
 
 use crate::bag::Encoding;
-use crate::evidence::claim::{Degree, SourceId};
+use crate::base::name::in_space;
+use crate::evidence::claim::{Degree, Name, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -13,14 +14,30 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     if !ros1 || known.nodes().is_empty() {
         return;
     }
-    let [log, all] = ["/rosout", "/rosout_agg"].map(|name| known.facts.name(name));
+    // Recordings in namespaces have a master each.
+    for space in known.facts.spaces.clone() {
+        add(source, known, &space);
+    }
+}
+
+/// Adds the log of the nodes whose recording lies in a namespace.
+fn add(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
+    let own = |node: &str| {
+        let spaces = known.facts.spaces.iter().map(String::as_str);
+        let around = spaces.filter(|of| !of.is_empty() && in_space(of, node) == node);
+        around.max_by_key(|of| of.len()).unwrap_or_default() == space
+    };
+    let nodes = known.nodes().iter().copied();
+    let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
+    let [log, all] =
+        ["/rosout", "/rosout_agg"].map(|name| known.facts.name(&in_space(space, name)));
     let rule = |what, when| Proof {
         what,
         source,
         degree: Degree::Inferred,
         when,
     };
-    for node in known.nodes().clone() {
+    for node in nodes {
         if node != log {
             known.prove(rule(
                 ElementKey::Publish(node, log),

@@ -4,11 +4,15 @@
 //! packages are searched for beside the file. See <http://wiki.ros.org/roslaunch/XML> and the design article on static
 //! launch files of ROS 2.
 
+mod args;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::substitution::{SubstitutionContext, is_true};
+use args::ProgramArguments;
+
+use super::substitution::{ANONYMOUS, SubstitutionContext, is_true};
 use super::tree::{self, Tree};
 use super::{NamedElement, Topology, TopologyEntry, place, python, resolved, unused};
 use crate::base::budget::LaunchWork;
@@ -45,6 +49,28 @@ pub(crate) struct LaunchedNode {
     /// The line that starts it, ≥ 1; 0 where not known.
     pub(crate) line: usize,
 }
+
+impl LaunchedNode {
+    /// The full name of a topic: `~x` is below the node, a plain name in its namespace.
+    fn full(&self, node: &str, topic: &str) -> String {
+        match topic.strip_prefix('~') {
+            Some(private) => join(node, private.trim_start_matches('/')),
+            None => join(&self.namespace, topic),
+        }
+    }
+
+    /// The full name of a topic of its program after its remaps; of `in/compressed`, `in` may be remapped.
+    fn resolved(&self, node: &str, topic: &str) -> String {
+        let remapped = self.remaps.iter().rev().find_map(|(from, to)| {
+            let rest = topic.strip_prefix(from.as_str())?;
+            (rest.is_empty() || rest.starts_with('/')).then(|| format!("{to}{rest}"))
+        });
+        self.full(node, remapped.as_deref().unwrap_or(topic))
+    }
+}
+
+/// The most topics that the arguments of a node name.
+const MOST_TOPICS: usize = 1000;
 
 /// The treatment of conditions that cannot be decided statically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -227,7 +253,9 @@ impl Launch {
     fn node(&mut self, path: &Path, tree: &Tree, scope: &Scope) {
         let mut value = |name: &str| self.value(path, tree, scope, name);
         let own_space = value("ns").or_else(|| value("namespace"));
-        let node = LaunchedNode {
+        let given = value("args").unwrap_or_default();
+        let given = ProgramArguments::new(&given);
+        let mut node = LaunchedNode {
             package: value("pkg").unwrap_or_default(),
             program: ["type", "exec", "plugin"]
                 .into_iter()
@@ -238,6 +266,10 @@ impl Launch {
             remaps: self.remaps(path, tree, scope),
             line: tree.line,
         };
+        node.remaps.extend(given.remaps.iter().cloned());
+        if let Some((package, class)) = given.nodelet().filter(|_| node.package == "nodelet") {
+            (node.package, node.program) = (package, class);
+        }
         if self
             .budget
             .spend(ENTRY + node.remaps.len() * ENTRY)
@@ -246,6 +278,7 @@ impl Launch {
             return;
         }
         if self.undecided == Undecided::Taken {
+            node.name = node.name.map(|name| name.replace(ANONYMOUS, ""));
             self.nodes.push(node);
             return;
         }
@@ -255,13 +288,19 @@ impl Launch {
         };
         let full = join(&node.namespace, name);
         self.add(path, tree, NamedElement::Node(full.clone()));
-        for (_, to) in &node.remaps {
-            // `~x` is below the node, a plain name in its namespace.
-            let topic = match to.strip_prefix('~') {
-                Some(private) => join(&full, private.trim_start_matches('/')),
-                None => join(&node.namespace, to),
+        let topics = given.topics(&node.package, &node.program);
+        for (publishes, topic) in topics.into_iter().take(MOST_TOPICS) {
+            let topic = node.resolved(&full, &topic);
+            let of = full.clone();
+            let edge = if publishes {
+                NamedElement::Publish(of, topic)
+            } else {
+                NamedElement::Subscribe(of, topic)
             };
-            self.add(path, tree, NamedElement::Topic(topic));
+            self.add(path, tree, edge);
+        }
+        for (_, to) in &node.remaps {
+            self.add(path, tree, NamedElement::Topic(node.full(&full, to)));
         }
     }
 

@@ -9,6 +9,9 @@ use crate::base::budget::LaunchWork;
 /// The longest text after substitution, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
 
+/// Stands for the part of an anonymous name that is new in every run; no name holds it.
+pub(crate) const ANONYMOUS: char = '*';
+
 /// The deepest nesting of substitutions; deeper ones are hostile.
 const DEEPEST: usize = 16;
 
@@ -65,7 +68,7 @@ impl SubstitutionContext<'_> {
                 Some((name, default)) => argument(name).or(Some(unquoted(default).to_owned())),
                 None => argument(words),
             },
-            "anon" => Some(words.to_owned()),
+            "anon" => Some(format!("{words}{ANONYMOUS}")),
             "optenv" => Some(
                 words
                     .split_once(' ')
@@ -155,6 +158,7 @@ mod tests {
             ("$(arg robot)/$(var robot)", "r1/r1"),
             ("$(var $(var which))", "r1"),
             ("$(env HOME /root)", "/root"),
+            ("$(anon viewer)", "viewer*"),
             ("$(eval arg('robot') == 'r1')", "true"),
             ("$(eval \"'$(var robot)' == 'r2' or $(var sim)\")", "true"),
             ("$(not $(var sim))", "false"),

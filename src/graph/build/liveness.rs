@@ -94,6 +94,8 @@ pub(crate) struct Liveness {
     pub(crate) seen: Vec<Stamp>,
     /// The signs that state a fact that may have begun before.
     pub(crate) stated: Vec<Stamp>,
+    /// The signs among these that come as soon as the fact is true: statistics of a connection.
+    pub(crate) counted: Vec<Stamp>,
     /// Proofs of an end.
     pub(crate) ends: Vec<Stamp>,
     /// The times at which something that is proved by it began, such as a rhythm.
@@ -125,6 +127,7 @@ impl Default for Liveness {
             signs: Vec::new(),
             seen: Vec::new(),
             stated: Vec::new(),
+            counted: Vec::new(),
             ends: Vec::new(),
             begins: Vec::new(),
             heard: None,
@@ -313,7 +316,8 @@ impl Liveness {
                 let absent = next.checked_sub(1).map(|at| self.ends[at].plus(1));
                 let absent = absent.filter(|at| *at > around.from);
                 let stated = self.stated.binary_search(&first.from).is_ok();
-                first.begin_within(around, absent, stated);
+                let dated = absent.is_some() && self.counted.contains(&first.from);
+                first.begin_within(around, absent, stated && !dated);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
                 let end = self.end(around.to, false).filter(|_| !self.lasts);
@@ -481,6 +485,24 @@ mod tests {
     fn a_lifetime_spans_its_signs() {
         assert_eq!(stretches(&[1, 5, 9], &[]), [(1, 9)]);
         assert_eq!(stretches(&[], &[4]), []);
+    }
+
+    #[test]
+    fn statistics_date_a_subscription_before_the_list_without_it() {
+        let stamp = |seconds: i64| Stamp(seconds * 1_000_000_000);
+        let began = |counted: Vec<Stamp>| {
+            let mut edge = Liveness {
+                lasts: true,
+                ..Liveness::default()
+            };
+            // A list without it at 10 s, statistics at 30 s, a list with it at 60 s.
+            edge.sign_all(&[stamp(30), stamp(60)], &[stamp(10)]);
+            edge.counted = counted;
+            edge.live_within(&[whole((stamp(0), stamp(90)))]);
+            edge.lives[0].from
+        };
+        assert_eq!(began(Vec::new()), stamp(10).plus(1));
+        assert_eq!(began(vec![stamp(30)]), stamp(30));
     }
 
     #[test]

@@ -156,10 +156,11 @@ pub(crate) fn restarts(
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
         let mut breaks = narrowed(breaks);
-        for log in own
-            .iter()
-            .filter(|own| findings.text(own.topic).as_ref() == "/rosout")
-        {
+        let is_log = |own: &&Own<'_>| {
+            let mut streams = own.streams.iter().map(|at| &recorded.streams[*at]);
+            streams.any(|stream| stream.connection.topic.as_str() == "/rosout")
+        };
+        for log in own.iter().filter(is_log) {
             breaks.retain(|gap| !counts_on(recorded, log, *gap));
         }
         if breaks.is_empty() {

@@ -73,6 +73,12 @@ pub(crate) fn tracks(
             Validity::Signs { signs, ends } => {
                 let ends = together(ends, &deaths);
                 track.sign_all(signs, &ends);
+                if SOURCES
+                    .get(proof.source)
+                    .is_some_and(|s| s.word == "statistics")
+                {
+                    track.counted.extend(signs.first());
+                }
                 if SOURCES.get(proof.source).is_some_and(|s| s.own) {
                     track.heard = track.heard.max(signs.last().copied());
                     track.speaks = true;

@@ -152,6 +152,19 @@ fn names_resolve_to_texts_and_types() {
 }
 
 #[test]
+fn a_name_passed_to_a_constructor_is_found_in_the_call() {
+    let text = r#"class Walker : public rclcpp::Node { public:
+          Walker(const std::string &n) : Node(n) { create_publisher<std_msgs::msg::Bool>("on", 1); } };
+        int main() { rclcpp::spin(std::make_shared<Walker>("walker")); }"#;
+    let classes = read(text).classes;
+    assert_eq!(
+        classes[0].mentions.get("Walker"),
+        Some(&Some("walker".to_owned()))
+    );
+    assert_eq!(names(text)[1].1, [] as [&str; 0]);
+}
+
+#[test]
 fn functions_outside_their_class_belong_to_it() {
     let text = "#include \"x.hpp\"\nFoo::Foo() : Base(\"foo_node\") { }\nvoid a::Foo::run() { create_publisher<std_msgs::msg::Bool>(\"on\", 1); }";
     let classes = read(text).classes;

@@ -130,3 +130,23 @@ fn similar_calls_are_not_declarations() {
     let text = "from zmq import Publisher\np = Publisher('x', y)\n# rospy.Publisher('no', String)\n'''rospy.Publisher('no', String)'''\n";
     assert_eq!(declared(text), [] as [&str; 0]);
 }
+
+#[test]
+fn loops_over_literals_are_followed() {
+    let text = "from std_msgs.msg import String, Int8\nTOPICS = ['a', 'b']\n\
+        for name in TOPICS:\n    node.create_publisher(String, '/x/' + name, 1)\n\
+        for name, kind in (('c', String), ('d', Int8)):\n    node.create_subscription(kind, name, cb, 1)\n\
+        subs = [node.create_subscription(t, n, cb, 1) for n, t in {'e': Int8}.items()]\n\
+        for name in unknown():\n    node.create_publisher(String, name, 1)\n";
+    assert_eq!(
+        declared(text),
+        [
+            "+/x/a std_msgs/String",
+            "+/x/b std_msgs/String",
+            "-c std_msgs/String",
+            "-d std_msgs/Int8",
+            "-e std_msgs/Int8",
+            "+? std_msgs/String",
+        ]
+    );
+}

@@ -49,6 +49,36 @@ fn ros2_is_the_same_in_xml_and_yaml() {
 }
 
 #[test]
+fn arguments_of_relays_are_edges() {
+    let text = r#"<launch><group ns="r1">
+        <node pkg="topic_tools" type="mux" name="mux" args="cmd_vel joy auto"/>
+        <node pkg="image_transport" type="republish" name="republish" args="compressed in:=/image raw out:=plain"/>
+        </group></launch>"#;
+    let edge = |publishes: bool, node: &str, topic: &str| {
+        let (node, topic) = (node.to_owned(), topic.to_owned());
+        if publishes {
+            NamedElement::Publish(node, topic)
+        } else {
+            NamedElement::Subscribe(node, topic)
+        }
+    };
+    assert_eq!(
+        elements(text),
+        [
+            NamedElement::Node("/r1/mux".into()),
+            edge(false, "/r1/mux", "/r1/joy"),
+            edge(false, "/r1/mux", "/r1/auto"),
+            edge(true, "/r1/mux", "/r1/cmd_vel"),
+            NamedElement::Node("/r1/republish".into()),
+            edge(false, "/r1/republish", "/image/compressed"),
+            edge(true, "/r1/republish", "/r1/plain"),
+            NamedElement::Topic("/image".into()),
+            NamedElement::Topic("/r1/plain".into()),
+        ]
+    );
+}
+
+#[test]
 fn includes_are_followed_with_their_arguments() {
     let folder = tempfile::tempdir().unwrap();
     let launch = folder.path().join("robot/launch");

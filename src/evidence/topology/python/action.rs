@@ -158,9 +158,14 @@ fn tree(name: &str, given: &Arguments) -> Option<Tree> {
 
 fn node(tag: &str, given: &Arguments) -> Tree {
     let text = |name| given.text(usize::MAX, name);
+    let words = match given.named("arguments") {
+        Some(PythonValue::List(words)) => words.iter().map(PythonValue::launch_text).collect(),
+        _ => Vec::new(),
+    };
     let mut tree = element(
         tag,
         &[
+            ("args", Some(words.join(" "))),
             ("pkg", text("package")),
             (
                 "exec",

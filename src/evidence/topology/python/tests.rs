@@ -28,6 +28,17 @@ fn indented(lines: &str) -> String {
         .collect()
 }
 
+#[test]
+fn arguments_of_a_relay_are_edges() {
+    let node =
+        "Node(package='topic_tools', executable='relay', name='relay', arguments=['/a', '/b'])";
+    let text =
+        format!("def generate_launch_description():\n    return LaunchDescription([{node}])\n");
+    let edges = topology(&text).entries.into_iter().map(|e| e.element);
+    let publishes = NamedElement::Publish("/relay".into(), "/b".into());
+    assert!(edges.into_iter().any(|edge| edge == publishes));
+}
+
 fn named(topology: &Topology) -> Vec<String> {
     let name = |element: &NamedElement| match element {
         NamedElement::Node(name) => Some(name.clone()),

@@ -1,0 +1,105 @@
+//! How far the clocks of several recorders are apart, by the messages that two of them recorded.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use super::collector::Recorded;
+use crate::base::time::Stamp;
+
+/// The fewest messages in common that are not chance.
+const FEWEST: usize = 10;
+/// The share, in per cent, of the messages in common that must agree about the offset.
+const SHARE: usize = 80;
+/// How far two messages may differ about one offset, in nanoseconds: they take different ways to the recorders.
+const NEAR_NS: i64 = 50_000_000;
+
+/// The offset of a recorder's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ClockOffset {
+    /// The place of the bag among the inputs, and that of the one that it is compared with.
+    pub(crate) bag: usize,
+    pub(crate) other: usize,
+    /// How far its clock is ahead, in nanoseconds.
+    pub(crate) ahead: i64,
+    /// The number of messages that show it.
+    pub(crate) messages: usize,
+}
+
+/// The times of the contents that a bag has once on a topic; `None` for those that it has more often.
+type Contents<'a> = BTreeMap<(&'a str, u32), Option<Stamp>>;
+
+/// The bags whose clocks differ from that of an earlier one.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn offsets(recorded: &Recorded) -> io::Result<Vec<ClockOffset>> {
+    let last = recorded.streams.iter().map(|stream| stream.bag).max();
+    let mut bags: Vec<Contents<'_>> = vec![Contents::new(); last.map_or(0, |last| last + 1)];
+    if bags.len() < 2 {
+        return Ok(Vec::new());
+    }
+    for (at, series) in &recorded.facts.payloads {
+        let stream = &recorded.streams[*at];
+        if stream.latched {
+            continue;
+        }
+        let contents = &mut bags[stream.bag];
+        recorded.facts.times.merge(&[*series], |timed| {
+            let key = (stream.connection.topic.as_str(), timed.size);
+            let time = contents.entry(key).or_insert(Some(timed.time));
+            *time = time.filter(|time| *time == timed.time);
+        })?;
+    }
+    let mut found = Vec::new();
+    for bag in 1..bags.len() {
+        let apart = (0..bag).find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
+        if let Some((other, (ahead, messages))) = apart
+            && ahead.abs() > NEAR_NS
+        {
+            found.push(ClockOffset {
+                bag,
+                other,
+                ahead,
+                messages,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// By how much the messages in common came later in the second recording, and their number; `None` without agreement.
+fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
+    let both = other.iter().filter_map(|(key, time)| {
+        let before = one.get(key)?.as_ref()?;
+        Some(time.as_ref()?.since(*before))
+    });
+    let mut lags: Vec<i64> = both.collect();
+    lags.sort_unstable();
+    let median = *lags.get(lags.len() / 2)?;
+    let near = lags.iter().filter(|lag| (**lag - median).abs() <= NEAR_NS);
+    let agreeing = near.count();
+    let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
+    is_clear.then_some((median, agreeing))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contents(times: &[i64]) -> Contents<'static> {
+        let keys = (0..).map(|hash| ("/tf", hash));
+        keys.zip(times.iter().map(|t| Some(Stamp(t * 1_000_000))))
+            .collect()
+    }
+
+    #[test]
+    fn an_offset_needs_messages_that_agree() {
+        let one: Vec<i64> = (0..20).map(|n| n * 100).collect();
+        let later: Vec<i64> = one.iter().map(|t| t + 350 + t % 7).collect();
+        let (ahead, messages) = apart(&contents(&one), &contents(&later)).unwrap();
+        assert_eq!((ahead / 10_000_000, messages), (35, 20));
+        let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
+        assert_eq!(apart(&contents(&one), &contents(&wild)), None);
+        assert_eq!(apart(&contents(&one[..5]), &contents(&later)), None);
+    }
+}
