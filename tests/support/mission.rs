@@ -198,7 +198,8 @@ impl Mission {
         let at = ORIGIN + (second * 1e9) as i64;
         let name = node.trim_start_matches('/').replace('/', ".");
         let payload = Cdr::default().time(at).u8(level).text(&name).text(text);
-        let payload = payload.text("node.cpp").text("run").u32(42).done();
+        let file = format!("{}_node.cpp", name.rsplit('.').next().unwrap_or_default());
+        let payload = payload.text(&file).text("run").u32(42).done();
         self.bag.messages.push((self.rosout, at + 400_000, payload));
     }
 
