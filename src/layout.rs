@@ -70,7 +70,7 @@ pub struct Vertex {
 }
 
 /// An edge to route. Parallel edges and self loops are allowed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Link {
     /// The vertex it begins at: a place in [`Plan::vertices`].
     pub from: usize,
@@ -78,6 +78,11 @@ pub struct Link {
     pub to: usize,
     /// The size of the widest label it ever shows, if any.
     pub label: Option<Size>,
+    /// The number of its fork: edges with the same one begin at the same vertex and part after their label, as far as
+    /// labels have room of their own and no cycle is broken among them.
+    pub fork: Option<usize>,
+    /// Whether it leaves the clusters around its ends as soon as it can, so that its label stands outside of them.
+    pub is_outside: bool,
 }
 
 /// A namespace to draw as a box around its members.
@@ -463,6 +468,17 @@ struct Layers {
     ranks: usize,
 }
 
+/// The first bend that an edge passes, seen from where it begins: after the first item if it runs with the ranks.
+fn first_bend(chain: &[usize], is_forward: bool) -> Option<usize> {
+    let bends = chain.get(1..chain.len().checked_sub(1)?)?;
+    if is_forward {
+        bends.first()
+    } else {
+        bends.last()
+    }
+    .copied()
+}
+
 impl Layers {
     /// The same layers without borders and as if no cluster were there.
     fn without_clusters(&self) -> Self {
@@ -510,7 +526,7 @@ mod tests {
         Link {
             from,
             to,
-            label: None,
+            ..Link::default()
         }
     }
 

@@ -42,7 +42,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["ledger"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
     ("view", &[
-        &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing"],
+        &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing", "shown"],
         &["cards", "settle"],
         &["union"],
         &["options"],
@@ -52,7 +52,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["apart", "frame", "lasting"],
         &["caption", "hidden", "marks", "nothing", "state"],
         &["turn"],
-        &["filtered", "frames"],
+        &["crowds", "filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["board", "paint", "strip"]]),

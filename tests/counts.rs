@@ -116,11 +116,11 @@ fn every_frame_has_the_counts_of_the_data() {
     }
 }
 
-/// One frame: its headline, and the marks of its boxes, rows, words and arrows.
+/// One frame: its headline, and the marks of its boxes, rows, words, arrows and frames.
 fn frame(svg: &str, shown: &BTreeSet<u64>, at: &str) {
     let named: BTreeSet<u64> = groups(svg, "headline").flatten().collect();
     assert_eq!(named, *shown, "headline of {at}");
-    let marks = ["node", "topic", "edge", "also"].into_iter();
+    let marks = ["node", "topic", "edge", "also", "crowd"].into_iter();
     let marked: BTreeSet<u64> = marks
         .flat_map(|class| groups(svg, class))
         .flatten()

@@ -66,6 +66,7 @@ fn plans() -> impl Strategy<Value = Plan> {
                     from,
                     to,
                     label: label.map(|w| Size::new(w, 13.0)),
+                    ..Link::default()
                 })
                 .collect(),
             clusters: clusters.clone(),
@@ -196,7 +197,7 @@ fn a_graph_too_large_for_layers_is_still_laid_out() {
     let link = |from, to| Link {
         from,
         to,
-        label: None,
+        ..Link::default()
     };
     let plan = Plan {
         vertices: (0..n).map(vertex).collect(),
@@ -249,6 +250,7 @@ fn an_inconsistent_plan_is_still_laid_out() {
                 from,
                 to,
                 label: Some(odd),
+                ..Link::default()
             })
             .to_vec(),
         clusters: vec![

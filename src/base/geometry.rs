@@ -154,6 +154,13 @@ pub(crate) fn on_cubic(points: [Point; 4], t: f64) -> Point {
     Point::new(mix(points.map(|p| p.x)), mix(points.map(|p| p.y)))
 }
 
+/// The part of a cubic Bézier curve after `t`, by its four points.
+pub(crate) fn after([a, b, c, end]: [Point; 4], t: f64) -> [Point; 4] {
+    let (ab, bc, cd) = (a.towards(b, t), b.towards(c, t), c.towards(end, t));
+    let (abc, bcd) = (ab.towards(bc, t), bc.towards(cd, t));
+    [abc.towards(bcd, t), bcd, cd, end]
+}
+
 /// The points of a path of cubic Bézier curves, each with its two controls and its end: the start, and then `pieces`
 /// points along each curve, the last of them its end.
 pub(crate) fn polyline(start: Point, curves: &[[Point; 3]], pieces: u32) -> Vec<Point> {

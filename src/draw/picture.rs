@@ -8,6 +8,7 @@ mod card;
 mod chips;
 pub(crate) use chips::chips;
 mod course;
+mod gates;
 mod ids;
 mod legend;
 pub(crate) use legend::{LegendSign, signs};
@@ -22,8 +23,12 @@ mod topics;
 mod tween;
 mod union;
 
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
 use self::arrows::{ArrowPath, Arrows};
 use self::boxes::{Boxes, ItemBox};
+use self::gates::Gate;
 pub use self::ids::unshown;
 use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
@@ -31,9 +36,9 @@ use self::page::{GraphFit, PageFrame};
 use self::timeline::Timeline;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
-use crate::base::geometry::{Point, Size};
+use crate::base::geometry::{Point, Rect, Size};
 pub use crate::draw::figure::course::Course;
-use crate::draw::scene::{Group, Scene};
+use crate::draw::scene::{Group, Piece, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
@@ -174,6 +179,10 @@ pub struct Picture<'a> {
     /// The parts of each item that never change, then those of each arrow.
     cards: Vec<ItemBox>,
     tracks: Vec<ArrowPath>,
+    /// The lines of namespaces that are drawn as one.
+    gates: Vec<(Gate, ArrowPath)>,
+    /// How far the title of each namespace stands from the left of its frame, to be clear of lines.
+    shifts: Vec<f64>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
     title: Title<'a>,
@@ -192,7 +201,7 @@ impl<'a> Picture<'a> {
             ..
         } = &measured;
         let fit = page.fit(layout.size);
-        let (cards, tracks) = places(&measured, &layout, fit);
+        let (cards, tracks, shifts) = places(&measured, &layout, fit);
         let mut order: Vec<usize> = (0..tracks.len()).collect();
         let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
         order.sort_by(|&a, &b| {
@@ -202,7 +211,14 @@ impl<'a> Picture<'a> {
                 .then(length)
                 .then(a.cmp(&b))
         });
+        let gates = measured.graph.gates.iter().filter_map(|(gate, names)| {
+            let mut path = gate.path(view, &tracks[gate.lead], &layout, fit)?;
+            path.topics.clone_from(names);
+            Some((gate.clone(), path))
+        });
         let mut picture = Self {
+            gates: gates.collect(),
+            shifts,
             cards,
             tracks,
             order,
@@ -255,7 +271,8 @@ impl<'a> Picture<'a> {
         let Some(frame) = measured.view.frames.get(k) else {
             return scene;
         };
-        self.graph((k, frame), &measured.view.seen(k), &mut scene.groups);
+        let seen = frame.calm(measured.view.seen(k));
+        self.graph((k, frame), &seen, &mut scene.groups);
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
@@ -319,7 +336,8 @@ impl<'a> Picture<'a> {
             let id = encoded(&space.name);
             let roll = (!space.replicas.is_empty()).then(|| rolls.next()).flatten();
             let now = view.place_in_time(frame.index);
-            let roll = roll.map(|who| boxes.roll(space, *place, &id, (now, who)));
+            let roll =
+                roll.map(|who| boxes.roll(space, (*place, self.shifts[at]), &id, (now, who)));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -328,46 +346,30 @@ impl<'a> Picture<'a> {
                 }
             });
             let mut space = boxes.space(space, *place, &id, empty);
-            titles.push(boxes.title_of(&mut space));
+            titles.push(boxes.title_of(&mut space, self.shifts[at]));
             titles.extend(roll.filter(|roll| !roll.pieces.is_empty()));
             groups.push(space);
+        }
+        let whole = Rect::new(0.0, 0.0, self.layout.size.w, self.layout.size.h);
+        for (nth, crowd) in frame.crowds.iter().enumerate() {
+            let space = crowd.space.and_then(|at| self.layout.clusters.get(at));
+            let name = crowd.space.map_or("", |at| &*view.namespaces[at].name);
+            let before = frame.crowds[..nth].iter();
+            let others = before.filter(|other| other.space == crowd.space);
+            let [frame, words] = boxes.crowd(crowd, (name, *space.unwrap_or(&whole)), others);
+            groups.push(frame);
+            titles.push(words);
         }
         for (footer, also) in self.measured.graph.footers.iter().zip(&view.also) {
             let place = match footer.cluster {
                 Some(at) => self.layout.clusters.get(at),
                 None => self.layout.boxes.get(view.items.len()),
             };
-            titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, k)));
+            titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, (view, k))));
         }
-        let arrows = Arrows {
-            style: self.measured.style,
-            fonts: self.measured.fonts,
-            fit: self.fit,
-        };
-        // What changed lies on top.
-        let (mut changed, mut over, mut changed_over) = (Vec::new(), Vec::new(), Vec::new());
-        for &at in &self.order {
-            let Some(shown) = measured::find(&seen.arrows, at) else {
-                continue;
-            };
-            let arrow = &view.arrows[at];
-            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
-            let (line, label) = arrows.parts(arrow, &self.tracks[at], shown, ends);
-            let (lines, labels) = if shown.mark.is_some() {
-                (&mut changed, &mut changed_over)
-            } else {
-                (&mut *groups, &mut over)
-            };
-            lines.push(line);
-            if !label.pieces.is_empty() {
-                labels.push(label);
-            }
-        }
-        groups.append(&mut changed);
+        let [lines, labels] = self.lines(seen);
         // No line runs over words.
-        for mut words in [titles, over, changed_over] {
-            groups.append(&mut words);
-        }
+        groups.extend(lines.into_iter().chain(titles).chain(labels));
         for shown in &seen.items {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
@@ -375,6 +377,57 @@ impl<'a> Picture<'a> {
                 groups.extend(boxes.card_rows(card, view, k));
             }
         }
+    }
+
+    /// The lines of a window, and their labels; those that changed are last, so that they lie on top.
+    fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
+        let measured = &self.measured;
+        let links = &measured.graph.plan.links;
+        let look = |at: usize| measured::find(&seen.arrows, at);
+        let mut drawn = Vec::new();
+        let mut in_gates = BTreeSet::new();
+        for (gate, path) in &self.gates {
+            if let Some((shown, lines)) = gate.shown(measured.view, look) {
+                in_gates.extend(lines);
+                drawn.push((&gate.arrow, path, Cow::Owned(shown), links[gate.lead].fork));
+            }
+        }
+        let is_there = |item: u32| measured::find(&seen.items, item as usize).is_some();
+        for &at in self.order.iter().filter(|at| !in_gates.contains(at)) {
+            let (arrow, path) = (&measured.view.arrows[at], &self.tracks[at]);
+            if let Some(shown) = look(at).filter(|_| is_there(arrow.from) && is_there(arrow.to)) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[at].fork));
+            }
+        }
+        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
+        // The lines of a fork have one label: that of a line that changed, which is on top.
+        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, (.., fork)) in drawn.iter().enumerate() {
+            last.extend(fork.map(|fork| (fork, k)));
+        }
+        let arrows = Arrows {
+            style: measured.style,
+            fonts: measured.fonts,
+            fit: self.fit,
+        };
+        let mut groups = [Vec::new(), Vec::new()];
+        for (arrow, path, shown, fork) in &drawn {
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
+            let (line, mut label) = arrows.parts(arrow, path, shown, ends);
+            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
+            if named.is_some_and(|other| {
+                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
+            }) {
+                label
+                    .pieces
+                    .retain(|piece| !matches!(piece, Piece::Text(_)));
+            }
+            groups[0].push(line);
+            if !label.pieces.is_empty() {
+                groups[1].push(label);
+            }
+        }
+        groups
     }
 
     /// For each namespace with a box, whether anything inside it is there.
@@ -401,18 +454,23 @@ impl<'a> Picture<'a> {
     }
 }
 
-/// The parts of items and arrows that never change, with badges where there is room for them.
+/// The parts of items and arrows that never change, with badges where there is room for them, and the shifts of titles.
 fn places(
     measured: &Measured<'_>,
     layout: &Layout,
     fit: GraphFit,
-) -> (Vec<ItemBox>, Vec<ArrowPath>) {
+) -> (Vec<ItemBox>, Vec<ArrowPath>, Vec<f64>) {
     let mut cards = cards(measured, layout, fit);
     let mut tracks = tracks(measured, layout, fit);
     // A hair beyond the badge's edge.
     let radius = measured.style.badge.radius * fit.pen + 1.0;
-    room::place_badges(&mut cards, &mut tracks, radius, fit.scale);
-    (cards, tracks)
+    let frames = layout.clusters.iter().zip(&measured.graph.plan.clusters);
+    let titles = frames.map(|(frame, cluster)| (fit.rect(*frame), cluster.title.scaled(fit.scale)));
+    let (shifts, titles) = room::place_titles(titles, &tracks, fit.scale)
+        .into_iter()
+        .unzip();
+    room::place_badges(&mut cards, &mut tracks, titles, (radius, fit.scale));
+    (cards, tracks, shifts)
 }
 
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {

@@ -141,7 +141,9 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     let pairs = ways
         .iter()
         .flat_map(|rank| lanes.iter().map(move |lane| (rank, *lane)));
-    let layers: Vec<Layers> = pairs.map(|(rank, lane)| cut(part, rank, lane)).collect();
+    let layers: Vec<Layers> = pairs
+        .map(|(rank, lane)| cut(plan, part, rank, lane))
+        .collect();
     let searches: Vec<Search> = layers.iter().map(|cut| Search::new(cut, effort)).collect();
     let is_promising = promising(plan, options, part, &searches);
     let both = searches.into_iter().zip(is_promising);

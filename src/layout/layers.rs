@@ -1,6 +1,9 @@
 //! A part cut into layers: long edges led through the layers between their ends, clusters bordered in each layer.
 
-use crate::layout::{Component, LayerItem, Layers};
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use crate::layout::{Component, LayerItem, Layers, Plan, first_bend};
 
 /// The cluster in which a long edge passes a layer, besides the one around both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +15,7 @@ pub(crate) enum Lane {
 }
 
 /// The layers of a part with these ranks; an edge that runs against them is led the other way.
-pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
+pub(crate) fn cut(plan: &Plan, part: &Component, rank: &[usize], lane: Lane) -> Layers {
     let n = part.vertices.len();
     let mut layers = Layers {
         vertices: n,
@@ -26,16 +29,38 @@ pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
         ranks: rank.iter().max().map_or(0, |r| r + 1),
         ..Layers::default()
     };
-    for &(from, to) in &part.ends {
-        let chain = match rank[from].cmp(&rank[to]) {
-            std::cmp::Ordering::Less => layers.chain(from, to, lane),
-            std::cmp::Ordering::Greater => layers.chain(to, from, lane),
-            std::cmp::Ordering::Equal => Vec::new(),
+    let mut stems = BTreeMap::new();
+    for (&(from, to), link) in part.ends.iter().zip(&part.links) {
+        let link = &plan.links[*link];
+        let lane = if link.is_outside { Lane::Outside } else { lane };
+        let is_forward = rank[from] < rank[to];
+        let fork = link.fork.filter(|_| plan.is_labelled);
+        let fork = fork.map(|fork| (fork, is_forward));
+        let stem = fork.and_then(|fork| stems.get(&fork).copied());
+        let stem = Stem {
+            is_forward,
+            bend: stem,
         };
+        let chain = match rank[from].cmp(&rank[to]) {
+            Ordering::Less => layers.chain((from, to), lane, stem),
+            Ordering::Greater => layers.chain((to, from), lane, stem),
+            Ordering::Equal => Vec::new(),
+        };
+        if let (Some(fork), Some(bend)) = (fork, first_bend(&chain, is_forward)) {
+            stems.entry(fork).or_insert(bend);
+        }
         layers.chains.push(chain);
     }
     layers.add_borders();
     layers
+}
+
+/// The first bend of the edges of a fork.
+#[derive(Clone, Copy)]
+struct Stem {
+    is_forward: bool,
+    /// The bend, if an edge before has it.
+    bend: Option<usize>,
 }
 
 /// The innermost cluster around two clusters, by the one around each.
@@ -90,17 +115,34 @@ impl Layers {
         self.kind.len() - 1
     }
 
+    /// Joins two items, once.
     fn link(&mut self, before: usize, after: usize) {
+        if self.kind[before] == LayerItem::Bend && self.down[before].contains(&after)
+            || self.kind[after] == LayerItem::Bend && self.up[after].contains(&before)
+        {
+            return;
+        }
         self.down[before].push(after);
         self.up[after].push(before);
     }
 
     /// Leads an edge from its earlier end to its later one, with a bend in every layer between; returns the items it
-    /// passes.
-    fn chain(&mut self, from: usize, to: usize, lane: Lane) -> Vec<usize> {
+    /// passes. Where an edge before has its stem, it runs through that.
+    fn chain(&mut self, (from, to): (usize, usize), lane: Lane, stem: Stem) -> Vec<usize> {
         let shared = common(&self.parent, self.home[from], self.home[to]);
+        let ranks = self.rank[from] + 1..self.rank[to];
+        let first = if stem.is_forward {
+            ranks.start
+        } else {
+            ranks.end - 1
+        };
         let mut chain = vec![from];
-        for rank in self.rank[from] + 1..self.rank[to] {
+        for rank in ranks {
+            if let Some(bend) = stem.bend.filter(|_| rank == first) {
+                self.link(chain[chain.len() - 1], bend);
+                chain.push(bend);
+                continue;
+            }
             let home = match lane {
                 Lane::Outside => shared,
                 Lane::Inside => {
@@ -151,18 +193,52 @@ impl Layers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::Link;
+    use crate::layout::tests::link;
 
     #[test]
     fn a_long_edge_bends_in_every_layer_between() {
         let part = Component {
             vertices: vec![0, 1, 2],
+            links: vec![0, 1, 2],
             ends: vec![(0, 1), (1, 2), (2, 0)],
             home: vec![0; 3],
             parent: vec![0],
             ..Component::default()
         };
-        let layers = cut(&part, &[0, 1, 2], Lane::Outside);
+        let plan = Plan {
+            links: vec![link(0, 1), link(1, 2), link(2, 0)],
+            ..Plan::default()
+        };
+        let layers = cut(&plan, &part, &[0, 1, 2], Lane::Outside);
         assert_eq!(layers.chains, [vec![0, 1], vec![1, 2], vec![0, 3, 2]]);
         assert_eq!(layers.kind[3], LayerItem::Bend);
+    }
+
+    #[test]
+    fn edges_of_a_fork_share_the_bend_with_their_label() {
+        let fork = |from, to| Link {
+            fork: Some(7),
+            ..link(from, to)
+        };
+        let plan = Plan {
+            links: vec![fork(0, 1), fork(0, 2), fork(0, 3)],
+            is_labelled: true,
+            ..Plan::default()
+        };
+        let part = Component {
+            vertices: vec![0, 1, 2, 3],
+            links: vec![0, 1, 2],
+            ends: vec![(0, 1), (0, 2), (0, 3)],
+            home: vec![0; 4],
+            parent: vec![0],
+            ..Component::default()
+        };
+        let layers = cut(&plan, &part, &[2, 4, 6, 0], Lane::Outside);
+        // The third runs against the ranks.
+        let want = [vec![0, 4, 1], vec![0, 4, 5, 6, 2], vec![3, 7, 0]];
+        assert_eq!(layers.chains, want);
+        assert_eq!(layers.down[0], [4]);
+        assert_eq!(layers.down[4], [1, 5]);
     }
 }

@@ -74,7 +74,10 @@ fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
 }
 
 fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Result<Layout> {
-    let flat = plan.without_clusters();
+    let mut flat = plan.without_clusters();
+    for link in &mut flat.links {
+        link.fork = None;
+    }
     let parts = parts::parts(&flat);
     let blocks: Option<Vec<PlacedPart>> = parts
         .iter()
@@ -103,6 +106,7 @@ fn block(
     let n = part.vertices.len();
     let reversed = acyclic::in_order(n, &part.ends);
     let layers = cut(
+        plan,
         part,
         &rank::ranks(n, &rank::turned(&part.ends, &reversed)),
         Lane::Outside,

@@ -3,7 +3,7 @@
 
 pub(crate) mod around;
 
-use super::{Layers, Outline, Route};
+use super::{LayerItem, Layers, Outline, Route};
 use crate::base::geometry::{Point, Size};
 
 /// The distance of neighbouring ports, where the side of a box is long enough.
@@ -81,9 +81,9 @@ impl RoutingPlane<'_> {
         let (mut leaving, mut entering) = (vec![Vec::new(); n], vec![Vec::new(); n]);
         for (i, chain) in self.layers.chains.iter().enumerate() {
             if let [first, second, ..] = chain[..] {
-                leaving[first].push((self.across[second], i));
+                leaving[first].push((second, i));
                 let before = chain[chain.len() - 2];
-                entering[chain[chain.len() - 1]].push((self.across[before], i));
+                entering[chain[chain.len() - 1]].push((before, i));
             }
         }
         for v in 0..n {
@@ -97,16 +97,22 @@ impl RoutingPlane<'_> {
         ports
     }
 
-    /// Ports for chains at one side of a vertex, in the order of the places they come from.
-    fn spread(&self, v: usize, chains: &mut [(f64, usize)]) -> Vec<(usize, f64)> {
-        chains.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let n = chains.len() as f64;
+    /// Ports for chains at one side of a vertex, in the order of the places they come from; the edges of a fork come
+    /// from the same item and share one.
+    fn spread(&self, v: usize, chains: &mut [(usize, usize)]) -> Vec<(usize, f64)> {
+        chains.sort_by(|a, b| {
+            let across = self.across[a.0].total_cmp(&self.across[b.0]);
+            across.then(a.1.cmp(&b.1))
+        });
+        let is_bend = |item: usize| self.layers.kind[item] == LayerItem::Bend;
+        let shares = |a: &(usize, usize), b: &(usize, usize)| a.0 == b.0 && is_bend(a.0);
+        let ports: Vec<&[(usize, usize)]> = chains.chunk_by(shares).collect();
+        let n = ports.len() as f64;
         let span = (self.size[v].h * 0.6).min(n * PORT_STEP);
         let port = |i: usize| self.across[v] + ((i as f64 + 0.5) / n - 0.5) * span;
-        chains
-            .iter()
-            .enumerate()
-            .map(|(i, &(_, chain))| (chain, port(i)))
+        let ports = ports.iter().enumerate();
+        ports
+            .flat_map(|(i, chains)| chains.iter().map(move |&(_, chain)| (chain, port(i))))
             .collect()
     }
 

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{
-    Component, LayerItem, LayerRows, Layers, LayoutOptions, Orientation, Plan, include,
+    Component, LayerItem, LayerRows, Layers, LayoutOptions, Link, Orientation, Plan, first_bend,
+    include,
 };
 
 /// The room between boxes side by side, between edges side by side, and between an edge and anything else.
@@ -27,14 +28,23 @@ const ASIDE: f64 = 4.0;
 /// The room that edges need to bend where they bend twice, as a part of the room for once.
 const TWICE: f64 = 0.45;
 
-/// The bend beside which the label of an edge stands: about the middle one, in a layer without boxes.
-fn label_bend(plan: &Plan, layers: &Layers, chain: &[usize]) -> Option<usize> {
-    let is_free = |item: &&usize| layers.rank[**item] % 2 == 1;
-    let bends = chain.get(1..chain.len().checked_sub(1)?)?;
-    let free: Vec<usize> = bends.iter().filter(is_free).copied().collect();
-    free.get(free.len() / 2)
-        .copied()
-        .filter(|_| plan.is_labelled)
+/// The bend beside which the label of an edge stands: about the middle one, in a layer without boxes; of an edge of a
+/// fork the first one, which all of them pass.
+fn label_bend(
+    plan: &Plan,
+    layers: &Layers,
+    (link, from): (&Link, usize),
+    chain: &[usize],
+) -> Option<usize> {
+    let bend = if link.fork.is_some() {
+        first_bend(chain, chain.first() == Some(&from))
+    } else {
+        let is_free = |item: &&usize| layers.rank[**item] % 2 == 1;
+        let bends = chain.get(1..chain.len().checked_sub(1)?)?;
+        let free: Vec<usize> = bends.iter().filter(is_free).copied().collect();
+        free.get(free.len() / 2).copied()
+    };
+    bend.filter(|_| plan.is_labelled)
 }
 
 /// The sizes of one part, seen in one orientation.
@@ -71,13 +81,14 @@ impl<'a> Spacing<'a> {
         }
         let mut label = vec![0.0_f64; layers.ranks];
         let mut worded = BTreeMap::new();
-        for (&i, chain) in part.links.iter().zip(&layers.chains) {
-            if let (Some(size), Some(bend)) = (plan.links[i].label, label_bend(plan, layers, chain))
-            {
+        let links = part.links.iter().map(|&i| &plan.links[i]);
+        for ((link, chain), ends) in links.zip(&layers.chains).zip(&part.ends) {
+            let bend = label_bend(plan, layers, (link, ends.0), chain);
+            if let (Some(size), Some(bend)) = (link.label, bend) {
                 worded.insert(bend, turned(size, orientation));
                 continue;
             }
-            if let (Some(size), &[first, _]) = (plan.links[i].label, chain.as_slice()) {
+            if let (Some(size), &[first, _]) = (link.label, chain.as_slice()) {
                 let label = &mut label[layers.rank[first]];
                 *label = label.max(turned(size, orientation).w);
             }

@@ -1,6 +1,7 @@
 //! The words of a window: its events as phrases for the headline, and the line below it.
 
 use std::collections::BTreeMap;
+use std::mem::discriminant;
 
 use super::audience::Audience;
 use super::home::{home, without_transport};
@@ -18,11 +19,16 @@ const LONGEST_NAME: usize = 48;
 /// The most names in the line below the headline.
 const MOST_NAMED: usize = 3;
 
+/// The kinds of events of which several at once are one event of the log.
+const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate];
+
 /// A writer of headlines, window by window.
 pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
     ledger: &'a Ledger,
+    /// The parts of each event of the log.
+    parts: BTreeMap<EntryId, Vec<EntryId>>,
     start: Stamp,
     /// Whether there is but one window.
     is_still: bool,
@@ -40,6 +46,7 @@ impl<'a> Speaker<'a> {
             elements: &mission.elements,
             viewed,
             ledger: &mission.ledger,
+            parts: mission.ledger.all_parts(),
             start: mission.span.start,
             is_still: mission.windows.len() == 1,
             last: None,
@@ -56,10 +63,27 @@ impl<'a> Speaker<'a> {
         for headline in &frame.headlines {
             let part = self.entry(headline.entry).map(|e| Part::of(e, frame.span));
             let phrase = self.phrase(headline, part.unwrap_or(Part::Whole), home);
-            add(&mut groups, phrase);
+            add(&mut groups, phrase, headline.entry);
+            // Equal events of others at the same time are parts of it.
+            for id in self.parts.get(&headline.entry).into_iter().flatten() {
+                if let Some(part) = self.entry(*id)
+                    && CROWDED.contains(&part.kind)
+                    && part.kind == headline.kind
+                    && discriminant(&part.what) == discriminant(&headline.what)
+                    && self.viewed.sees(part.what)
+                {
+                    let other = Headline {
+                        entry: *id,
+                        what: part.what,
+                        ..*headline
+                    };
+                    let phrase = self.phrase(&other, Part::Whole, home);
+                    add(&mut groups, phrase, headline.entry);
+                }
+            }
         }
         for lasting in &frame.lasting {
-            add(&mut groups, self.lasting(lasting, home));
+            add(&mut groups, self.lasting(lasting, home), lasting.entry);
         }
         frame.caption = groups.into_values().map(plural).collect();
         frame.note = self.note(frame, home);
@@ -314,19 +338,23 @@ fn said(sign: char, lead: &str, name: String, tail: &str) -> Phrase {
         sign,
         lead: lead.to_owned(),
         names: vec![name],
+        entries: Vec::new(),
         tail: tail.to_owned(),
     }
 }
 
-/// Adds a phrase to an equal one.
-fn add(groups: &mut Groups, (place, phrase): (u8, Phrase)) {
+/// Adds the phrase of an event to an equal one.
+fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), entry: EntryId) {
     let key = (place, [phrase.lead.clone(), phrase.tail.clone()]);
-    match groups.entry(key) {
-        std::collections::btree_map::Entry::Vacant(new) => {
-            new.insert(phrase);
-        }
-        std::collections::btree_map::Entry::Occupied(mut old) => {
-            old.get_mut().names.extend(phrase.names);
+    let names = phrase.names.clone();
+    let all = groups.entry(key).or_insert(Phrase {
+        names: Vec::new(),
+        ..phrase
+    });
+    for name in names {
+        if !all.names.contains(&name) {
+            all.names.push(name);
+            all.entries.push(entry);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! One window of the picture with its events, and the words of its headline.
 
-use super::{Attendance, Counts, Lasting};
+use super::{Attendance, Counts, Crowd, Lasting};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::ledger::{EntryId, Kind};
@@ -40,6 +40,8 @@ pub struct Phrase {
     pub lead: String,
     /// The names, one per event.
     pub names: Vec<String>,
+    /// The event of each name: places in the ledger.
+    pub entries: Vec<EntryId>,
     /// The words after the names: `start`.
     pub tail: String,
 }
@@ -85,6 +87,8 @@ pub struct Frame {
     pub counts: Counts,
     /// What changed in words, the most important first; empty exactly if nothing is marked.
     pub caption: Vec<Phrase>,
+    /// The changes that are one coloured frame, because there are too many.
+    pub crowds: Vec<Crowd>,
     /// The long time without a message and without a change that it lies in, which is one frame of a film.
     pub empty: Option<Span>,
     /// The line below: namespace, exact times and consequence of the changes, or since when nothing changed.
@@ -104,6 +108,7 @@ impl Frame {
             lasting: Vec::new(),
             counts: Counts::default(),
             caption: Vec::new(),
+            crowds: Vec::new(),
             empty: None,
             note: String::new(),
         }

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Mark, Members, Shown};
+use super::{Mark, Members, Shown, sum};
 use crate::evidence::Degree;
 use crate::graph::State;
 
@@ -35,6 +35,20 @@ pub struct TopicRow {
 pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
 
 impl TopicRow {
+    /// Takes in the same topic on another line; its messages add up where others send them.
+    pub(crate) fn join(&mut self, other: &Self, is_other_sender: bool) {
+        let is_sum = is_other_sender && self.count.is_some() && other.count.is_some();
+        if is_sum {
+            self.hz = sum(self.hz, other.hz, |a, b| a + b);
+            self.count = sum(self.count, other.count, |a, b| a + b);
+        } else {
+            self.hz = sum(self.hz, other.hz, f64::max);
+            self.count = sum(self.count, other.count, u64::max);
+        }
+        self.state = self.state.min(other.state);
+        self.ways = [0, 1].map(|way| self.ways[way] || other.ways[way]);
+    }
+
     pub(super) fn key(&self) -> RowKey {
         (
             self.topic,

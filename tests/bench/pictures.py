@@ -4,8 +4,9 @@
     tests/bench/pictures.py BAGREEL BAG... [-- OPTION...]
 
 Prints per bag, over all frames: boxes and lines per frame; lines with a twin between the same two boxes; new lines without a
-name; labels with a line of others under them; changes that are folded away; the smallest text in pixels; the part of the
-graph's page that boxes fill.
+name; labels with a line of others under them; titles of namespaces with a line under them; badges on a line of others;
+heads of lines below words; changes that are folded away; most things with a colour in a frame; the smallest text in pixels;
+the part of the graph's page that boxes fill.
 """
 
 import collections
@@ -55,6 +56,17 @@ def box(text):
     return left, y - size * 0.75, left + wide, y + size * 0.1
 
 
+def inside(place, x, y):
+    """Whether a point is in a rectangle."""
+    left, top, right, bottom = place
+    return left < x < right and top < y < bottom
+
+
+def centre(form):
+    """The middle of an ellipse."""
+    return float(form.get("cx")), float(form.get("cy"))
+
+
 def shape(group):
     """The rectangle of the box of a node or topic."""
     for form in group:
@@ -69,6 +81,7 @@ def shape(group):
 def frame(root, sums):
     """Adds what is found in one frame."""
     lines, labels, filled = {}, [], 0.0
+    titles, badges, heads, coloured = [], [], [], set()
     smallest = 1e9
     for group in root.iter(SVG + "g"):
         words = group.get("class", "").split()
@@ -83,11 +96,22 @@ def frame(root, sums):
             line["label"] |= any(re.search("[a-z]{2}", "".join(t.itertext()).replace("Hz", "")) for t in texts)
             labels += [(name, box(text)) for text in texts]
             for path in group.iter(SVG + "path"):
-                line["points"] += points(path.get("d"))
+                way = points(path.get("d"))
+                if path.get("d").endswith("Z"):
+                    heads.append((name, way[0]))
+                else:
+                    line["points"] += way
+            line["topics"] = group.get("data-topics")
+            badges += [(name, centre(form)) for form in group.iter(SVG + "ellipse") if float(form.get("rx")) > 4]
         elif kind in ("node", "topic"):
             sums["boxes"] += 1
             filled += shape(group)
             sums["folded"] += group.get("data-mark") == "inside"
+            badges += [(None, centre(form)) for form in list(group)[1:] if form.tag == SVG + "ellipse"]
+        elif kind == "namespace-title":
+            titles += [box(text) for text in texts]
+        if {"added", "removed", "changed", "away"} & set(words):
+            coloured |= set((group.get("data-entries") or "").split()) if kind != "crowd" else {group.get("data-entries")}
     pairs = collections.Counter(frozenset(line["ends"]) for line in lines.values())
     sums["lines"] += len(lines)
     sums["twins"] += sum(pairs[frozenset(line["ends"])] > 1 for line in lines.values())
@@ -95,7 +119,9 @@ def frame(root, sums):
     topics = {group.get("data-name") for group in root.iter(SVG + "g") if group.get("class", "").startswith("topic ")}
     new = [line for line in lines.values() if "added" in line["words"] and not topics & set(line["ends"])]
     sums["new"] += len(new)
-    sums["nameless"] += sum(not line["label"] for line in new)
+    # The lines of a fork have one label.
+    named = {(line["ends"][0], line["topics"]) for line in lines.values() if line["label"]}
+    sums["nameless"] += sum((line["ends"][0], line["topics"]) not in named for line in new)
     sums["labels"] += len(labels)
     for own, (left, top, right, bottom) in labels:
         sums["covered"] += any(
@@ -104,6 +130,16 @@ def frame(root, sums):
             if name != own
             for x, y in line["points"]
         )
+    runs = [(name, x, y) for name, line in lines.items() for x, y in line["points"]]
+    sums["titles"] += len(titles)
+    sums["crossed"] += sum(any(inside(place, x, y) for _, x, y in runs) for place in titles)
+    sums["badges"] += len(badges)
+    sums["run over"] += sum(
+        any(name != own and (x - bx) ** 2 + (y - by) ** 2 < 36 for name, x, y in runs) for own, (bx, by) in badges if own
+    )
+    words = [(None, place) for place in titles] + labels
+    sums["hidden"] += sum(any(own != name and inside(place, x, y) for own, place in words) for name, (x, y) in heads)
+    sums["colours"] = max(sums["colours"], len(coloured))
     wide, high = (float(n) for n in root.get("viewBox").split()[2:])
     sums["filled"] += filled / (wide * high)
     return smallest
@@ -113,8 +149,9 @@ def main():
     args = sys.argv[1:]
     options = args[args.index("--") + 1 :] if "--" in args else []
     bagreel, *bags = args[: args.index("--")] if "--" in args else args
-    print("| bag | frames | boxes | lines | twins | new without a name | labels over lines | folded | smallest text | filled |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| bag | frames | boxes | lines | twins | new without a name | labels over lines | titles crossed "
+          "| badges run over | heads hidden | folded | most coloured | smallest text | filled |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for bag in bags:
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([bagreel, "render", "-q", bag, *options, "-o", folder + "/x{n}.svg"], check=True)
@@ -125,7 +162,8 @@ def main():
         share = f"{100 * sums['covered'] / max(sums['labels'], 1):.0f} %"
         print(
             f"| {pathlib.Path(bag).name} | {many} | {sums['boxes'] / many:.0f} | {sums['lines'] / many:.0f} | {sums['twins']} "
-            f"| {sums['nameless']} of {sums['new']} | {share} | {sums['folded']} | {smallest:.1f} px "
+            f"| {sums['nameless']} of {sums['new']} | {share} | {sums['crossed']} of {sums['titles']} "
+            f"| {sums['run over']} of {sums['badges']} | {sums['hidden']} | {sums['folded']} | {sums['colours']} | {smallest:.1f} px "
             f"| {100 * sums['filled'] / many:.0f} % |"
         )
 

@@ -126,7 +126,7 @@ impl<'s> StepSource<'s> {
         all.retain(|k| self.weight(*k) > 0);
         if all.is_empty() {
             return Err(Error::usage(
-                "no node starts, stops or hands over a topic in these steps, so there is nothing to show",
+                "no node with a known partner starts, stops or hands over a topic, so no step has anything to show",
                 "`--kind lives` shows what there is",
             ));
         }

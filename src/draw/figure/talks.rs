@@ -35,7 +35,7 @@ impl Talk {
         Link {
             from: self.from,
             to: self.to,
-            label: None,
+            ..Link::default()
         }
     }
 

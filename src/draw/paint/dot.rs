@@ -206,6 +206,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         from: arrow.from as usize,
         to: arrow.to as usize,
         label: widest.map(|w| Size::new(w + 8.0, LINE)),
+        ..Link::default()
     });
     let clusters = view.namespaces.iter().map(|space| layout::Cluster {
         parent: space.parent,

@@ -109,12 +109,13 @@ impl Boxes<'_> {
         footer: &Footer,
         also: &AlsoHere,
         place: Rect,
-        k: usize,
+        (view, k): (&View, usize),
     ) -> Option<Group> {
         let (style, scale) = (&self.style.edge, self.fit.scale);
         let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
         let seen = also.items.iter().zip(&also.shown).zip(&footer.names);
-        let seen = seen.filter_map(|((item, shown), name)| Some((item, shown.at(k)?, name)));
+        let seen =
+            seen.filter_map(|((item, shown), name)| Some((item, view.calm_at(shown, k)?, name)));
         let seen: Vec<_> = seen.collect();
         let words = words(
             seen.iter()

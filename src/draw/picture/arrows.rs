@@ -5,15 +5,16 @@ use super::measured::{LINE, arrow_label};
 use super::options::{self, ArrowLook};
 use super::page::GraphFit;
 use super::{badge, chips, topics};
-use crate::base::geometry::{Point, Rect, Size, polyline};
+use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
-/// The number of straight pieces in which a curve is measured.
+/// The number of straight pieces in which a curve is measured, and of those in which its way out of a frame is found.
 const PIECES: u32 = 10;
+const EXIT: u32 = 64;
 
 /// The style, the fonts and the scale that arrows are drawn with.
 pub(crate) struct Arrows<'a> {
@@ -123,7 +124,7 @@ impl ArrowPath {
     }
 
     /// The room of its label.
-    pub(super) fn label_area(&self) -> Option<Rect> {
+    pub(crate) fn label_area(&self) -> Option<Rect> {
         self.label.map(|label| label.area)
     }
 
@@ -135,6 +136,50 @@ impl ArrowPath {
         } else {
             end.x > self.start.x
         }
+    }
+
+    /// The part of it outside of a frame that it begins in, or else ends in; `None` if its label is not there.
+    pub(super) fn outside(&self, frame: Rect, begins_inside: bool) -> Option<Self> {
+        let label = self.label.filter(|label| !label.area.overlaps(&frame))?;
+        let mut path = self.clone();
+        path.label = Some(label);
+        if !begins_inside {
+            path.turn();
+        }
+        let is_inside = |p: Point| {
+            frame.x <= p.x && p.x <= frame.right() && frame.y <= p.y && p.y <= frame.bottom()
+        };
+        let starts = std::iter::once(path.start).chain(path.curves.iter().map(|curve| curve[2]));
+        let curves = starts
+            .zip(&path.curves)
+            .map(|(from, c)| [from, c[0], c[1], c[2]]);
+        let exits = curves.enumerate().filter_map(|(at, curve)| {
+            let mut steps = (0..EXIT)
+                .rev()
+                .map(|step| f64::from(step) / f64::from(EXIT));
+            let part = steps.find(|t| is_inside(on_cubic(curve, *t)))?;
+            Some((at, after(curve, part)))
+        });
+        let (at, [start, near, far, end]) = exits.last()?;
+        path.start = start;
+        path.curves.drain(..at);
+        *path.curves.first_mut()? = [near, far, end];
+        if !begins_inside {
+            path.turn();
+        }
+        Some(path)
+    }
+
+    /// Turns it to run from its end to its start.
+    fn turn(&mut self) {
+        let points = self.curves.iter().flatten().copied();
+        let mut points: Vec<Point> = std::iter::once(self.start).chain(points).collect();
+        points.reverse();
+        self.start = points[0];
+        self.curves = points[1..]
+            .chunks_exact(3)
+            .map(|piece| [piece[0], piece[1], piece[2]])
+            .collect();
     }
 
     /// Points along it, close enough to be joined by straight lines.

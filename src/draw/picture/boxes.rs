@@ -10,7 +10,7 @@ use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygo
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
-use crate::view::{Item, ItemKind, Mark, Shown};
+use crate::view::{Crowd, Item, ItemKind, Mark, Shown};
 
 /// The dashes of a namespace in which nothing is there.
 const EMPTY: [f64; 2] = [1.0, 4.0];
@@ -89,8 +89,52 @@ impl Boxes<'_> {
         group
     }
 
-    /// Takes the title out of a namespace's box, to be painted over the lines that cross it.
-    pub(crate) fn title_of(&self, space: &mut Group) -> Group {
+    /// The coloured frame of a crowd in the place of a namespace or the whole graph, and the number on it, left of those
+    /// of `others`, which have the same frame.
+    pub(crate) fn crowd<'a>(
+        &self,
+        crowd: &Crowd,
+        (name, place): (&str, Rect),
+        others: impl Iterator<Item = &'a Crowd>,
+    ) -> [Group; 2] {
+        let (style, pen) = (self.style, self.fit.pen);
+        let change = options::change(style, crowd.mark);
+        let place = self.fit.rect(place).grown(if crowd.space.is_none() {
+            4.0 * pen
+        } else {
+            0.0
+        });
+        let entries: Vec<String> = crowd.entries.iter().map(ToString::to_string).collect();
+        let group = |part: &str| Group {
+            id: format!("crowd{part}{}{}", crowd.mark.word(), super::encoded(name)),
+            class: format!("crowd {}", crowd.mark.class()),
+            data: vec![("name", name.to_owned()), ("entries", entries.join(" "))],
+            title: format!("{name} {}", crowd.words).trim_start().to_owned(),
+            ..Group::default()
+        };
+        let (mut frame, mut words) = (group(""), group("-words-"));
+        frame.shape(Shape {
+            form: Form::Rect(place, style.cluster.radius * self.fit.scale),
+            fill: Color::NONE,
+            stroke: Stroke::dashed(change.color, change.width * pen, &change.dash),
+        });
+        let size = style.cluster.size * self.fit.scale;
+        let width = |crowd: &Crowd| badge::pill_width(self.fonts, &crowd.words, size);
+        let taken: f64 = others.map(|other| width(other) + size * 0.5).sum();
+        let centre = Point::new(place.right() - width(crowd) / 2.0 - size - taken, place.y);
+        badge::pill(
+            &mut words,
+            self.fonts,
+            (change.color, style.badge.sign),
+            &crowd.words,
+            centre,
+            size,
+        );
+        [frame, words]
+    }
+
+    /// Takes the title out of a namespace's box, to be painted over the lines that cross it, and moves it along the top.
+    pub(crate) fn title_of(&self, space: &mut Group, by: f64) -> Group {
         let mut title = Group {
             id: format!("{}..title", space.id),
             class: "namespace-title".to_owned(),
@@ -108,6 +152,7 @@ impl Boxes<'_> {
             let halo = self.style.edge.halo_width * self.fit.scale * 1.5;
             title.text(Text {
                 halo: Some((plate, halo)),
+                at: Point::new(text.at.x + by, text.at.y),
                 ..text
             });
         }

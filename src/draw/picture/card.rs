@@ -171,10 +171,10 @@ impl Boxes<'_> {
     ) -> Option<Group> {
         let seen = line.topics.iter().filter_map(|(at, _)| {
             let row = &view.rows[*at];
-            Some((row, row.shown.at(k)?))
+            Some((row, view.calm_at(&row.shown, k)?))
         });
-        let seen: Vec<(&CardRow, &Shown)> = seen.collect();
-        let (row, shown) = *seen.first()?;
+        let seen: Vec<(&CardRow, Shown)> = seen.collect();
+        let (row, shown) = seen.first()?;
         let mut group = Group {
             id: format!("{owner}..{}", item_id(&row.item)),
             class: class(row.item.class(), shown),
@@ -190,7 +190,11 @@ impl Boxes<'_> {
         let (style, size) = (self.style, self.style.topic.size * self.fit.scale);
         let look = options::of_box(style, &style.topic, shown);
         let middle = place.centre().y;
-        if let Some(mark) = shown.mark {
+        // The colour of the whole card says it already.
+        let owner = view.items_shown.get(row.owner as usize);
+        let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
+        let is_new = |mark: &Mark| owner.map(Mark::class) != Some(mark.class());
+        if let Some(mark) = shown.mark.filter(is_new) {
             let inset = style.added.width / 2.0 * self.fit.pen;
             let inside = Rect::new(place.x + inset, place.y, place.w - 2.0 * inset, place.h);
             group.shape(Shape::filled(
@@ -201,7 +205,7 @@ impl Boxes<'_> {
             badge::badge(&mut group, style, mark, at, self.fit.pen * BADGE);
         }
         let (weight, quiet) = look.small;
-        let is_there = |at: usize| view.rows[at].shown.at(k).is_some();
+        let is_there = |at: usize| view.calm_at(&view.rows[at].shown, k).is_some();
         let words = |x: f64, anchor: Anchor, (size, color): (f64, _), text: String| Text {
             at: Point::new(x, middle + size * 0.36),
             anchor,

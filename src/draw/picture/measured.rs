@@ -2,7 +2,10 @@
 
 use super::also::{self, Footer};
 use super::card::{self, Card};
+use super::gates::{self, Gate};
 use super::{chips, replicas, topics};
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
@@ -75,6 +78,8 @@ pub(crate) struct MeasuredGraph {
     pub(crate) rated: Vec<bool>,
     /// The names of the topics of each bundle as they are drawn; none for other arrows.
     pub(crate) topics: Vec<Vec<String>>,
+    /// The lines of namespaces that are drawn as one, with the names of their topics.
+    pub(crate) gates: Vec<(Gate, Vec<String>)>,
     /// The window in which something is first there, by namespace.
     pub(crate) first_seen: Vec<usize>,
     /// The rows of each box.
@@ -124,11 +129,24 @@ impl MeasuredGraph {
                 .collect()
         };
         let topics: Vec<Vec<String>> = view.arrows.iter().map(fitted).collect();
-        let rooms = drafter.rooms(&topics);
-        let links = view.arrows.iter().zip(&rooms).map(|(arrow, room)| Link {
+        let mut rooms = drafter.rooms(&topics);
+        let gates: Vec<(Gate, Vec<String>)> = gates::gates(view)
+            .into_iter()
+            .map(|gate| {
+                let names = fitted(&gate.arrow);
+                (gate, names)
+            })
+            .collect();
+        let forks = gates::forks(view, &gates);
+        drafter.share(&mut rooms, &gates, &forks);
+        let through: BTreeSet<usize> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
+        let links = view.arrows.iter().zip(&rooms).zip(&forks).enumerate();
+        let links = links.map(|(at, ((arrow, room), fork))| Link {
             from: arrow.from as usize,
             to: arrow.to as usize,
             label: *room,
+            fork: *fork,
+            is_outside: through.contains(&at),
         });
         let clusters = view
             .namespaces
@@ -168,6 +186,7 @@ impl MeasuredGraph {
             spaces,
             rated,
             topics,
+            gates,
             cards,
             footers,
             first_seen: first_seen(view),
@@ -277,6 +296,42 @@ impl Measurer<'_> {
         widest
     }
 
+    /// Gives the labels of lines that are drawn as one the same room: that of a gate to the line that leads it, that of a
+    /// fork to all of its lines.
+    fn share(
+        &self,
+        rooms: &mut [Option<Size>],
+        gates: &[(Gate, Vec<String>)],
+        forks: &[Option<usize>],
+    ) {
+        for (gate, names) in gates {
+            for (at, is_alone) in gate.alone(self.view) {
+                rooms[at] = rooms[at].filter(|_| is_alone);
+            }
+            let look = |at: usize, window: u32| self.view.arrows_shown[at].at(window as usize);
+            for window in gate.turns(self.view) {
+                let shown = gate.shown(self.view, |at| look(at, window));
+                let rows = shown.map(|(shown, _)| topics::rows(&shown, names));
+                let room = rows.and_then(|rows| topics::room(&rows, self.fonts, &self.style.edge));
+                rooms[gate.lead] = larger(rooms[gate.lead], room);
+            }
+        }
+        let mut shared: BTreeMap<usize, Option<Size>> = BTreeMap::new();
+        let forked = || {
+            forks
+                .iter()
+                .enumerate()
+                .filter_map(|(at, fork)| Some((at, (*fork)?)))
+        };
+        for (at, fork) in forked() {
+            let room = shared.entry(fork).or_default();
+            *room = larger(*room, rooms[at]);
+        }
+        for (at, fork) in forked() {
+            rooms[at] = shared.get(&fork).copied().flatten();
+        }
+    }
+
     /// The room for the widest label that each arrow shows in some window.
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
@@ -300,7 +355,7 @@ impl Measurer<'_> {
                 let rooms = showing.looks().iter();
                 let rooms =
                     rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
-                return rooms.reduce(|a, b| Size::new(a.w.max(b.w), a.h.max(b.h)));
+                return rooms.fold(None, |a, b| larger(a, Some(b)));
             }
             // A subscription shows its rate if its topic has another.
             let topic = self.view.items_shown.get(arrow.from as usize);
@@ -325,6 +380,14 @@ impl Measurer<'_> {
             Some(Size::new(widest?, style.size * PILL_HEIGHT))
         });
         rooms.collect()
+    }
+}
+
+/// A size at least as wide and as high as both.
+fn larger(a: Option<Size>, b: Option<Size>) -> Option<Size> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(Size::new(a.w.max(b.w), a.h.max(b.h))),
+        (a, b) => a.or(b),
     }
 }
 

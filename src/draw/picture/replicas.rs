@@ -89,12 +89,15 @@ impl Boxes<'_> {
     pub(crate) fn roll(
         &self,
         space: &Space,
-        place: Rect,
+        (place, by): (Rect, f64),
         id: &str,
         (now, who): (f64, &[Attendance]),
     ) -> Group {
         let size = self.style.cluster.size;
-        let (place, scale) = (self.fit.rect(place), self.fit.scale);
+        let (place, scale) = (
+            self.fit.rect(place).moved(Point::new(by, 0.0)),
+            self.fit.scale,
+        );
         let area = |(x, width): (f64, f64)| {
             Rect::new(
                 place.x + (8.0 + x) * scale,

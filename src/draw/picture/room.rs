@@ -1,4 +1,5 @@
-//! Room for badges: the corner of a box, or the part of an arrow, where the badge covers least.
+//! Room for badges and titles: the corner of a box, or the part of an arrow, where a badge covers least; the place along
+//! the top of a frame where no line runs under its title.
 
 use super::arrows::ArrowPath;
 use super::boxes::{ItemBox, corners};
@@ -8,13 +9,52 @@ use crate::base::geometry::{Point, Rect, Size};
 /// of more a badge is smaller than a point.
 const MOST: usize = 3000;
 
-/// Moves all badges of this radius to places where they cover no line and no other box, as far as there are any; those
-/// of very large drawings stay where they are.
+/// The distance of titles from the left of their frames, and from lines, in pixels of the graph.
+const INSET: f64 = 8.0;
+const CLEAR: f64 = 3.0;
+
+/// How far each title moves along the top of its frame until no line and no label is below it, and its place; one that
+/// finds none stays.
+pub(super) fn place_titles(
+    titles: impl Iterator<Item = (Rect, Size)>,
+    tracks: &[ArrowPath],
+    scale: f64,
+) -> Vec<(f64, Rect)> {
+    let few = if tracks.len() > MOST { &[] } else { tracks };
+    let lines: Vec<Vec<Point>> = few.iter().map(ArrowPath::points).collect();
+    let pieces = lines.iter().flat_map(|line| line.windows(2));
+    let pieces = pieces.filter_map(|ends| Rect::of_points(ends.iter().copied()));
+    let taken: Vec<Rect> = pieces
+        .chain(few.iter().filter_map(ArrowPath::label_area))
+        .collect();
+    let placed = titles.map(|(frame, size)| {
+        let (left, right) = (frame.x + INSET * scale, frame.right() - INSET * scale);
+        let strip = Rect::new(frame.x, frame.y, frame.w, size.h + CLEAR * scale);
+        let below = taken.iter().filter(|rect| {
+            rect.y < strip.bottom() && rect.bottom() > strip.y && rect.x < strip.right()
+        });
+        let mut below: Vec<&Rect> = below.collect();
+        below.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let mut x = left;
+        for rect in below {
+            if rect.x > x + size.w + CLEAR * scale {
+                break;
+            }
+            x = x.max(rect.right() + CLEAR * scale);
+        }
+        let x = if x + size.w > right { left } else { x };
+        (x - left, Rect::new(x, frame.y, size.w, size.h))
+    });
+    placed.collect()
+}
+
+/// Moves all badges of this radius to places where they cover no line, no title and no other box, as far as there are
+/// any; those of very large drawings stay where they are.
 pub(super) fn place_badges(
     cards: &mut [ItemBox],
     tracks: &mut [ArrowPath],
-    radius: f64,
-    scale: f64,
+    titles: Vec<Rect>,
+    (radius, scale): (f64, f64),
 ) {
     for card in cards.iter_mut() {
         card.badge = corners(card.place, scale)[0];
@@ -22,7 +62,8 @@ pub(super) fn place_badges(
     if cards.len() + tracks.len() > MOST {
         return;
     }
-    let room = Room::new(cards, tracks, radius);
+    let mut room = Room::new(cards, tracks, radius);
+    room.boxes.extend(titles);
     for (at, card) in cards.iter_mut().enumerate() {
         let free = corners(card.place, scale);
         card.badge = room.best(&free, (Some(at), None)).unwrap_or(card.badge);
@@ -133,10 +174,24 @@ mod tests {
     fn a_badge_avoids_a_corner_with_a_line() {
         let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
-        place_badges(&mut cards, &mut [along(130.0)], 8.0, 1.0);
+        place_badges(&mut cards, &mut [along(130.0)], Vec::new(), (8.0, 1.0));
         assert_eq!(cards[0].badge, Point::new(93.0, 1.0));
-        place_badges(&mut cards, &mut [along(97.0)], 8.0, 1.0);
+        place_badges(&mut cards, &mut [along(97.0)], Vec::new(), (8.0, 1.0));
         assert_eq!(cards[0].badge, Point::new(7.0, 1.0));
+    }
+
+    #[test]
+    fn a_title_moves_along_its_frame_until_it_is_clear_of_lines() {
+        let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
+        let title = |width: f64, lines: &[ArrowPath]| {
+            let frame = Rect::new(0.0, 0.0, 200.0, 80.0);
+            let titles = std::iter::once((frame, Size::new(width, 14.0)));
+            place_titles(titles, lines, 1.0)[0].0
+        };
+        assert_eq!(title(50.0, &[along(70.0)]), 0.0);
+        assert!((title(50.0, &[along(20.0), along(60.0)]) - 55.0).abs() < 0.1);
+        // There is no room anywhere.
+        assert_eq!(title(150.0, &[along(100.0)]), 0.0);
     }
 
     #[test]
@@ -145,7 +200,7 @@ mod tests {
             line(Point::new(0.0, 0.0), Point::new(200.0, 0.0)),
             line(Point::new(100.0, -30.0), Point::new(100.0, 90.0)),
         ];
-        place_badges(&mut [], &mut both, 8.0, 1.0);
+        place_badges(&mut [], &mut both, Vec::new(), (8.0, 1.0));
         assert!((both[0].badge.x - 100.0).abs() > 8.0, "{:?}", both[0].badge);
     }
 }

@@ -7,7 +7,7 @@ use crate::base::geometry::Rect;
 use crate::draw::paint::raster::{Canvas, Painter};
 use crate::draw::scene::{Form, Piece, Shape};
 use crate::view::testing::mission;
-use crate::view::{ViewOptions, view};
+use crate::view::{Mode, ViewOptions, view};
 
 /// Calls `then` with the picture of a mission of this description, in this style.
 fn with_picture<T>(
@@ -324,4 +324,68 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
     assert_eq!(told[0][0], told[2][0]);
     assert_ne!(told[0][1], told[2][1]);
     assert!(lines(&[3, 3]).iter().all(Vec::is_empty));
+}
+
+/// The lines of each window between nodes, as their ends with the words of their labels.
+fn bundles(windows: &[&str]) -> Vec<Vec<String>> {
+    let options = ViewOptions {
+        mode: Mode::Bundles,
+        is_picture: true,
+        ..ViewOptions::default()
+    };
+    let (view, _) = view(&mission(windows), &options);
+    let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
+    let engine = layout::engine("layered").unwrap();
+    let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
+    let picture = measured.laid_out(engine);
+    let texts = |group: &Group| {
+        let texts = group.pieces.iter().filter_map(|piece| match piece {
+            Piece::Text(text) => Some(text.text.clone()),
+            Piece::Shape(_) => None,
+        });
+        texts.collect::<Vec<_>>().join(", ")
+    };
+    let lines = |k: usize| {
+        let groups = picture.scene(k).groups;
+        let is_line = |g: &&Group| g.class.starts_with("edge") && !g.id.ends_with("..over");
+        let words = |id: &str| {
+            let over = groups.iter().find(|g| g.id == format!("{id}..over"));
+            over.map(&texts).unwrap_or_default()
+        };
+        let line = |g: &Group| {
+            let words = words(&g.id);
+            format!("{} > {}: {words}", g.data[0].1, g.data[1].1)
+                .trim_end()
+                .to_owned()
+        };
+        let mut lines: Vec<String> = groups.iter().filter(is_line).map(line).collect();
+        lines.sort();
+        lines
+    };
+    (0..picture.len()).map(lines).collect()
+}
+
+#[test]
+fn quiet_lines_to_a_box_outside_begin_at_the_frame_as_one() {
+    let quiet = "/r/a>/x@3 /r/b>/y@2 /f</x /f</y /r/a>/z@4 /r/b</z";
+    let news = "/r/a>/x@3 /r/b>/y@20 /f</x /f</y /r/a>/z@4 /r/b</z";
+    let [first, second] = &bundles(&[quiet, news])[..] else {
+        panic!("two windows");
+    };
+    assert_eq!(first, &["/r > /f: x 3 Hz, y 2 Hz", "/r/a > /r/b: z 4 Hz"]);
+    let want = [
+        "/r > /f: x 3 Hz",
+        "/r/a > /r/b: z 4 Hz",
+        "/r/b > /f: y 2 → 20 Hz",
+    ];
+    assert_eq!(second, &want);
+}
+
+#[test]
+fn one_topic_to_several_readers_has_one_label() {
+    let lines = bundles(&["/s>/scan@9 /p</scan /q</scan /p>/u@2 /q</u"]);
+    assert_eq!(
+        lines[0],
+        ["/p > /q: u 2 Hz", "/s > /p: scan 9 Hz", "/s > /q:"]
+    );
 }

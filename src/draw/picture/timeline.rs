@@ -214,14 +214,14 @@ impl<'a> Timeline<'a> {
         let size = self.sizes.text;
         let width = |text: &str| self.fonts.width(text, size, Weight::Regular);
         let total = self.span.nanos();
-        let last = words::offset(whole(total));
+        let last = words::moment(whole(total));
         #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
         let most = (self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
         let step = round_length(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
         // Counted, not added up: a span may be as long as a number can say.
         for at in (0..=total / step).map(|tick| tick * step) {
-            let text = words::offset(at);
+            let text = words::moment(at);
             let wide = width(&text);
             let x = self.x(self.span.start.plus(at)) - wide / 2.0;
             let x = x.max(self.plot.x);

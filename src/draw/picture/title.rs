@@ -78,10 +78,16 @@ impl<'a> Title<'a> {
             let text = self.cut(main, size, Weight::Regular, room.0);
             note.text(self.text(text, LINES.0, (size, Weight::Regular), style.quiet));
         } else {
-            let wide = |text: &str| self.width(&self.fonts.shown(text), size, Weight::SemiBold);
-            let text = frame.fitting(|text| wide(text) <= room.0);
-            let text = self.cut(&text, size, Weight::SemiBold, room.0);
+            let fits = |text: &str, size: f64| {
+                self.width(&self.fonts.shown(text), size, Weight::SemiBold) <= room.0
+            };
             headline.title = frame.fitting(|_| true);
+            // Rather all words a little smaller than some of them.
+            let sizes = SMALLER.map(|part| size * part);
+            let whole = sizes.into_iter().find(|size| fits(&headline.title, *size));
+            let size = whole.unwrap_or(size);
+            let text = frame.fitting(|text| fits(text, size));
+            let text = self.cut(&text, size, Weight::SemiBold, room.0);
             headline.text(self.text(text, LINES.0, (size, Weight::SemiBold), self.color(frame)));
             below.extend([&*frame.note, &empty]);
         }
@@ -195,6 +201,9 @@ fn entries(frame: &Frame) -> String {
     let ids = frame.entries().map(|entry| entry.to_string());
     ids.collect::<Vec<_>>().join(" ")
 }
+
+/// The sizes of a headline, as parts of the largest.
+const SMALLER: [f64; 4] = [1.0, 0.9, 0.8, 0.7];
 
 /// The titles of the windows of a comparison.
 pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];

@@ -93,7 +93,7 @@ impl Picture<'_> {
             fit,
         };
         let spaces = measured.graph.spaces.iter().zip(&layout.clusters);
-        let (cards, tracks) = places(measured, layout, fit);
+        let (cards, tracks, _) = places(measured, layout, fit);
         Union {
             size: layout.size,
             spaces: spaces

@@ -31,9 +31,12 @@ impl Subplan {
         let (mut links, mut drawn) = (Vec::new(), Vec::new());
         for (link, &both) in part.ends.iter().enumerate() {
             if let Some((from, to)) = ends(both) {
-                let label = plan.links[part.links[link]].label;
                 links.push(link);
-                drawn.push(Link { from, to, label });
+                drawn.push(Link {
+                    from,
+                    to,
+                    ..plan.links[part.links[link]]
+                });
             }
         }
         let outer: BTreeSet<usize> = part.around(root).collect();

@@ -91,13 +91,14 @@ fn union(json: &serde_json::Value) -> Graph {
             from: place_of(&nodes, node),
             to: nodes.len() + place_of(&topics, topic),
             label: Some(Size::new(label.len() as f64 * 5.5 + 2.0, 13.0)),
+            ..Link::default()
         });
     }
     for (topic, node) in &subscribes {
         plan.links.push(Link {
             from: nodes.len() + place_of(&topics, topic),
             to: place_of(&nodes, node),
-            label: None,
+            ..Link::default()
         });
     }
     plan.clusters = clusters

@@ -1,8 +1,9 @@
 //! What is kept of rows beside what they give anew, and the counts that swaps rest on.
 
 use super::*;
-use crate::layout::Component;
 use crate::layout::layers::{Lane, cut};
+use crate::layout::tests::link;
+use crate::layout::{Component, Plan};
 
 /// All pairs of edges between two rows that cross.
 fn counted(layers: &Layers, rows: &LayerRows) -> u64 {
@@ -35,12 +36,17 @@ fn cached_rows_equal_recomputed_ones() {
         let rank: Vec<usize> = (0..n).map(|v| if v < 6 { v } else { number(6) }).collect();
         let part = Component {
             vertices: (0..n).collect(),
+            links: (0..40).collect(),
             ends: (0..40).map(|_| (number(n), number(n))).collect(),
             home: (0..n).map(|_| number(4)).collect(),
             parent: vec![0, 0, 1, 0],
             ..Component::default()
         };
-        let layers = cut(&part, &rank, Lane::Inside);
+        let plan = Plan {
+            links: part.ends.iter().map(|&(from, to)| link(from, to)).collect(),
+            ..Plan::default()
+        };
+        let layers = cut(&plan, &part, &rank, Lane::Inside);
         let mut kept = CrossingReducer::new(&layers);
         let keys: Vec<f64> = (0..layers.rank.len()).map(|_| number(100) as f64).collect();
         kept.restart(&keys);

@@ -1,0 +1,237 @@
+//! Lines that are one: those from the boxes of a namespace to the same box outside begin at its frame while they are
+//! quiet, and those over which one topic goes to several readers part only after their label.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::arrows::ArrowPath;
+use super::page::GraphFit;
+use crate::layout::Layout;
+use crate::view::{Arrow, ArrowKind, Showing, Shown, TopicRow, View};
+
+/// The lines between the boxes of a namespace and one box outside of it, drawn as one as long as they are quiet.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Gate {
+    /// The namespace: a place in [`View::namespaces`].
+    space: usize,
+    /// The line that runs as the one for all does: a place in [`View::arrows`].
+    pub(crate) lead: usize,
+    /// Every line, and whether it begins inside.
+    members: Vec<(usize, bool)>,
+    /// The lines as one, with the ends of the lead.
+    pub(crate) arrow: Arrow,
+}
+
+/// The gates of a view. Lines to topics, which are drawn as boxes, have none.
+pub(crate) fn gates(view: &View) -> Vec<Gate> {
+    let mut found: BTreeMap<(usize, u32), Vec<(usize, bool)>> = BTreeMap::new();
+    for (at, arrow) in view.arrows.iter().enumerate() {
+        if let Some((space, is_outward)) =
+            crossed(view, arrow).filter(|_| is_between_nodes(view, arrow))
+        {
+            let outside = if is_outward { arrow.to } else { arrow.from };
+            let members = found.entry((space, outside)).or_default();
+            members.push((at, is_outward));
+        }
+    }
+    let found = found.into_iter().filter(|(_, members)| members.len() > 1);
+    let gate = |((space, _), members): (_, Vec<(usize, bool)>)| {
+        let quiet = |at: usize| {
+            let shown = view.arrows_shown.get(at);
+            shown.map_or(0, |shown| quiet_windows(shown, view.frames.len()))
+        };
+        let longest = members.iter().rev().max_by_key(|(at, _)| quiet(*at));
+        let lead = longest.map_or(0, |(at, _)| *at);
+        let arrows = || members.iter().map(|(at, _)| &view.arrows[*at]);
+        let topics: BTreeSet<Arc<str>> = arrows().flat_map(|a| a.topics.iter().cloned()).collect();
+        let edges: BTreeSet<_> = arrows().flat_map(|a| a.members.iter().copied()).collect();
+        Gate {
+            space,
+            lead,
+            arrow: Arrow {
+                members: edges.into_iter().collect(),
+                topics: topics.into_iter().collect(),
+                ..view.arrows[lead].clone()
+            },
+            members,
+        }
+    };
+    found.map(gate).collect()
+}
+
+/// The number of windows in which something is there without a mark.
+fn quiet_windows(shown: &Showing, windows: usize) -> usize {
+    let mut runs: Vec<(usize, bool)> = shown
+        .runs()
+        .map(|(window, look)| (window as usize, look.is_some_and(is_quiet)))
+        .collect();
+    runs.push((windows, false));
+    let quiet = runs.windows(2).filter(|pair| pair[0].1);
+    quiet.map(|pair| pair[1].0.saturating_sub(pair[0].0)).sum()
+}
+
+fn is_quiet(shown: &Shown) -> bool {
+    shown.mark.is_none() && !shown.is_starved && shown.topics.iter().all(|row| row.mark.is_none())
+}
+
+fn is_between_nodes(view: &View, arrow: &Arrow) -> bool {
+    let is_node = |item: u32| {
+        let item = view.items.get(item as usize);
+        item.is_some_and(|item| item.kind.word() == "node")
+    };
+    arrow.kind == ArrowKind::Bundle && is_node(arrow.from) && is_node(arrow.to)
+}
+
+/// The outermost namespace whose frame a line crosses, and whether it begins inside; `None` if it crosses none, or
+/// those of both ends.
+fn crossed(view: &View, arrow: &Arrow) -> Option<(usize, bool)> {
+    let around = |item: u32| {
+        let first = view.items.get(item as usize).and_then(|item| item.cluster);
+        let all = std::iter::successors(first, |at| view.namespaces[*at].parent);
+        all.collect::<Vec<usize>>()
+    };
+    let (from, to) = (around(arrow.from), around(arrow.to));
+    let outermost =
+        |inside: &[usize], other: &[usize]| inside.iter().rfind(|at| !other.contains(at)).copied();
+    match (outermost(&from, &to), outermost(&to, &from)) {
+        (Some(space), None) => Some((space, true)),
+        (None, Some(space)) => Some((space, false)),
+        _ => None,
+    }
+}
+
+impl Gate {
+    /// The places of its lines.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = usize> {
+        self.members.iter().map(|(at, _)| *at)
+    }
+
+    /// The windows in which one of the lines changes its look.
+    pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
+        let shown = self.members.iter();
+        let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
+        shown.flat_map(Showing::runs).map(|run| run.0).collect()
+    }
+
+    /// Whether each line is drawn on its own in some window.
+    pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (usize, bool)> {
+        let news = |at: usize| {
+            let shown = view.arrows_shown.get(at);
+            shown.is_some_and(|shown| !shown.looks().iter().all(is_quiet))
+        };
+        let is_lead_news = news(self.lead);
+        let all = self.members.iter();
+        all.map(move |(at, _)| (*at, is_lead_news || news(*at)))
+    }
+
+    /// The look of the line for all that are quiet in a window, and those; `None` if there are none, or if the lead is
+    /// news itself.
+    pub(crate) fn shown<'a>(
+        &self,
+        view: &View,
+        look: impl Fn(usize) -> Option<&'a Shown>,
+    ) -> Option<(Shown, Vec<usize>)> {
+        if look(self.lead).is_some_and(|shown| !is_quiet(shown)) {
+            return None;
+        }
+        let leads_out = self.members.contains(&(self.lead, true));
+        let mut all: Option<Shown> = None;
+        let mut quiet = Vec::new();
+        let mut rows: BTreeMap<u32, TopicRow> = BTreeMap::new();
+        for &(at, runs_out) in &self.members {
+            let Some(shown) = look(at).filter(|shown| is_quiet(shown)) else {
+                continue;
+            };
+            quiet.push(at);
+            for row in &shown.topics {
+                let name = view.arrows[at].topics.get(row.topic as usize);
+                let topic = name.and_then(|name| self.arrow.topics.binary_search(name).ok());
+                let Some(topic) = topic.and_then(|topic| u32::try_from(topic).ok()) else {
+                    continue;
+                };
+                let mut ways = row.ways;
+                if runs_out != leads_out {
+                    ways.reverse();
+                }
+                let row = TopicRow {
+                    topic,
+                    ways,
+                    ..row.clone()
+                };
+                let is_sent_inside = row.ways[usize::from(!leads_out)];
+                rows.entry(topic)
+                    .and_modify(|old| old.join(&row, is_sent_inside))
+                    .or_insert(row);
+            }
+            match &mut all {
+                Some(all) => {
+                    all.state = all.state.min(shown.state);
+                    all.degree = all.degree.min(shown.degree);
+                    all.is_paused &= shown.is_paused;
+                }
+                None => all = Some(shown.clone()),
+            }
+        }
+        let topics: Vec<TopicRow> = rows.into_values().collect();
+        let hz: Option<f64> = topics.iter().filter_map(|row| row.hz).reduce(|a, b| a + b);
+        let shown = Shown {
+            hz,
+            steady_hz: hz,
+            topics,
+            ..all?
+        };
+        Some((shown, quiet))
+    }
+
+    /// The way of the one line outside of the frame; `None` where its label stands inside.
+    pub(crate) fn path(
+        &self,
+        view: &View,
+        lead: &ArrowPath,
+        layout: &Layout,
+        fit: GraphFit,
+    ) -> Option<ArrowPath> {
+        let frame = fit.rect(*layout.clusters.get(self.space)?);
+        let is_outward = crossed(view, &self.arrow)?.1;
+        let mut path = lead.outside(frame, is_outward)?;
+        path.ends[usize::from(!is_outward)] = view.namespaces[self.space].name.to_string();
+        path.id = format!("g{}", path.id);
+        Some(path)
+    }
+}
+
+/// The fork of each line: the number of the first line from the same box over the same topic, and nothing else, where
+/// there are several. Of the lines of a gate all are of one fork, or none.
+pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<usize>> {
+    let mut forks: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
+    let single = |at: usize| {
+        let arrow = &view.arrows[at];
+        let [topic] = &arrow.topics[..] else {
+            return None;
+        };
+        let looks = view.arrows_shown.get(at)?.looks();
+        let is_sent = |shown: &Shown| shown.topics.iter().all(|row| row.ways == [true, false]);
+        let is_fork = looks.iter().all(is_sent) && is_between_nodes(view, arrow);
+        is_fork.then_some((arrow.from, &**topic))
+    };
+    let mut gate_of: BTreeMap<usize, &Gate> = BTreeMap::new();
+    for (gate, _) in gates {
+        gate_of.extend(gate.members.iter().map(|(at, _)| (*at, gate)));
+    }
+    for at in 0..view.arrows.len() {
+        let gate = gate_of.get(&at);
+        let mut others = gate.iter().flat_map(|gate| &gate.members);
+        if let Some(key) = single(at)
+            && others.all(|(other, _)| single(*other) == Some(key))
+        {
+            forks.entry(key).or_default().push(at);
+        }
+    }
+    let mut of = vec![None; view.arrows.len()];
+    for members in forks.values().filter(|members| members.len() > 1) {
+        for at in members {
+            of[*at] = Some(members[0]);
+        }
+    }
+    of
+}

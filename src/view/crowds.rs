@@ -1,0 +1,241 @@
+//! Windows in which more changes than a reader can follow: those of one kind in one namespace are one coloured frame
+//! with their number, and as few words in the headline.
+
+use std::collections::BTreeMap;
+
+use super::{Frame, Mark, SeenWindow, Shown, View};
+use crate::graph::Element;
+use crate::mission::Mission;
+use crate::mission::ledger::{EntryId, Kind};
+
+/// The most things that have a colour, and a word in the headline, each on its own.
+const MOST: usize = 5;
+/// The event of words that stand for several.
+const FOLDED: EntryId = EntryId::MAX;
+
+/// Changes of one kind in one namespace that are one coloured frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Crowd {
+    /// The namespace with the frame: a place in [`View::namespaces`]; the whole graph if `None`.
+    pub space: Option<usize>,
+    /// Its colour.
+    pub mark: Mark,
+    /// The words on the frame: `+4 nodes`.
+    pub words: String,
+    /// The headlines, sorted: places in the ledger.
+    pub entries: Vec<EntryId>,
+}
+
+/// Draws crowds as one in every window.
+pub(super) fn gather(view: &mut View, mission: &Mission) {
+    let mut frames = std::mem::take(&mut view.frames);
+    for frame in &mut frames {
+        let words = |frame: &Frame| frame.caption.iter().map(|p| p.names.len()).sum::<usize>();
+        while words(frame) > MOST {
+            let Some((phrase, names, space)) = largest(frame, view, mission) else {
+                break;
+            };
+            fold(frame, (phrase, &names), space, view, mission);
+        }
+    }
+    view.frames = frames;
+}
+
+/// The place of the phrase with most names in one namespace, or anywhere, the places of those names, and the innermost
+/// namespace around all of them.
+fn largest(
+    frame: &Frame,
+    view: &View,
+    mission: &Mission,
+) -> Option<(usize, Vec<usize>, Option<usize>)> {
+    let mut groups: BTreeMap<(bool, usize, usize), Vec<usize>> = BTreeMap::new();
+    for (at, phrase) in frame.caption.iter().enumerate() {
+        for (name, entry) in phrase.entries.iter().enumerate() {
+            if *entry == FOLDED {
+                continue;
+            }
+            let around = around(view, subject(mission, *entry));
+            // The whole graph comes after all namespaces.
+            let outermost = around.first().copied().unwrap_or(usize::MAX);
+            if outermost < usize::MAX {
+                groups.entry((true, at, outermost)).or_default().push(name);
+            }
+            groups
+                .entry((false, at, usize::MAX))
+                .or_default()
+                .push(name);
+        }
+    }
+    groups.retain(|_, names| names.len() > 1);
+    let all: usize = frame.caption.iter().map(|p| p.names.len()).sum();
+    let best = groups
+        .into_iter()
+        .max_by_key(|((is_framed, at, space), names)| {
+            // What came is still there in the next window; what went is seen in this one only.
+            let stays = frame.caption[*at].sign == '+' && all - names.len() < MOST;
+            let order = (usize::MAX - at, usize::MAX - space);
+            (*is_framed, stays, names.len(), order)
+        });
+    let ((_, at, _), names) = best?;
+    let entries = &frame.caption[at].entries;
+    let spaces = names
+        .iter()
+        .map(|name| around(view, subject(mission, entries[*name])));
+    let common = spaces.reduce(|a, b| {
+        let same = a.into_iter().zip(b).take_while(|(a, b)| a == b);
+        same.map(|(a, _)| a).collect()
+    });
+    Some((at, names, common.and_then(|all| all.last().copied())))
+}
+
+/// The namespaces with a frame around a name, the outermost first.
+fn around(view: &View, name: &str) -> Vec<usize> {
+    let is_around = |space: &str| {
+        let rest = name.strip_prefix(space);
+        rest.is_some_and(|rest| rest.starts_with('/'))
+    };
+    let spaces = view.namespaces.iter().enumerate();
+    spaces
+        .filter(|(_, space)| is_around(&space.name))
+        .map(|(at, _)| at)
+        .collect()
+}
+
+/// The node that an event is about, or else the topic.
+fn subject(mission: &Mission, entry: EntryId) -> &str {
+    let entry = mission.ledger.entries.get(entry as usize);
+    let names = entry.map(|entry| mission.elements.names(entry.what));
+    names
+        .and_then(|(node, topic)| node.or(topic))
+        .unwrap_or_default()
+}
+
+/// Makes some names of a phrase one.
+fn fold(
+    frame: &mut Frame,
+    (at, names): (usize, &[usize]),
+    space: Option<usize>,
+    view: &View,
+    mission: &Mission,
+) {
+    let phrase = &mut frame.caption[at];
+    let first = mission
+        .ledger
+        .entries
+        .get(phrase.entries[names[0]] as usize);
+    let noun = first.map_or("changes", |entry| match (entry.kind, entry.what) {
+        (Kind::Rate, _) => "rates",
+        (_, Element::Node(_)) => "nodes",
+        _ => "topics",
+    });
+    let mut entries: Vec<EntryId> = names.iter().map(|name| phrase.entries[*name]).collect();
+    let space_name = space.map(|at| &*view.namespaces[at].name);
+    let place = space_name.filter(|space| !frame.note.starts_with(space));
+    let place = place.map_or_else(String::new, |space| format!(" in {space}"));
+    let count = names.len();
+    for name in names.iter().rev() {
+        phrase.names.remove(*name);
+        phrase.entries.remove(*name);
+    }
+    phrase.names.insert(0, format!("{count} {noun}{place}"));
+    phrase.entries.insert(0, FOLDED);
+    entries.sort_unstable();
+    let (mark, sign) = match phrase.sign {
+        '+' => (Mark::Added, "+"),
+        '−' => (Mark::Removed, "−"),
+        _ => (Mark::Changed, ""),
+    };
+    frame.crowds.push(Crowd {
+        space,
+        mark,
+        words: format!("{sign}{count} {noun}"),
+        entries,
+    });
+}
+
+impl Frame {
+    /// These looks with the colours of crowds on their frames alone: their members stand as if nothing happened, and
+    /// those that are gone do not stand.
+    pub(crate) fn calm(&self, mut seen: SeenWindow) -> SeenWindow {
+        if !self.crowds.is_empty() {
+            for all in [&mut seen.items, &mut seen.arrows] {
+                *all = all.iter().filter_map(|shown| self.calmed(shown)).collect();
+            }
+        }
+        seen
+    }
+
+    /// A look without its colour, if its events are those of a crowd; `None` for something gone.
+    pub(crate) fn calmed(&self, shown: &Shown) -> Option<Shown> {
+        let in_crowd = |entry: &EntryId| {
+            let mut crowds = self.crowds.iter();
+            crowds.any(|crowd| crowd.entries.binary_search(entry).is_ok())
+        };
+        let mut shown = shown.clone();
+        if shown.entries.is_empty() || !shown.entries.iter().all(in_crowd) {
+            return Some(shown);
+        }
+        match shown.mark {
+            Some(Mark::Removed) => return None,
+            Some(Mark::Away) | None => return Some(shown),
+            Some(_) => {}
+        }
+        (shown.mark, shown.rates, shown.inside) = (None, None, None);
+        shown.topics.retain(|row| row.mark != Some(Mark::Removed));
+        for row in &mut shown.topics {
+            (row.mark, row.rates) = (None, None);
+        }
+        Some(shown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::mission;
+    use crate::view::{ViewOptions, view};
+
+    /// The last window of a picture: its headline, its crowds, and the boxes that have a colour.
+    fn last(windows: &[&str]) -> (String, Vec<String>, Vec<String>) {
+        let options = ViewOptions {
+            is_picture: true,
+            ..ViewOptions::default()
+        };
+        let (view, _) = view(&mission(windows), &options);
+        let frame = view.frames.last().unwrap();
+        let seen = frame.calm(view.seen(view.frames.len() - 1));
+        let coloured = seen.items.iter().filter(|shown| shown.mark.is_some());
+        let name = |at: Option<usize>| at.map_or("page", |at| &*view.namespaces[at].name);
+        let crowd = |crowd: &Crowd| format!("{}: {}", name(crowd.space), crowd.words);
+        (
+            frame.fitting(|_| true),
+            frame.crowds.iter().map(crowd).collect(),
+            coloured
+                .map(|shown| view.items[shown.id as usize].name.to_string())
+                .collect(),
+        )
+    }
+
+    #[test]
+    fn five_changes_have_a_colour_each() {
+        let (words, crowds, coloured) = last(&["/a", "/a /r/b /r/c /r/d /r/e /r/f"]);
+        assert_eq!(words, "+ b, c, d, e, f start");
+        assert_eq!((crowds.len(), coloured.len()), (0, 5));
+    }
+
+    #[test]
+    fn more_than_five_changes_of_a_namespace_are_one_frame() {
+        let (words, crowds, coloured) = last(&["/a /r/x>/t", "/b /r/b /r/c /r/d /r/e /r/f"]);
+        assert_eq!(words, "− /a, x stop; + 5 nodes, /b start");
+        assert_eq!(crowds, ["/r: +5 nodes"]);
+        assert_eq!(coloured, ["/a", "/b", "/r/x"]);
+    }
+
+    #[test]
+    fn a_crowd_outside_of_all_namespaces_colours_the_page() {
+        let (words, crowds, coloured) = last(&["/a", "/a /b /c /d /e /f /g"]);
+        assert_eq!(words, "+ 6 nodes start");
+        assert_eq!(crowds, ["page: +6 nodes"]);
+        assert!(coloured.is_empty(), "{coloured:?}");
+    }
+}

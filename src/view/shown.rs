@@ -1,0 +1,173 @@
+//! The look of an item or arrow in one window: its state, its change, its numbers.
+
+use std::sync::Arc;
+
+use super::{Counts, TopicRow};
+use crate::evidence::Degree;
+use crate::graph::State;
+use crate::mission::ledger::EntryId;
+
+/// The sum of two numbers of which one, or both, may be unknown.
+pub(super) fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Option<T> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(add(a, b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The change of an item or arrow in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Mark {
+    /// It began.
+    Added,
+    /// It ended, listed in this one window as a ghost, or left to come back in a later window.
+    Removed,
+    /// Its rate rose.
+    Faster,
+    /// Its rate fell.
+    Slower,
+    /// It is a topic whose messages now come from other senders.
+    HandedOver,
+    /// It is back: a node that ended and came back, or something silent that sends again.
+    Restarted,
+    /// It paused.
+    Paused,
+    /// Its lifecycle state, type or quality of service changed.
+    Changed,
+    /// Something inside a group or a collapsed namespace was added, removed or changed.
+    Inside,
+    /// It is a node that left in an earlier window and comes back in a later one.
+    Away,
+}
+
+impl Mark {
+    /// Its word in SVG: what exactly happened.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Added => "added",
+            Self::Removed => "removed",
+            Self::Faster => "faster",
+            Self::Slower => "slower",
+            Self::HandedOver => "handed-over",
+            Self::Restarted => "restarted",
+            Self::Paused => "paused",
+            Self::Changed => "changed",
+            Self::Inside => "inside",
+            Self::Away => "away",
+        }
+    }
+
+    /// The class in SVG: `added`, `removed`, `away` or `changed`.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Added => "added",
+            Self::Removed => "removed",
+            Self::Away => "away",
+            _ => "changed",
+        }
+    }
+}
+
+/// The look of an item or arrow in one window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// Its place in [`View::items`] or [`View::arrows`].
+    pub id: u32,
+    /// Its state; for a ghost, the last one before its end.
+    pub state: State,
+    /// The strength of the evidence for it.
+    pub degree: Degree,
+    /// Its change in the window, if any.
+    pub mark: Option<Mark>,
+    /// Messages per second in the window, if known (0 for a ghost).
+    pub hz: Option<f64>,
+    /// Messages per second, averaged between the two changes of its rate that this window lies between.
+    pub steady_hz: Option<f64>,
+    /// The rate that is written, with its number of messages: that of an earlier window as long as chance alone may
+    /// make the difference.
+    pub held: Option<(f64, Option<u64>)>,
+    /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
+    pub rates: Option<(f64, f64)>,
+    /// Whether it is silent or away all through the window, with a beginning and an end in the ledger, or no message
+    /// came yet.
+    pub is_paused: bool,
+    /// Whether the receiver gets nothing, as the qualities of service do not match.
+    pub is_starved: bool,
+    /// The headlines behind `mark`, sorted: places in the ledger.
+    pub entries: Vec<EntryId>,
+    /// The topics that a bundle carries, sorted by their places; empty for all else.
+    pub topics: Vec<TopicRow>,
+    /// The number of equal namespaces it stands for in the window; 0 for all else.
+    pub each: usize,
+    /// The nodes and topics in a folded namespace in the graph of the window; none for all else.
+    pub members: Members,
+    /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
+    pub inside: Option<Box<Counts>>,
+    /// The number of messages in the window, if known.
+    pub count: Option<u64>,
+    /// The lifecycle state of a node, if it has one.
+    pub lifecycle: Option<Arc<str>>,
+}
+
+/// The numbers of nodes and topics in a folded namespace that are in the graph of a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Members {
+    /// The number of nodes.
+    pub nodes: usize,
+    /// The number of topics.
+    pub topics: usize,
+}
+
+impl Members {
+    /// The number that the box gives: of its nodes, or of its topics where it has no node; `None` for no folded
+    /// namespace.
+    pub(crate) fn number(self) -> Option<(usize, &'static str)> {
+        match (self.nodes, self.topics) {
+            (0, 0) => None,
+            (0, topics) => Some((topics, "topic")),
+            (nodes, _) => Some((nodes, "node")),
+        }
+    }
+}
+
+impl Shown {
+    /// An element of which nothing more is known.
+    pub fn plain(id: u32, state: State, degree: Degree) -> Self {
+        Self {
+            id,
+            state,
+            degree,
+            mark: None,
+            hz: None,
+            steady_hz: None,
+            held: None,
+            rates: None,
+            is_paused: false,
+            is_starved: false,
+            entries: Vec::new(),
+            topics: Vec::new(),
+            each: 0,
+            members: Members::default(),
+            inside: None,
+            count: None,
+            lifecycle: None,
+        }
+    }
+
+    /// Makes it the look of a service, which is not silent for having no messages.
+    pub(super) fn is_called(&mut self) {
+        (self.state, self.is_paused) = (self.state.min(State::Active), false);
+    }
+
+    /// The topics of a bundle, those that changed first, then those with the highest rate.
+    pub(crate) fn by_rate(&self) -> impl Iterator<Item = &TopicRow> {
+        let mut rows: Vec<&TopicRow> = self.topics.iter().collect();
+        let hz = |row: &TopicRow| row.hz.unwrap_or(0.0);
+        rows.sort_by(|a, b| {
+            let news = b.mark.is_some().cmp(&a.mark.is_some());
+            news.then(hz(b).total_cmp(&hz(a)))
+                .then(a.topic.cmp(&b.topic))
+        });
+        rows.into_iter()
+    }
+}
