@@ -10,11 +10,13 @@ mod layout_rs;
 mod pack;
 mod pinned;
 mod ring;
+mod route;
 mod routes;
 mod spacing;
 
 pub(crate) use layered::parts::parts;
 pub(crate) use pack::shelves;
+pub use route::Route;
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
@@ -138,18 +140,6 @@ pub struct LayoutOptions {
     pub orientation: Option<Orientation>,
     /// Whether a drawing that fills the page is better than one of short edges without crossings.
     pub is_tight: bool,
-}
-
-/// The way of one edge: a start point, then cubic pieces `(control, control, end)`; straight pieces have their
-/// controls on the line. It runs from the outline of `from` to the outline of `to`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Route {
-    /// Its start point.
-    pub start: Point,
-    /// The cubic pieces `(control, control, end)`.
-    pub curves: Vec<[Point; 3]>,
-    /// The middle of its label, if it has one and there was room.
-    pub label: Option<Point>,
 }
 
 /// Everything placed; the top left corner of the whole is (0, 0).
@@ -340,45 +330,6 @@ impl Cluster {
             around.w.max(self.words() + 2.0 * padding),
             around.h + self.title.h + self.footer.h,
         )
-    }
-}
-
-impl Route {
-    /// Every point that shapes it, from its start on.
-    fn points(&self) -> impl DoubleEndedIterator<Item = Point> {
-        std::iter::once(self.start).chain(self.curves.iter().flatten().copied())
-    }
-
-    /// This route with every point moved.
-    pub(crate) fn mapped(&self, f: impl Fn(Point) -> Point) -> Self {
-        Self {
-            start: f(self.start),
-            curves: self.curves.iter().map(|curve| curve.map(&f)).collect(),
-            label: self.label.map(&f),
-        }
-    }
-
-    /// This route moved by `by`.
-    pub(crate) fn moved(&self, by: Point) -> Self {
-        self.mapped(|p| Point::new(p.x + by.x, p.y + by.y))
-    }
-
-    /// About its length: that of the straight lines between the points that its pieces join.
-    fn length(&self) -> f64 {
-        let ends = self.curves.iter().map(|curve| curve[2]);
-        let far = |(length, from): (f64, Point), to: Point| (length + from.distance(to), to);
-        ends.fold((0.0, self.start), far).0
-    }
-
-    /// This route from its end to its start.
-    fn backwards(&self) -> Self {
-        let points: Vec<Point> = self.points().rev().collect();
-        let pieces = points[1..].chunks_exact(3);
-        Self {
-            start: points[0],
-            curves: pieces.map(|piece| [piece[0], piece[1], piece[2]]).collect(),
-            label: self.label,
-        }
     }
 }
 

@@ -379,6 +379,22 @@ impl View {
         at.since(first.span.start) as f64 / whole
     }
 
+    /// The namespaces with a box around an item, the innermost first.
+    pub(crate) fn around(&self, item: u32) -> impl Iterator<Item = usize> + '_ {
+        let first = self.items.get(item as usize).and_then(|item| item.cluster);
+        // Parents have smaller places, so that this ends.
+        std::iter::successors(first, |at| self.namespaces.get(*at)?.parent)
+    }
+
+    /// For each namespace with a box, whether anything inside it is seen.
+    pub(crate) fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
+        let mut inhabited = vec![false; self.namespaces.len()];
+        for at in seen.items.iter().flat_map(|shown| self.around(shown.id)) {
+            inhabited[at] = true;
+        }
+        inhabited
+    }
+
     /// Whether there is time to show: not between two missions that are compared, and not in one window.
     pub(crate) fn has_time(&self) -> bool {
         !self.compares && self.frames.len() > 1

@@ -54,7 +54,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["turn"],
         &["crowds", "filtered", "frames"],
     ]),
-    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
+    ("layout", &[&["isotonic", "layers", "pack", "pinned", "route", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["board", "paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],

@@ -11,22 +11,21 @@ mod course;
 mod gates;
 mod ids;
 mod legend;
+mod lines;
 pub(crate) use legend::{LegendSign, signs};
 mod measured;
 mod options;
 pub(crate) mod page;
 mod replicas;
 mod room;
+mod spaces;
 mod timeline;
 pub(crate) mod title;
 mod topics;
 mod tween;
 mod union;
 
-use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
-
-use self::arrows::{ArrowPath, Arrows};
+use self::arrows::ArrowPath;
 use self::boxes::{Boxes, ItemBox};
 use self::gates::Gate;
 pub use self::ids::unshown;
@@ -38,7 +37,7 @@ use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::{Point, Rect, Size};
 pub use crate::draw::figure::course::Course;
-use crate::draw::scene::{Group, Piece, Scene};
+use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
@@ -271,8 +270,7 @@ impl<'a> Picture<'a> {
         let Some(frame) = measured.view.frames.get(k) else {
             return scene;
         };
-        let seen = frame.calm(measured.view.seen(k));
-        self.graph((k, frame), &seen, &mut scene.groups);
+        self.graph((k, frame), &measured.view.calm(k), &mut scene.groups);
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
@@ -328,7 +326,7 @@ impl<'a> Picture<'a> {
     fn graph(&self, (k, frame): (usize, &Frame), seen: &SeenWindow, groups: &mut Vec<Group>) {
         let view = self.measured.view;
         let boxes = self.boxes();
-        let full = self.inhabited(seen);
+        let full = view.inhabited(seen);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
         let mut rolls = frame.rolls.iter();
@@ -377,72 +375,6 @@ impl<'a> Picture<'a> {
                 groups.extend(boxes.card_rows(card, view, k));
             }
         }
-    }
-
-    /// The lines of a window, and their labels; those that changed are last, so that they lie on top.
-    fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
-        let measured = &self.measured;
-        let links = &measured.graph.plan.links;
-        let look = |at: usize| measured::find(&seen.arrows, at);
-        let mut drawn = Vec::new();
-        let mut in_gates = BTreeSet::new();
-        for (gate, path) in &self.gates {
-            if let Some((shown, lines)) = gate.shown(measured.view, look) {
-                in_gates.extend(lines);
-                drawn.push((&gate.arrow, path, Cow::Owned(shown), links[gate.lead].fork));
-            }
-        }
-        let is_there = |item: u32| measured::find(&seen.items, item as usize).is_some();
-        for &at in self.order.iter().filter(|at| !in_gates.contains(at)) {
-            let (arrow, path) = (&measured.view.arrows[at], &self.tracks[at]);
-            if let Some(shown) = look(at).filter(|_| is_there(arrow.from) && is_there(arrow.to)) {
-                drawn.push((arrow, path, Cow::Borrowed(shown), links[at].fork));
-            }
-        }
-        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
-        // The lines of a fork have one label: that of a line that changed, which is on top.
-        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
-        for (k, (.., fork)) in drawn.iter().enumerate() {
-            last.extend(fork.map(|fork| (fork, k)));
-        }
-        let arrows = Arrows {
-            style: measured.style,
-            fonts: measured.fonts,
-            fit: self.fit,
-        };
-        let mut groups = [Vec::new(), Vec::new()];
-        for (arrow, path, shown, fork) in &drawn {
-            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
-            let (line, mut label) = arrows.parts(arrow, path, shown, ends);
-            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
-            if named.is_some_and(|other| {
-                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
-            }) {
-                label
-                    .pieces
-                    .retain(|piece| !matches!(piece, Piece::Text(_)));
-            }
-            groups[0].push(line);
-            if !label.pieces.is_empty() {
-                groups[1].push(label);
-            }
-        }
-        groups
-    }
-
-    /// For each namespace with a box, whether anything inside it is there.
-    fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
-        let view = self.measured.view;
-        let mut full = vec![false; view.namespaces.len()];
-        for shown in &seen.items {
-            let mut space = view.items.get(shown.id as usize).and_then(|i| i.cluster);
-            // Parents come first in the list, so that this ends.
-            while let Some(at) = space.filter(|at| full.get(*at) == Some(&false)) {
-                full[at] = true;
-                space = view.namespaces[at].parent;
-            }
-        }
-        full
     }
 
     fn boxes(&self) -> Boxes<'_> {

@@ -1,7 +1,7 @@
 //! Windows in which more changes than a reader can follow: those of one kind in one namespace are one coloured frame
 //! with their number, and as few words in the headline.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Frame, Mark, SeenWindow, Shown, View};
 use crate::graph::Element;
@@ -153,26 +153,49 @@ fn fold(
     });
 }
 
-impl Frame {
-    /// These looks with the colours of crowds on their frames alone: their members stand as if nothing happened, and
-    /// those that are gone do not stand.
-    pub(crate) fn calm(&self, mut seen: SeenWindow) -> SeenWindow {
-        if !self.crowds.is_empty() {
-            for all in [&mut seen.items, &mut seen.arrows] {
-                *all = all.iter().filter_map(|shown| self.calmed(shown)).collect();
-            }
+impl View {
+    /// The looks in window `k` with the colours of crowds on their frames alone: their members stand as if nothing
+    /// happened, and those that are gone do not stand, unless a line to them is news of its own.
+    pub(crate) fn calm(&self, k: usize) -> SeenWindow {
+        let seen = self.seen(k);
+        let Some(frame) = self.frames.get(k).filter(|frame| !frame.crowds.is_empty()) else {
+            return seen;
+        };
+        let ends = |shown: &Shown| {
+            let arrow = self.arrows.get(shown.id as usize);
+            arrow.into_iter().flat_map(|arrow| [arrow.from, arrow.to])
+        };
+        let is_news = |shown: &&Shown| !shown.entries.is_empty() && !frame.is_crowd(shown);
+        let told: BTreeSet<u32> = seen.arrows.iter().filter(is_news).flat_map(ends).collect();
+        let stays = |shown: &Shown| told.contains(&shown.id).then(|| shown.clone());
+        let items = seen.items.iter();
+        let items: Vec<Shown> = items
+            .filter_map(|shown| frame.calmed(shown).or_else(|| stays(shown)))
+            .collect();
+        let is_there = |at: u32| items.binary_search_by_key(&at, |shown| shown.id).is_ok();
+        let arrows = seen.arrows.iter().filter(|shown| ends(shown).all(is_there));
+        SeenWindow {
+            arrows: arrows.filter_map(|shown| frame.calmed(shown)).collect(),
+            items,
         }
-        seen
     }
+}
 
-    /// A look without its colour, if its events are those of a crowd; `None` for something gone.
-    pub(crate) fn calmed(&self, shown: &Shown) -> Option<Shown> {
+impl Frame {
+    /// Whether all events of something are those of a crowd.
+    fn is_crowd(&self, shown: &Shown) -> bool {
         let in_crowd = |entry: &EntryId| {
             let mut crowds = self.crowds.iter();
             crowds.any(|crowd| crowd.entries.binary_search(entry).is_ok())
         };
+        !shown.entries.is_empty() && shown.entries.iter().all(in_crowd)
+    }
+
+    /// A look without its colour, if its events are those of a crowd; `None` for something gone.
+    pub(crate) fn calmed(&self, shown: &Shown) -> Option<Shown> {
+        let is_crowd = self.is_crowd(shown);
         let mut shown = shown.clone();
-        if shown.entries.is_empty() || !shown.entries.iter().all(in_crowd) {
+        if !is_crowd {
             return Some(shown);
         }
         match shown.mark {
@@ -203,7 +226,7 @@ mod tests {
         };
         let (view, _) = view(&mission(windows), &options);
         let frame = view.frames.last().unwrap();
-        let seen = frame.calm(view.seen(view.frames.len() - 1));
+        let seen = view.calm(view.frames.len() - 1);
         let coloured = seen.items.iter().filter(|shown| shown.mark.is_some());
         let name = |at: Option<usize>| at.map_or("page", |at| &*view.namespaces[at].name);
         let crowd = |crowd: &Crowd| format!("{}: {}", name(crowd.space), crowd.words);

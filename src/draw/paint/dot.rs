@@ -116,20 +116,6 @@ impl<'a> DotView<'a> {
         }
     }
 
-    /// The namespaces that hold an item that is seen, by place.
-    fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
-        let mut inhabited = vec![false; self.view.namespaces.len()];
-        for shown in &seen.items {
-            let item = self.view.items.get(shown.id as usize);
-            let mut at = item.and_then(|item| item.cluster);
-            while let Some(space) = at.filter(|at| inhabited.get(*at) == Some(&false)) {
-                inhabited[space] = true;
-                at = self.view.namespaces.get(space).and_then(|n| n.parent);
-            }
-        }
-        inhabited
-    }
-
     /// The colour of a change; `None` for an element that stayed as it was.
     fn colour(&self, shown: &Shown) -> Option<String> {
         let change = match shown.mark? {

@@ -1,9 +1,10 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
 use super::card::Card;
-use super::measured::{LINE, Label, Space, Tells, pendant, second_line};
+use super::measured::{LINE, Label, Tells, pendant, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
+use super::spaces::Space;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};

@@ -6,6 +6,10 @@ use std::sync::Arc;
 
 use super::arrows::ArrowPath;
 use super::page::GraphFit;
+use super::topics;
+use crate::base::geometry::Size;
+use crate::draw::style::Edge;
+use crate::draw::text::Fonts;
 use crate::layout::Layout;
 use crate::view::{Arrow, ArrowKind, Showing, Shown, TopicRow, View};
 
@@ -85,12 +89,7 @@ fn is_between_nodes(view: &View, arrow: &Arrow) -> bool {
 /// The outermost namespace whose frame a line crosses, and whether it begins inside; `None` if it crosses none, or
 /// those of both ends.
 fn crossed(view: &View, arrow: &Arrow) -> Option<(usize, bool)> {
-    let around = |item: u32| {
-        let first = view.items.get(item as usize).and_then(|item| item.cluster);
-        let all = std::iter::successors(first, |at| view.namespaces[*at].parent);
-        all.collect::<Vec<usize>>()
-    };
-    let (from, to) = (around(arrow.from), around(arrow.to));
+    let [from, to] = [arrow.from, arrow.to].map(|item| view.around(item).collect::<Vec<usize>>());
     let outermost =
         |inside: &[usize], other: &[usize]| inside.iter().rfind(|at| !other.contains(at)).copied();
     match (outermost(&from, &to), outermost(&to, &from)) {
@@ -197,6 +196,50 @@ impl Gate {
         path.ends[usize::from(!is_outward)] = view.namespaces[self.space].name.to_string();
         path.id = format!("g{}", path.id);
         Some(path)
+    }
+}
+
+/// Gives the labels of lines that are drawn as one the same room: that of a gate to the line that leads it, that of a
+/// fork to all of its lines.
+pub(crate) fn share(
+    (view, fonts, style): (&View, &Fonts, &Edge),
+    rooms: &mut [Option<Size>],
+    gates: &[(Gate, Vec<String>)],
+    forks: &[Option<usize>],
+) {
+    for (gate, names) in gates {
+        for (at, is_alone) in gate.alone(view) {
+            rooms[at] = rooms[at].filter(|_| is_alone);
+        }
+        let look = |at: usize, window: u32| view.arrows_shown[at].at(window as usize);
+        for window in gate.turns(view) {
+            let shown = gate.shown(view, |at| look(at, window));
+            let rows = shown.map(|(shown, _)| topics::rows(&shown, names));
+            let room = rows.and_then(|rows| topics::room(&rows, fonts, style));
+            rooms[gate.lead] = larger(rooms[gate.lead], room);
+        }
+    }
+    let mut shared: BTreeMap<usize, Option<Size>> = BTreeMap::new();
+    let forked = || {
+        forks
+            .iter()
+            .enumerate()
+            .filter_map(|(at, fork)| Some((at, (*fork)?)))
+    };
+    for (at, fork) in forked() {
+        let room = shared.entry(fork).or_default();
+        *room = larger(*room, rooms[at]);
+    }
+    for (at, fork) in forked() {
+        rooms[at] = shared.get(&fork).copied().flatten();
+    }
+}
+
+/// A size at least as wide and as high as both.
+pub(crate) fn larger(a: Option<Size>, b: Option<Size>) -> Option<Size> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(Size::new(a.w.max(b.w), a.h.max(b.h))),
+        (a, b) => a.or(b),
     }
 }
 

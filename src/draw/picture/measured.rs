@@ -2,9 +2,10 @@
 
 use super::also::{self, Footer};
 use super::card::{self, Card};
-use super::gates::{self, Gate};
+use super::gates::{self, Gate, larger};
+use super::spaces::{Space, first_seen, spaces};
 use super::{chips, replicas, topics};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
 use crate::base::words;
@@ -53,20 +54,6 @@ impl Label {
 
 /// The text in the place of a rate where no message came.
 const NO_MESSAGE: &str = "no msg";
-
-/// A namespace with a box around its members.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Space {
-    /// Its full name.
-    pub(crate) name: String,
-    /// Its title: the part inside the namespace around it.
-    pub(crate) title: String,
-    /// The indices of the equal namespaces drawn as this one; empty for a single one.
-    pub(crate) replicas: Vec<String>,
-    /// Their number over time, if it changes: parts of the time from 0 to 1, each with the share of them that is there
-    /// from then on.
-    pub(crate) course: Vec<(f64, f64)>,
-}
 
 /// The labels of a view, and the plan that follows from them.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +125,7 @@ impl MeasuredGraph {
             })
             .collect();
         let forks = gates::forks(view, &gates);
-        drafter.share(&mut rooms, &gates, &forks);
+        gates::share((view, fonts, &style.edge), &mut rooms, &gates, &forks);
         let through: BTreeSet<usize> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
         let links = view.arrows.iter().zip(&rooms).zip(&forks).enumerate();
         let links = links.map(|(at, ((arrow, room), fork))| Link {
@@ -192,22 +179,6 @@ impl MeasuredGraph {
             first_seen: first_seen(view),
         }
     }
-}
-
-/// The window in which each namespace first has something inside.
-fn first_seen(view: &View) -> Vec<usize> {
-    let mut first = vec![usize::MAX; view.namespaces.len()];
-    for (item, showing) in view.items.iter().zip(&view.items_shown) {
-        let seen = showing.runs().find(|(_, shown)| shown.is_some());
-        let seen = seen.map_or(usize::MAX, |(window, _)| window as usize);
-        let mut space = item.cluster;
-        // Parents have smaller places, so that this ends.
-        while let Some(at) = space {
-            first[at] = first[at].min(seen);
-            space = view.namespaces[at].parent;
-        }
-    }
-    first
 }
 
 struct Measurer<'a> {
@@ -296,42 +267,6 @@ impl Measurer<'_> {
         widest
     }
 
-    /// Gives the labels of lines that are drawn as one the same room: that of a gate to the line that leads it, that of a
-    /// fork to all of its lines.
-    fn share(
-        &self,
-        rooms: &mut [Option<Size>],
-        gates: &[(Gate, Vec<String>)],
-        forks: &[Option<usize>],
-    ) {
-        for (gate, names) in gates {
-            for (at, is_alone) in gate.alone(self.view) {
-                rooms[at] = rooms[at].filter(|_| is_alone);
-            }
-            let look = |at: usize, window: u32| self.view.arrows_shown[at].at(window as usize);
-            for window in gate.turns(self.view) {
-                let shown = gate.shown(self.view, |at| look(at, window));
-                let rows = shown.map(|(shown, _)| topics::rows(&shown, names));
-                let room = rows.and_then(|rows| topics::room(&rows, self.fonts, &self.style.edge));
-                rooms[gate.lead] = larger(rooms[gate.lead], room);
-            }
-        }
-        let mut shared: BTreeMap<usize, Option<Size>> = BTreeMap::new();
-        let forked = || {
-            forks
-                .iter()
-                .enumerate()
-                .filter_map(|(at, fork)| Some((at, (*fork)?)))
-        };
-        for (at, fork) in forked() {
-            let room = shared.entry(fork).or_default();
-            *room = larger(*room, rooms[at]);
-        }
-        for (at, fork) in forked() {
-            rooms[at] = shared.get(&fork).copied().flatten();
-        }
-    }
-
     /// The room for the widest label that each arrow shows in some window.
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
@@ -380,14 +315,6 @@ impl Measurer<'_> {
             Some(Size::new(widest?, style.size * PILL_HEIGHT))
         });
         rooms.collect()
-    }
-}
-
-/// A size at least as wide and as high as both.
-fn larger(a: Option<Size>, b: Option<Size>) -> Option<Size> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(Size::new(a.w.max(b.w), a.h.max(b.h))),
-        (a, b) => a.or(b),
     }
 }
 
@@ -517,36 +444,6 @@ pub(crate) fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
         Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
         _ => name,
     }
-}
-
-/// The titles of the namespaces: the part of their names inside the namespace around them.
-fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
-    let title = |at: usize| {
-        let name = &*view.namespaces[at].name;
-        let around = view.namespaces[at]
-            .parent
-            .and_then(|p| view.namespaces.get(p));
-        around.map_or(name, |p| name.strip_prefix(&*p.name).unwrap_or(name))
-    };
-    let mut fleets = 0..;
-    (0..view.namespaces.len())
-        .map(|at| Space {
-            course: Some(at)
-                .filter(|&at| !view.namespaces[at].replicas.is_empty())
-                .and_then(|_| fleets.next())
-                .map_or_else(Vec::new, |nth| replicas::shares(view, nth)),
-            name: view.namespaces[at].name.to_string(),
-            title: match view.namespaces[at].replicas.len() {
-                0 => fonts.shown(title(at)).into_owned(),
-                n => format!("{} × {n}", fonts.shown(title(at))),
-            },
-            replicas: view.namespaces[at]
-                .replicas
-                .iter()
-                .map(ToString::to_string)
-                .collect(),
-        })
-        .collect()
 }
 
 #[cfg(test)]

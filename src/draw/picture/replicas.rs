@@ -1,7 +1,7 @@
 //! The roll call of equal namespaces that are drawn as one: a chip for each, and their number over time.
 
 use super::boxes::Boxes;
-use super::measured::Space;
+use super::spaces::Space;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::Color;

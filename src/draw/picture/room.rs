@@ -188,10 +188,10 @@ mod tests {
             let titles = std::iter::once((frame, Size::new(width, 14.0)));
             place_titles(titles, lines, 1.0)[0].0
         };
-        assert_eq!(title(50.0, &[along(70.0)]), 0.0);
+        assert!(title(50.0, &[along(70.0)]) < 0.1);
         assert!((title(50.0, &[along(20.0), along(60.0)]) - 55.0).abs() < 0.1);
         // There is no room anywhere.
-        assert_eq!(title(150.0, &[along(100.0)]), 0.0);
+        assert!(title(150.0, &[along(100.0)]) < 0.1);
     }
 
     #[test]

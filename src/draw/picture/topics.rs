@@ -106,9 +106,7 @@ fn last(name: &str) -> &str {
 /// The name without the namespace whose frame one of the ends of the arrow stands in.
 fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     let inside = |item: u32| {
-        let space = view.items.get(item as usize)?.cluster?;
-        let around = std::iter::successors(Some(space), |at| view.namespaces[*at].parent);
-        let mut rests = around.filter_map(|at| {
+        let mut rests = view.around(item).filter_map(|at| {
             name.strip_prefix(&*view.namespaces[at].name)?
                 .strip_prefix('/')
         });

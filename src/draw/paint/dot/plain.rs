@@ -37,7 +37,7 @@ pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> St
         )
     };
     let item = |_, item: &Item, shown: &Shown| node(drawing, item, shown);
-    let whole = (None, &*drawing.inhabited(seen), " ");
+    let whole = (None, &*drawing.view.inhabited(seen), " ");
     drawing.members(&mut out, seen, whole, (&space, &item));
     for shown in &seen.arrows {
         if let Some(arrow) = drawing.view.arrows.get(shown.id as usize) {

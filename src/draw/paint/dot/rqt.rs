@@ -31,7 +31,7 @@ pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, seen: &SeenWindow) -
         format!(" graph [{}];", writer.cluster(at, name))
     };
     let item = |at: usize, item: &Item, shown: &Shown| writer.item(item, layout.boxes[at], shown);
-    let whole = (None, &*drawing.inhabited(seen), " ");
+    let whole = (None, &*drawing.view.inhabited(seen), " ");
     drawing.members(&mut out, seen, whole, (&space, &item));
     for shown in &seen.arrows {
         writer.arrow(&mut out, shown);

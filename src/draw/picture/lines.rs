@@ -1,0 +1,61 @@
+//! The lines of a window: those of a namespace as one while they are quiet, and one label for each fork.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::arrows::Arrows;
+use super::{Picture, measured};
+use crate::draw::scene::{Group, Piece};
+use crate::view::SeenWindow;
+
+impl Picture<'_> {
+    /// The lines of a window, and their labels; those that changed are last, so that they lie on top.
+    pub(super) fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
+        let measured = &self.measured;
+        let links = &measured.graph.plan.links;
+        let look = |at: usize| measured::find(&seen.arrows, at);
+        let mut drawn = Vec::new();
+        let mut in_gates = BTreeSet::new();
+        for (gate, path) in &self.gates {
+            if let Some((shown, lines)) = gate.shown(measured.view, look) {
+                in_gates.extend(lines);
+                drawn.push((&gate.arrow, path, Cow::Owned(shown), links[gate.lead].fork));
+            }
+        }
+        for &at in self.order.iter().filter(|at| !in_gates.contains(at)) {
+            let (arrow, path) = (&measured.view.arrows[at], &self.tracks[at]);
+            if let Some(shown) = look(at) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[at].fork));
+            }
+        }
+        drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
+        // The lines of a fork have one label: that of a line that changed, which is on top.
+        let mut last: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, (.., fork)) in drawn.iter().enumerate() {
+            last.extend(fork.map(|fork| (fork, k)));
+        }
+        let arrows = Arrows {
+            style: measured.style,
+            fonts: measured.fonts,
+            fit: self.fit,
+        };
+        let mut groups = [Vec::new(), Vec::new()];
+        for (arrow, path, shown, fork) in &drawn {
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
+            let (line, mut label) = arrows.parts(arrow, path, shown, ends);
+            let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
+            if named.is_some_and(|other| {
+                !std::ptr::eq(other, *path) && other.label_area() == path.label_area()
+            }) {
+                label
+                    .pieces
+                    .retain(|piece| !matches!(piece, Piece::Text(_)));
+            }
+            groups[0].push(line);
+            if !label.pieces.is_empty() {
+                groups[1].push(label);
+            }
+        }
+        groups
+    }
+}

@@ -1,0 +1,158 @@
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::*;
+use crate::base::notice::Notices;
+use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::Degree;
+use crate::graph::{Element, Elements, State};
+use crate::layout;
+use crate::view::{Headline, Item, ItemKind, Mark, Phrase, Showing, Shown};
+
+/// Four minutes in which a node is there and another comes and goes.
+fn two_nodes() -> (Mission, View) {
+    let minute = |i: usize| Stamp(i64::try_from(i).unwrap() * 60_000_000_000);
+    let period = Period::parse("1m").unwrap();
+    let mission = Mission {
+        bags: Vec::new(),
+        span: Span::new(minute(0), minute(4)),
+        messages: 0,
+        period,
+        step: period,
+        elements: Elements::default(),
+        windows: Vec::new(),
+        graphs: crate::graph::Graphs::default(),
+        ledger: crate::mission::Ledger::default(),
+        sending: crate::graph::history::Sending::default(),
+        undrawn: Vec::new(),
+        layout: None,
+        notices: Notices::new(),
+    };
+    let item = |(id, name): (u32, &str)| Item {
+        kind: ItemKind::Node,
+        name: Arc::from(name),
+        label: Arc::from(name),
+        members: vec![Element::Node(id)],
+        is_replica: false,
+            is_service: false,
+        cluster: None,
+    };
+    let shown = |id, mark| Shown {
+        mark,
+        ..Shown::plain(id, State::Active, Degree::Measured)
+    };
+    let frame = |(index, mark): (usize, Option<Mark>)| Frame {
+        headlines: mark.map(|_| Headline::started()).into_iter().collect(),
+        caption: mark
+            .map(|m| Phrase {
+                sign: ' ',
+                lead: String::new(),
+                names: vec!["/planner".to_owned()],
+                entries: vec![0],
+                tail: m.class().to_owned(),
+            })
+            .into_iter()
+            .collect(),
+        ..Frame::empty(index, Span::new(minute(index), minute(index + 1)))
+    };
+    let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
+    let driver = shown(0, None);
+    let planner = marks.map(|mark| mark.map(|m| shown(1, Some(m))));
+    let view = View {
+        items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
+        items_shown: vec![
+            Showing::of(marks.iter().map(|_| Some(&driver))),
+            Showing::of(planner.iter().map(Option::as_ref)),
+        ],
+        frames: marks.into_iter().enumerate().map(frame).collect(),
+        ..View::default()
+    };
+    (mission, view)
+}
+
+fn strip_of(choice: &str, width_mm: Option<f64>) -> Strip {
+    let (mission, view) = two_nodes();
+    let (style, fonts) = (Style::builtin("paper").unwrap(), Fonts::bundled());
+    let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
+    let picture = measured.laid_out(layout::engine("layered").unwrap());
+    let source = StripSource {
+        mission: &mission,
+        view: &view,
+        picture: &picture,
+        style: &style,
+        fonts: &fonts,
+        engine: layout::engine("layered").unwrap(),
+    };
+    strip(source, &Choice::parse(choice).unwrap(), width_mm, 1280.0).unwrap()
+}
+
+fn texts(strip: &Strip) -> Vec<&Text> {
+    let pieces = strip.scene.groups.iter().flat_map(|g| &g.pieces);
+    let mut texts = Vec::new();
+    for piece in pieces {
+        if let Piece::Text(text) = piece {
+            texts.push(text);
+        }
+    }
+    texts
+}
+
+#[test]
+fn panels_have_time_and_change_and_share_a_legend() {
+    let strip = strip_of("changes", None);
+    let words: Vec<&str> = texts(&strip).iter().map(|t| t.text.as_str()).collect();
+    for expected in ["0:00–1:00", "1:00–2:00", "3:00–4:00", "/planner added"] {
+        assert_eq!(
+            words.iter().filter(|w| **w == expected).count(),
+            1,
+            "{expected}"
+        );
+    }
+    assert!(!words.contains(&"2:00–3:00"));
+    assert_eq!(words.iter().filter(|w| **w == "node").count(), 1);
+}
+
+#[test]
+fn ids_stay_unique() {
+    let strip = strip_of("2x2", None);
+    let ids: BTreeSet<&str> = strip.scene.groups.iter().map(|g| g.id.as_str()).collect();
+    assert_eq!(ids.len(), strip.scene.groups.len());
+}
+
+#[test]
+fn on_paper_the_width_is_exact_and_captions_are_legible() {
+    let strip = strip_of("2x2", Some(88.0));
+    assert_eq!(strip.scene.width_mm, Some(88.0));
+    assert!((strip.scene.size.w - 88.0 * PX_PER_MM).abs() < 1e-9);
+    assert_eq!(strip.remarks, Vec::<String>::new());
+    let smallest = texts(&strip)
+        .iter()
+        .map(|t| t.size)
+        .fold(f64::MAX, f64::min);
+    assert!(smallest * PT_PER_PX >= SMALLEST_PT);
+}
+
+#[test]
+fn too_small_text_is_reported_with_advice() {
+    let strip = strip_of("2x2", Some(20.0));
+    assert!(strip.remarks[0].contains("mm`"), "{:?}", strip.remarks);
+}
+
+#[test]
+fn everything_is_on_the_page() {
+    for choice in ["2x2", "0", "changes"] {
+        let strip = strip_of(choice, None);
+        let page = strip.scene.size;
+        for piece in strip.scene.groups.iter().flat_map(|g| &g.pieces) {
+            let bounds = piece_bounds(piece).unwrap();
+            assert!(
+                bounds.x >= -1.0 && bounds.right() <= page.w + 1.0,
+                "{choice}: {piece:?}"
+            );
+            assert!(
+                bounds.y >= -1.0 && bounds.bottom() <= page.h + 1.0,
+                "{choice}: {piece:?}"
+            );
+        }
+    }
+}
