@@ -54,8 +54,8 @@ pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
 pub use showing::Showing;
 pub(crate) use showing::TopicRow;
 pub(crate) use shown::Members;
-pub use shown::{Mark, Shown};
 use shown::sum;
+pub use shown::{Mark, Shown};
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {

@@ -34,7 +34,7 @@ fn two_nodes() -> (Mission, View) {
         label: Arc::from(name),
         members: vec![Element::Node(id)],
         is_replica: false,
-            is_service: false,
+        is_service: false,
         cluster: None,
     };
     let shown = |id, mark| Shown {
