@@ -55,7 +55,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -p all -o out/x.svg", "--for column"),
     ("render", "r.bag -p all -o out/x.png", "--size 300x200"),
     ("render", "r.bag -p all -o out/x.svg", "--width 88mm"),
-    ("render", "r.bag -p all -o out/x.svg", "--line-width bytes"),
+    ("render", "r.bag --topology both.csv -p all -o out/x.svg", "--line-width bytes"),
     ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--fit none"),
     ("render", "r.bag -p all -o out/x.html", "--orientation TB"),
     ("render", "r.bag -p all -o out/x.svg", "--layout layout-rs"),
@@ -384,6 +384,10 @@ fn folder() -> TempDir {
     put(
         "t.csv",
         b"Name,Publish,Subscribe,Node-start,Node-end\n/new,[],\"['/chat']\",,\n",
+    );
+    put(
+        "both.csv",
+        b"Name,Publish,Subscribe,Node-start,Node-end\n/new,[],\"['/chat', '/ns/cam/image']\",,\n",
     );
     let expects = |topics: &str| format!("schema: bagreel.expect/1\ntopics:\n{topics}");
     let gone = "  /chat: {type: gone/Gone}\n  /ns/log: {type: gone/Gone}\n";
