@@ -67,10 +67,6 @@ pub(crate) enum Claim {
     Reports(Name, Name),
     /// This node is in this lifecycle state.
     Lifecycle(Name, Name),
-    /// This service (by the topic of its events) has this client.
-    Client(Name, Name),
-    /// This service (by the topic of its events) was called: a request or a reply was sent or received.
-    Called(Name, Name),
     /// This topic has this type.
     Type(Name, Name),
     /// This topic is offered with this quality of service.
@@ -129,8 +125,6 @@ impl Claim {
             Self::Reports(a, b) => Self::Reports(to(a), to(b)),
             Self::Logger(a, b) => Self::Logger(to(a), to(b)),
             Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
-            Self::Client(a, b) => Self::Client(to(a), to(b)),
-            Self::Called(a, b) => Self::Called(to(a), to(b)),
             Self::Type(a, b) => Self::Type(to(a), to(b)),
             Self::Quality(a, b) => Self::Quality(to(a), to(b)),
             Self::SaysPublish(a, b) => Self::SaysPublish(to(a), to(b)),

@@ -1,12 +1,9 @@
 //! A collector that takes in any number of bags: the times of all messages, and the claims of their contents.
 
-mod services;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::clock::{Belief, believed};
-pub use services::Service;
 
 use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};

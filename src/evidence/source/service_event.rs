@@ -1,5 +1,5 @@
-//! Service introspection (`<service>/_service_event`): requests and replies of a service, and the number of its
-//! clients.
+//! Service introspection (`<service>/_service_event`): requests and replies of a service, and its client and its server
+//! where the recorder names publishers.
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -50,14 +50,7 @@ pub(crate) fn read(
         heard.claim(end, Degree::Measured, || format!("{service}: {word}"));
         heard.claim(Claim::Type(called, kind), Degree::Measured, String::new);
     }
-    let (client_name, kind) = (heard.name(&client), heard.name(word));
     let words = || format!("{service}: {word}, client {client}");
     heard.claim(Claim::Topic(of), Degree::Measured, words);
-    heard.claim(
-        Claim::Client(of, client_name),
-        Degree::Measured,
-        String::new,
-    );
-    heard.claim(Claim::Called(of, kind), Degree::Measured, String::new);
     Ok(())
 }

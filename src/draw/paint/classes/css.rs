@@ -93,7 +93,7 @@ fn body(out: &mut String, what: &str, body: &Body) {
     let weight = if body.bold { "600 " } else { "" };
     let _ = write!(
         out,
-        "{what} :is(rect,ellipse){{{}}}{what} text{{font:{weight}{}px {FONT};fill:{}}}\
+        "{what} :is(rect,ellipse,path){{{}}}{what} text{{font:{weight}{}px {FONT};fill:{}}}\
          {what} :is(.r,.m){{font:{}px {FONT}}}",
         paint(body.fill, body.stroke, body.width, &[]),
         body.size,
@@ -148,7 +148,7 @@ fn change(out: &mut String, kind: &str, change: &Change) {
     } = change;
     let _ = write!(
         out,
-        ".{kind} :is(rect,ellipse){{{}}}.{kind} text{{fill:{text}}}\
+        ".{kind} :is(rect,ellipse,path){{{}}}.{kind} text{{fill:{text}}}\
          .edge.{kind} path{{fill:none;stroke:{color};stroke-width:{};stroke-dasharray:{}}}\
          .edge.{kind} path+path{{fill:{color};stroke:none}}.edge.{kind} text{{fill:{color};font-weight:600}}",
         paint(*fill, *color, *width, dash),
