@@ -1,6 +1,6 @@
 //! Tests of the sources of ROS 2 with single messages.
 
-use super::tests::{Payload, claims, hear};
+use super::tests::{Payload, claims};
 
 #[test]
 fn a_log_record_of_ros2_names_its_logger() {
