@@ -44,8 +44,9 @@ fn every_headline_is_counted_captioned_and_marked() {
             let reported: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
             assert_eq!(reported.len(), frame.counts.total(), "{at}");
             let reported: BTreeSet<u32> = frame.entries().collect();
-            let said: usize = frame.caption.iter().map(|phrase| phrase.names.len()).sum();
-            assert_eq!(reported.len(), said, "{at}");
+            let phrases = frame.caption.iter();
+            let said: BTreeSet<u32> = phrases.flat_map(|one| one.entries.clone()).collect();
+            assert_eq!(reported, said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
             let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
             assert_eq!(marked, reported, "{at}");

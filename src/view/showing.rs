@@ -11,7 +11,7 @@ use crate::graph::State;
 /// A topic on a line between two boxes in a window, or several that are shown as one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicRow {
-    /// Its place in [`Arrow::topics`].
+    /// Its place in `Arrow::topics`.
     pub topic: u32,
     /// Whether its messages run along the arrow, and whether they run against it.
     pub ways: [bool; 2],

@@ -71,7 +71,7 @@ impl Mark {
 /// The look of an item or arrow in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
-    /// Its place in [`View::items`] or [`View::arrows`].
+    /// Its place in `View::items` or `View::arrows`.
     pub id: u32,
     /// Its state; for a ghost, the last one before its end.
     pub state: State,
