@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 .map_or_else(|| "?".to_owned(), |hz| format!("{hz:.1} Hz"));
             println!(
                 "  {node}  {rate}  {} by {}",
-                state.degree.word(),
+                state.confidence.word(),
                 evidence.join(", ")
             );
         }

@@ -4,35 +4,35 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
-use bagreel::values::{Detail, Entry};
+use bagreel::values::{Detail, Event};
 use bagreel::{Mission, Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bag = std::env::args().nth(1).ok_or("name a bag")?;
     let mission = read(&Reading::of([bag]))?;
-    let ledger = &mission.ledger;
-    let mut phases = ledger.phases.iter().peekable();
-    for (id, entry) in ledger.headlines(mission.span) {
-        while let Some(phase) = phases.next_if(|phase| phase.span.start <= entry.time) {
+    let log = &mission.log;
+    let mut phases = log.phases.iter().peekable();
+    for (id, event) in log.headlines(mission.span) {
+        while let Some(phase) = phases.next_if(|phase| phase.span.start <= event.time) {
             println!("-- {}", phase.name);
         }
-        let doubt = entry.latest.since(entry.earliest) as f64 / 2e9;
+        let doubt = event.latest.since(event.earliest) as f64 / 2e9;
         println!(
             "{:7.1} s ± {doubt:.1}  {} {}{}, {} parts",
-            mission.offset(entry.time) as f64 / 1e9,
-            name(&mission, entry),
-            entry.kind.word(),
-            detail(&mission, entry),
-            ledger.parts(id).count()
+            mission.offset(event.time) as f64 / 1e9,
+            name(&mission, event),
+            event.kind.word(),
+            detail(&mission, event),
+            log.parts(id).count()
         );
     }
     Ok(())
 }
 
-/// Whom or what an entry is about.
-fn name(mission: &Mission, entry: &Entry) -> String {
+/// Whom or what an event is about.
+fn name(mission: &Mission, event: &Event) -> String {
     let elements = &mission.elements;
-    let (node, topic) = elements.ends(entry.what);
+    let (node, topic) = elements.ends(event.what);
     let node = node.map(|id| elements.nodes[id as usize].name.as_str());
     let topic = topic.map(|id| elements.topics[id as usize].name.as_str());
     let names: Vec<&str> = node.into_iter().chain(topic).collect();
@@ -40,14 +40,14 @@ fn name(mission: &Mission, entry: &Entry) -> String {
 }
 
 /// What more there is to say: rates, senders, values before and after.
-fn detail(mission: &Mission, entry: &Entry) -> String {
+fn detail(mission: &Mission, event: &Event) -> String {
     let nodes = |ids: &[u32]| {
         let names = ids
             .iter()
             .map(|id| mission.elements.nodes[*id as usize].name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
-    match &entry.detail {
+    match &event.detail {
         Detail::Rates { from_hz, to_hz } => format!(" from {from_hz:.2} to {to_hz:.2} Hz"),
         Detail::Senders { from, to } => format!(" from {} to {}", nodes(from), nodes(to)),
         Detail::Values { from, to } => format!(" from `{from}` to `{to}`"),

@@ -1,20 +1,20 @@
 //! Evidence of who talks to whom: one file per kind of proof below `source/`, one row each in [`SOURCES`].
 //!
 //! A source reads messages whose layout it knows, or the announcement of a connection, or draws a conclusion from the
-//! whole mission; what it finds are claims.
+//! whole mission; what it finds are observations.
 
-pub(crate) mod claim;
 pub(crate) mod clock;
 #[cfg(feature = "source")]
 pub mod code;
 pub mod collector;
 pub mod conclude;
 pub(crate) mod given;
+pub(crate) mod inference;
 mod kinds;
 pub(crate) mod message;
 pub(crate) mod numbers;
+pub(crate) mod observation;
 pub(crate) mod offsets;
-pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod source;
 pub(crate) mod spread;
@@ -26,8 +26,8 @@ pub mod topology;
 pub(crate) mod unknown;
 pub(crate) mod values;
 
-pub use claim::{Degree, EvidenceLine};
 pub use kinds::Evidence;
+pub use observation::{Confidence, EvidenceLine};
 pub(crate) use source::Source;
 
 use message::{definition, parameters};

@@ -162,7 +162,7 @@ pub const FORMATS: &[OutputFormat] = &[
     },
     OutputFormat {
         word: "csv",
-        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, log, phases, bags",
         check: Some(tables::check),
         start: |sequence, target| tables::start(sequence, target, TableFormat::Csv),
         ..DATA

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder, is_service};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 
 #[cfg(test)]
 pub(crate) use graphs::tests as graphs_for_tests;
@@ -151,7 +151,7 @@ pub struct NodeState {
     /// The state.
     pub state: State,
     /// The strength of the evidence for it in this window.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// The sum of the rates of its publications, in messages per second; `None` where not known.
     pub hz: Option<f64>,
     /// The lifecycle state, if it has one: `inactive`, `active`, …
@@ -181,7 +181,7 @@ pub struct TopicState {
     /// The state.
     pub state: State,
     /// The strength of the evidence for it in this window.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// The number of messages in the window, ≥ 0.
     pub count: u64,
     /// The payload bytes of these messages, if known.
@@ -204,7 +204,7 @@ pub struct EdgeState {
     /// The state.
     pub state: State,
     /// The strength of the evidence for it in this window.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// The number of messages over this edge in the window, if known.
     pub count: Option<u64>,
     /// The messages per second over this edge; `None` where not known.

@@ -10,7 +10,7 @@ pub mod base {
 pub mod evidence {
     #[cfg(feature = "source")]
     pub use crate::evidence::code;
-    pub use crate::evidence::{Degree, Evidence, EvidenceLine, SOURCES};
+    pub use crate::evidence::{Confidence, Evidence, EvidenceLine, SOURCES};
     pub use crate::evidence::{collector, conclude, topology};
 }
 
@@ -25,7 +25,7 @@ pub mod graph {
 /// See `src/mission.rs`.
 pub mod mission {
     pub use crate::mission::{
-        Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
+        EventLog, Mission, Window, event_log, events, info, phases, read_json, write_json,
     };
 }
 

@@ -23,7 +23,7 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! The [`Ledger`] of a mission holds its events, the same for all windows; `examples/story.rs` prints it.
+//! The [`EventLog`] of a mission holds its events, the same for all windows; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
@@ -48,7 +48,7 @@
 //!
 //! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
 //! *window* one half-open interval `[start, end)`. A *claim* is a statement of one source about the graph, with the
-//! times at which it said so; a *proof* is a fact that follows from claims; a *degree* is the strength of the evidence
+//! times at which it said so; a *proof* is a fact that follows from claims; a *confidence* is the strength of the evidence
 //! for something. The *graph* of a window holds the *states* of nodes, topics, publications and subscriptions, its
 //! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
 //! every run. The *view* holds *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
@@ -111,27 +111,27 @@ pub use draw::style::Style;
 pub use export::Output;
 pub use graph::Graph;
 pub use graph::diff::Change;
-pub use mission::{Ledger, Mission, Window, write_json};
+pub use mission::{EventLog, Mission, Window, write_json};
 pub use pipeline::Reading;
 #[cfg(feature = "render")]
 pub use pipeline::{Render, Rendered};
 
 pub mod values {
-    //! The values that those of the front page are made of: times and names, the elements of a graph, the entries of a
-    //! ledger, and options.
+    //! The values that those of the front page are made of: times and names, the elements of a graph, the events of a
+    //! log, and options.
 
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Period, Span, Stamp};
     pub use crate::evidence::conclude;
-    pub use crate::evidence::{Degree, Evidence};
+    pub use crate::evidence::{Confidence, Evidence};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
         Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Measures, Node, NodeId,
         NodeLoad, NodeState, State, Topic, TopicId, TopicState,
     };
-    pub use crate::mission::ledger::{
-        Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Phase,
+    pub use crate::mission::event_log::{
+        Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,
     };
     #[cfg(feature = "render")]
     pub use crate::pipeline::{Body, Drawing, Purpose};

@@ -1,8 +1,8 @@
 //! The mission: all windows with their graphs and changes; written as JSON, which can be read as an input.
 
+pub mod event_log;
 pub mod events;
 pub mod info;
-pub mod ledger;
 pub mod phases;
 pub(crate) mod reconfiguration;
 
@@ -23,8 +23,8 @@ use crate::graph::diff::{Change, Changes};
 use crate::graph::history::Sending;
 use crate::graph::{Elements, Graph, Graphs, NodeId};
 
-pub(crate) use ledger::EntryId;
-pub use ledger::Ledger;
+pub(crate) use event_log::EventId;
+pub use event_log::EventLog;
 
 /// One window; its graph is in [`Mission::graphs`].
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +40,8 @@ pub struct Window {
     pub messages: u64,
     /// The changes since the window before; empty in the first.
     pub changes: Vec<Change>,
-    /// The ledger entries that the changes belong to, one per change.
-    pub entries: Vec<EntryId>,
+    /// The log events that the changes belong to, one per change.
+    pub events: Vec<EventId>,
 }
 
 /// A mission as a sequence of graphs.
@@ -65,7 +65,7 @@ pub struct Mission {
     /// The graph of each window.
     pub graphs: Graphs,
     /// The events, in continuous time.
-    pub ledger: Ledger,
+    pub log: EventLog,
     /// The activity of every sender, in continuous time.
     pub sending: Sending,
     /// The positions of the drawing, if one was made.
@@ -131,17 +131,17 @@ impl Mission {
         sums.into_iter().map(skew).collect()
     }
 
-    /// Determines the changes from each window to the next, by the ledger.
+    /// Determines the changes from each window to the next, by the event log.
     pub(crate) fn explain(&mut self) {
         let spans = self.windows.iter().map(|w| w.span);
         let windows = spans.zip(&self.graphs);
-        let told = ledger::explain(windows, &self.elements, &self.ledger);
-        for (window, (changes, entries)) in self.windows.iter_mut().zip(told) {
-            (window.changes, window.entries) = (changes, entries);
+        let told = event_log::explain(windows, &self.elements, &self.log);
+        for (window, (changes, events)) in self.windows.iter_mut().zip(told) {
+            (window.changes, window.events) = (changes, events);
         }
     }
 
-    /// Determines the changes from each window to the next, and derives lifetimes, sending and ledger from them: for
+    /// Determines the changes from each window to the next, and derives lifetimes, sending and log from them: for
     /// missions of which only the windows are known. A rate must change by more than the fraction `threshold`;
     /// `restarts` are nodes that restarted under the same name, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
@@ -163,10 +163,10 @@ impl Mission {
             }
         }
         self.sending = Sending::of_windows(&self.elements, &self.graphs);
-        self.ledger = Ledger::from_changes(&self.elements, &self.windows);
-        let places = ledger::places(&self.ledger, &self.windows);
+        self.log = EventLog::from_changes(&self.elements, &self.windows);
+        let places = event_log::places(&self.log, &self.windows);
         for (window, places) in self.windows.iter_mut().zip(places) {
-            window.entries = places;
+            window.events = places;
         }
     }
 

@@ -63,7 +63,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let notices = hidden::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
     let mut view = View {
-        compares: mission.ledger.compares,
+        compares: mission.log.compares,
         ..staged(viewed, options, frames)
     };
     if options.is_picture {

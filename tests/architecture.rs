@@ -33,7 +33,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
     ("evidence", &[
         &["clock", "message", "spread", "syntax", "texts", "times"],
-        &["claim", "numbers", "topology"],
+        &["observation", "numbers", "topology"],
         &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],

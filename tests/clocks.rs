@@ -8,7 +8,7 @@ use bagreel::bag::{self, Connection, Input, Message, OpenOptions, Sink, Want};
 use bagreel::internals::base::notice::{Notice, NoticeKind};
 use bagreel::internals::base::time::Stamp;
 use bagreel::internals::mission::Mission;
-use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::event_log::Kind;
 use bagreel::{Reading, read};
 
 use crate::support::rosbag1::{Pack, write};
@@ -117,7 +117,7 @@ fn shown(name: &str, recordings: &[Recording]) -> String {
     let mission = mission(recordings, |_, _| {});
     let mut line = format!("{name}:");
     for kind in Kind::ALL {
-        let entries = mission.ledger.entries.iter();
+        let entries = mission.log.events.iter();
         let many = entries
             .filter(|e| e.kind == kind && e.is_headline())
             .count();
@@ -133,8 +133,8 @@ fn details(mission: &Mission) -> String {
     let mut text = String::new();
     let seconds = |time: Stamp| mission.offset(time) / SECOND;
     for entry in mission
-        .ledger
-        .entries
+        .log
+        .events
         .iter()
         .filter(|e| e.kind == Kind::Restarted && e.is_headline())
     {
@@ -142,7 +142,7 @@ fn details(mission: &Mission) -> String {
         let role = &mission.elements.nodes[node.unwrap() as usize].role;
         write!(text, "\n  {} restarted at {} s", role, seconds(entry.time)).unwrap();
     }
-    for one in &mission.ledger.interruptions {
+    for one in &mission.log.interruptions {
         let (word, length) = (one.kind.word(), one.length as f64 / 1e9);
         write!(text, "\n  {word} at {} s: {length:.1} s", seconds(one.time)).unwrap();
     }
@@ -281,7 +281,7 @@ fn two_robots_with_the_same_names_are_told_apart_by_a_namespace() {
     let nodes = |mission: &Mission| mission.elements.nodes.len();
     assert_eq!(nodes(&both), 2 * nodes(&alone));
     let count = |mission: &Mission, kind: Kind| {
-        let entries = mission.ledger.entries.iter();
+        let entries = mission.log.events.iter();
         entries
             .filter(|e| e.kind == kind && e.is_headline())
             .count()

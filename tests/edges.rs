@@ -7,7 +7,7 @@ use bagreel::internals::base::time::{Span, Stamp};
 use bagreel::internals::evidence::collector::{CollectOptions, Collector, Recorded};
 use bagreel::internals::evidence::conclude;
 use bagreel::internals::evidence::topology::{NamedElement, Topology, TopologyEntry};
-use bagreel::internals::evidence::{Degree, EvidenceLine};
+use bagreel::internals::evidence::{Confidence, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
 use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
 
@@ -63,7 +63,7 @@ fn concluded(bag: &Recording, options: CollectOptions) -> (Built, Vec<EvidenceLi
     (built, lines)
 }
 
-/// Every edge that a kind of evidence proves: `/node > /topic degree` or `/topic > /node degree`.
+/// Every edge that a kind of evidence proves: `/node > /topic confidence` or `/topic > /node confidence`.
 fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
     let (built, _) = concluded(bag, options);
     let all = &built.elements;
@@ -71,9 +71,9 @@ fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
         |evidence: bagreel::internals::evidence::Evidence| evidence.words().any(|word| word == by);
     let node = |id: u32| all.nodes[id as usize].name.as_str();
     let topic = |id: u32| all.topics[id as usize].name.as_str();
-    let degree = |states: &[graph::EdgeState], id: usize| {
+    let confidence = |states: &[graph::EdgeState], id: usize| {
         let state = states.iter().find(|s| s.id as usize == id);
-        state.map_or("never", |s| s.degree.word())
+        state.map_or("never", |s| s.confidence.word())
     };
     let graph = &built.graphs[0];
     let publishes = all
@@ -88,13 +88,13 @@ fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
         .filter(|(_, e)| by(e.evidence));
     let mut lines: Vec<String> = publishes
         .map(|(id, e)| {
-            let degree = degree(&graph.publishes, id);
-            format!("{} > {} {degree}", node(e.node), topic(e.topic))
+            let confidence = confidence(&graph.publishes, id);
+            format!("{} > {} {confidence}", node(e.node), topic(e.topic))
         })
         .collect();
     lines.extend(subscribes.map(|(id, e)| {
-        let degree = degree(&graph.subscribes, id);
-        format!("{} > {} {degree}", topic(e.topic), node(e.node))
+        let confidence = confidence(&graph.subscribes, id);
+        format!("{} > {} {confidence}", topic(e.topic), node(e.node))
     }));
     lines
 }
@@ -648,8 +648,12 @@ fn diagnostics_count_before_lists_are_read() {
 fn only_measured_edges_depend_on_messages() {
     let bag = logging(&[("/arm", "a.cpp")], &[("/arm/state", "a/msg/State")]);
     let (built, _) = concluded(&bag, CollectOptions::default());
-    let degrees: Vec<_> = built.graphs[0].publishes.iter().map(|s| s.degree).collect();
-    assert_eq!(degrees, [Degree::Inferred, Degree::Stated]);
+    let confidences: Vec<_> = built.graphs[0]
+        .publishes
+        .iter()
+        .map(|s| s.confidence)
+        .collect();
+    assert_eq!(confidences, [Confidence::Inferred, Confidence::Stated]);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use bagreel::internals::export::run;
 use bagreel::internals::export::sequence::{Drawings, Sequence, SequenceOptions};
 use bagreel::internals::export::{Output, Written};
 use bagreel::internals::graph::Element;
-use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::{Mission, read_json};
 use bagreel::internals::view::{Frame, Headline, View};
 
@@ -63,7 +63,7 @@ fn mission(windows: usize) -> (Mission, View) {
     let frame = |index: usize| Frame {
         headlines: (index % 2 == 1)
             .then_some(Headline {
-                entry: 0,
+                event: 0,
                 kind: Kind::Started,
                 what: Element::Node(0),
                 time: second(index),

@@ -86,13 +86,13 @@ fn names(built: &Built, window: usize) -> [Names; 3] {
     ]
 }
 
-/// Right and wrong states of each degree, over all kinds and all windows of ten seconds.
+/// Right and wrong states of each confidence, over all kinds and all windows of ten seconds.
 fn by_degree(bag: &str, truth: &str) -> Option<[[u32; 2]; 4]> {
     let (bag, truth) = (shared(bag)?, shared(truth)?);
-    Some(degrees(&graphs(&bag), &truth))
+    Some(confidences(&graphs(&bag), &truth))
 }
 
-fn degrees((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]; 4] {
+fn confidences((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]; 4] {
     let truth: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
     let all = &built.elements;
@@ -106,37 +106,41 @@ fn degrees((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]; 4]
             continue;
         };
         let graph = &built.graphs[window];
-        let nodes = graph
-            .nodes
-            .iter()
-            .map(|s| (s.degree, "nodes", node(s.id), serde_json::json!(node(s.id))));
+        let nodes = graph.nodes.iter().map(|s| {
+            (
+                s.confidence,
+                "nodes",
+                node(s.id),
+                serde_json::json!(node(s.id)),
+            )
+        });
         let publishes = graph.publishes.iter().map(|s| {
             let edge = &all.publishes[s.id as usize];
             let names = serde_json::json!([node(edge.node), topic(edge.topic)]);
-            (s.degree, "publishes", node(edge.node), names)
+            (s.confidence, "publishes", node(edge.node), names)
         });
         let subscribes = graph.subscribes.iter().map(|s| {
             let edge = &all.subscribes[s.id as usize];
             let names = serde_json::json!([topic(edge.topic), node(edge.node)]);
-            (s.degree, "subscribes", node(edge.node), names)
+            (s.confidence, "subscribes", node(edge.node), names)
         });
-        for (degree, kind, node, names) in nodes.chain(publishes).chain(subscribes) {
+        for (confidence, kind, node, names) in nodes.chain(publishes).chain(subscribes) {
             if !node.starts_with("/record_") {
                 let is_right = real[kind].as_array().unwrap().contains(&names);
-                counts[degree as usize][usize::from(!is_right)] += 1;
+                counts[confidence as usize][usize::from(!is_right)] += 1;
             }
         }
     }
     counts
 }
 
-/// Asserts that each degree has its stated precision.
+/// Asserts that each confidence has its stated precision.
 fn assert_promise(counts: &[[u32; 2]; 4], of: &str) {
-    for (degree, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
-        let [right, wrong] = counts[degree].map(f64::from);
+    for (confidence, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
+        let [right, wrong] = counts[confidence].map(f64::from);
         assert!(
             right >= least * (right + wrong),
-            "{of}, {degree}: {counts:?}"
+            "{of}, {confidence}: {counts:?}"
         );
     }
     assert!(
@@ -206,7 +210,7 @@ fn a_node_ends_although_its_topic_continues() {
     merged(&mut tape);
     let used: BTreeSet<ConnectionId> = tape.stamps.iter().map(|(id, ..)| *id).collect();
     let found = replayed(&tape, |connection| used.contains(&connection.id));
-    assert_promise(&degrees(&found, &truth), "merged");
+    assert_promise(&confidences(&found, &truth), "merged");
     let (built, _) = &found;
     // It was stopped after three minutes; half a minute later another node took over its status topic.
     let windows: Vec<usize> = (0..33)

@@ -17,7 +17,7 @@ fn mission(path: &Path, length: Length) -> Mission {
 
 /// The seconds at which phases begin, except the first.
 fn boundaries(mission: &Mission) -> Vec<f64> {
-    let phases = mission.ledger.phases.iter().skip(1);
+    let phases = mission.log.phases.iter().skip(1);
     let seconds = phases.map(|p| mission.offset(p.span.start) as f64 / 1e9);
     seconds.map(|s| (s * 10.0).round() / 10.0).collect()
 }
@@ -34,14 +34,14 @@ fn the_example_has_the_phases_of_its_script() {
     let mission = mission(&example(), Length::Auto);
     assert_eq!(boundaries(&mission), TRUTH);
     let counts: Vec<(u32, u32)> = mission
-        .ledger
+        .log
         .phases
         .iter()
         .map(|p| (p.nodes_added, p.nodes_removed))
         .collect();
     let expected = [(11, 0), (4, 0), (3, 0), (4, 3), (4, 4), (4, 0), (1, 4)];
     assert_eq!(counts, expected);
-    let name = &mission.ledger.phases[2].name;
+    let name = &mission.log.phases[2].name;
     assert_eq!(
         &**name,
         "+3 nodes: emergency_stop, obstacle_detector and replanner"
@@ -50,7 +50,7 @@ fn the_example_has_the_phases_of_its_script() {
 
 #[test]
 fn phases_do_not_depend_on_the_period() {
-    let phases = |length| mission(&example(), length).ledger.phases;
+    let phases = |length| mission(&example(), length).log.phases;
     let ten = Period::parse("7").map_or(Length::Auto, Length::Fixed);
     assert_eq!(phases(Length::All), phases(ten));
 }

@@ -1,6 +1,6 @@
 //! Property tests of graphs and missions.
 
-use bagreel::internals::evidence::Degree;
+use bagreel::internals::evidence::Confidence;
 use bagreel::internals::graph::diff::{apply, diff};
 use bagreel::internals::graph::{EdgeState, Graph, Measures, NodeState, State, TopicState};
 use std::collections::BTreeSet;
@@ -17,19 +17,19 @@ fn state() -> impl Strategy<Value = State> {
     prop::sample::select(State::ALL.to_vec())
 }
 
-fn degree() -> impl Strategy<Value = Degree> {
-    prop::sample::select(Degree::ALL.to_vec())
+fn confidence() -> impl Strategy<Value = Confidence> {
+    prop::sample::select(Confidence::ALL.to_vec())
 }
 
 fn edges() -> impl Strategy<Value = Vec<EdgeState>> {
-    let one = (state(), degree(), prop::option::of(0..500_u64));
+    let one = (state(), confidence(), prop::option::of(0..500_u64));
     btree_map(0..40_u32, one, 0..20).prop_map(|edges| {
         let made = edges
             .into_iter()
-            .map(|(id, (state, degree, count))| EdgeState {
+            .map(|(id, (state, confidence, count))| EdgeState {
                 id,
                 state,
-                degree,
+                confidence,
                 count,
                 hz: count.map(|n| n as f64 / 10.0),
                 bytes: None,
@@ -40,25 +40,25 @@ fn edges() -> impl Strategy<Value = Vec<EdgeState>> {
 }
 
 fn graph() -> impl Strategy<Value = Graph> {
-    let nodes = btree_map(0..30_u32, (state(), degree()), 0..15);
-    let topics = btree_map(0..30_u32, (state(), degree(), 0..500_u64), 0..15);
+    let nodes = btree_map(0..30_u32, (state(), confidence()), 0..15);
+    let topics = btree_map(0..30_u32, (state(), confidence(), 0..500_u64), 0..15);
     (nodes, topics, edges(), edges()).prop_map(|(nodes, topics, publishes, subscribes)| Graph {
         nodes: nodes
             .into_iter()
-            .map(|(id, (state, degree))| NodeState {
+            .map(|(id, (state, confidence))| NodeState {
                 id,
                 state,
-                degree,
+                confidence,
                 hz: None,
                 lifecycle: None,
             })
             .collect(),
         topics: topics
             .into_iter()
-            .map(|(id, (state, degree, count))| TopicState {
+            .map(|(id, (state, confidence, count))| TopicState {
                 id,
                 state,
-                degree,
+                confidence,
                 count,
                 bytes: None,
                 hz: Some(count as f64 / 10.0),
@@ -131,8 +131,8 @@ fn follows(mission: &Mission) -> Result<(), TestCaseError> {
     let mut before: Option<BTreeSet<Element>> = None;
     for (window, graph) in mission.each() {
         let mut now = before.unwrap_or_else(|| there(&graph));
-        for (change, entry) in window.changes.iter().zip(&window.entries) {
-            let kind = mission.ledger.entries[*entry as usize].kind;
+        for (change, entry) in window.changes.iter().zip(&window.events) {
+            let kind = mission.log.events[*entry as usize].kind;
             match change {
                 Change::Added { what, .. } => {
                     prop_assert!(now.insert(*what), "{what:?} came twice");
@@ -166,7 +166,7 @@ proptest! {
         for seconds in [10, 30, 60] {
             let other = mission(&path, seconds);
             follows(&other)?;
-            prop_assert_eq!(&first.ledger, &other.ledger, "{} s", seconds);
+            prop_assert_eq!(&first.log, &other.log, "{} s", seconds);
         }
     }
 }
@@ -182,7 +182,7 @@ fn the_examples_follow_from_their_changes() {
         for seconds in [10, 30, 60] {
             let other = mission(&path, seconds);
             follows(&other).unwrap();
-            assert_eq!(first.ledger, other.ledger, "{bag} by {seconds} s");
+            assert_eq!(first.log, other.log, "{bag} by {seconds} s");
         }
     }
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use bagreel::internals::base::time::Period;
 use bagreel::internals::graph::diff::{apply, diff};
 use bagreel::internals::graph::window::Length;
+use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
-use bagreel::internals::mission::ledger::Kind;
 use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
 
@@ -30,14 +30,14 @@ const ALL: LogOptions = LogOptions {
 
 /// Every headline of a kind: its element and its time in seconds.
 fn shown(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
-    let headlines = mission.ledger.entries.iter();
+    let headlines = mission.log.events.iter();
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
-    let name = |e: &bagreel::internals::mission::ledger::Entry| match mission.elements.ends(e.what)
-    {
-        (Some(node), _) => mission.elements.nodes[node as usize].role.to_string(),
-        (None, Some(topic)) => mission.elements.topics[topic as usize].name.to_string(),
-        (None, None) => String::new(),
-    };
+    let name =
+        |e: &bagreel::internals::mission::event_log::Event| match mission.elements.ends(e.what) {
+            (Some(node), _) => mission.elements.nodes[node as usize].role.to_string(),
+            (None, Some(topic)) => mission.elements.topics[topic as usize].name.to_string(),
+            (None, None) => String::new(),
+        };
     of_kind
         .map(|e| (name(e), mission.offset(e.time) / 1_000_000_000))
         .collect()
@@ -76,7 +76,7 @@ fn crashes_restarts_and_rates_of_the_warehouse_are_logged() {
     assert!(near(&rates, "/robot1/camera_driver", 236), "{rates:?}");
     let handed = shown(&mission, Kind::HandedOver);
     assert!(near(&handed, "/robot1/cmd_vel", 299), "{handed:?}");
-    let headlines = mission.ledger.entries.iter().filter(|e| e.is_headline());
+    let headlines = mission.log.events.iter().filter(|e| e.is_headline());
     assert!(headlines.count() <= 60);
 }
 
@@ -102,11 +102,11 @@ fn a_mission_read_from_json_has_the_same_log() {
         write_json(&first, &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         let again = read_json(&text, Path::new("x.json")).unwrap();
-        assert!(first.ledger == again.ledger, "{file}: another ledger");
+        assert!(first.log == again.log, "{file}: another ledger");
         for (a, b) in first.windows.iter().zip(&again.windows) {
             assert_eq!(
-                (&a.changes, &a.entries),
-                (&b.changes, &b.entries),
+                (&a.changes, &a.events),
+                (&b.changes, &b.events),
                 "window {}",
                 a.index
             );
@@ -140,13 +140,9 @@ fn every_window_difference_refers_to_its_log_entry() {
             }
             let shown = words.get("added").unwrap_or(&0) + words.get("removed").unwrap_or(&0);
             assert_eq!(moved, shown, "window {} of {seconds} s", after.index);
-            assert_eq!(after.changes.len(), after.entries.len());
-            let places = after.entries.iter().map(|id| *id as usize);
-            assert!(
-                places
-                    .max()
-                    .is_none_or(|id| id < mission.ledger.entries.len())
-            );
+            assert_eq!(after.changes.len(), after.events.len());
+            let places = after.events.iter().map(|id| *id as usize);
+            assert!(places.max().is_none_or(|id| id < mission.log.events.len()));
         }
     }
 }
@@ -154,7 +150,7 @@ fn every_window_difference_refers_to_its_log_entry() {
 #[test]
 fn the_log_is_sorted_and_parts_are_not_nested() {
     let mission = mission("warehouse.bag", 60);
-    let entries = &mission.ledger.entries;
+    let entries = &mission.log.events;
     assert!(entries.is_sorted_by_key(|e| e.time));
     for entry in entries {
         assert!(entry.earliest <= entry.time && entry.time <= entry.latest);
@@ -174,14 +170,14 @@ fn truth() -> Vec<serde_json::Value> {
 /// Starts or stops of nodes by role, including restarts, with seconds and the interval that should contain the truth.
 fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
     let second = |at| mission.offset(at) as f64 / 1e9;
-    let entries = mission.ledger.entries.iter();
+    let entries = mission.log.events.iter();
     let mut all = Vec::new();
     for (id, entry) in (0..).zip(entries) {
         let bagreel::values::Element::Node(node) = entry.what else {
             continue;
         };
         let role = mission.elements.nodes[node as usize].role.to_string();
-        let has_part = mission.ledger.parts(id).any(|part| part.kind == kind);
+        let has_part = mission.log.parts(id).any(|part| part.kind == kind);
         let interval = (second(entry.earliest), second(entry.latest));
         match entry.kind {
             found if found == kind => all.push((role, second(entry.time), interval)),
@@ -254,13 +250,13 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
         _ => "",
     };
     let near = |from: f64, to: f64, at: f64| from - 5.0 <= at && at <= to + 5.0;
-    let shown = |entry: &&bagreel::internals::mission::ledger::Entry| !entry.quiet;
+    let shown = |entry: &&bagreel::internals::mission::event_log::Event| !entry.quiet;
     let mut explained = 0;
     for event in &truth {
         let topic = event["topic"].as_str().unwrap_or_default();
         let number = |key: &str| event[key].as_f64().unwrap();
         let of = |kind: Kind| {
-            let entries = mission.ledger.entries.iter().filter(shown);
+            let entries = mission.log.events.iter().filter(shown);
             entries.filter(move |e| e.kind == kind && name(e.what) == topic)
         };
         match event["kind"].as_str().unwrap() {
@@ -268,7 +264,7 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
                 let at = number("time_s");
                 let close = |a: f64, b: f64| (a - b).abs() <= 0.1 * b;
                 let found = of(Kind::Rate).filter(|e| near(at, at, second(e.time))).filter(|e| {
-                    matches!(e.detail, bagreel::internals::mission::ledger::Detail::Rates { from_hz, to_hz }
+                    matches!(e.detail, bagreel::internals::mission::event_log::Detail::Rates { from_hz, to_hz }
                         if close(from_hz, number("from_hz")) && close(to_hz, number("to_hz")))
                 });
                 let found = found.count();
@@ -286,8 +282,8 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
             _ => {}
         }
     }
-    let all = mission.ledger.entries.iter().filter(shown);
+    let all = mission.log.events.iter().filter(shown);
     let all = all.filter(|e| matches!(e.kind, Kind::Rate | Kind::HandedOver));
-    let of_parts = |e: &&bagreel::internals::mission::ledger::Entry| e.part_of.is_none();
+    let of_parts = |e: &&bagreel::internals::mission::event_log::Event| e.part_of.is_none();
     assert!(all.filter(of_parts).count() <= explained, "a false line");
 }

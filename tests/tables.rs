@@ -351,8 +351,8 @@ fn a_recorder_is_not_a_subscriber() {
         let topology = ["--topology", "nodes.csv", "--format", "json"];
         let output = bagreel(dir.path(), &[&["info", COURIER][..], &topology].concat());
         let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        let degrees = info["subscribes_by_degree"].as_object().unwrap();
-        degrees.values().map(|n| n.as_u64().unwrap()).sum()
+        let confidences = info["subscribes_by_degree"].as_object().unwrap();
+        confidences.values().map(|n| n.as_u64().unwrap()).sum()
     };
     let recorder = counted("/record_12345,[],['/scan']\n");
     let both = counted("/record_12345,[],['/scan']\n/listens,[],['/scan']\n");

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use bagreel::internals::view::{Mark, SeenWindow, Shown, View, ViewOptions, view};
 
@@ -41,17 +41,17 @@ fn every_headline_is_counted_captioned_and_marked() {
         for (k, frame) in view.frames.iter().enumerate() {
             let seen = view.seen(k);
             let at = format!("{name}, window {}", frame.index);
-            let reported: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
+            let reported: BTreeSet<u32> = frame.headlines.iter().map(|h| h.event).collect();
             assert_eq!(reported.len(), frame.counts.total(), "{at}");
-            let reported: BTreeSet<u32> = frame.entries().collect();
+            let reported: BTreeSet<u32> = frame.events().collect();
             let phrases = frame.caption.iter();
-            let said: BTreeSet<u32> = phrases.flat_map(|one| one.entries.clone()).collect();
+            let said: BTreeSet<u32> = phrases.flat_map(|one| one.events.clone()).collect();
             assert_eq!(reported, said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
-            let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
+            let marked: BTreeSet<u32> = marked.flat_map(|s| s.events.clone()).collect();
             assert_eq!(marked, reported, "{at}");
             assert!(
-                all(&seen).all(|s| s.mark.is_none() || !s.entries.is_empty()),
+                all(&seen).all(|s| s.mark.is_none() || !s.events.is_empty()),
                 "{at}"
             );
         }
@@ -61,7 +61,12 @@ fn every_headline_is_counted_captioned_and_marked() {
 /// A window's picture without marks, clock and numbers.
 fn settled(seen: &SeenWindow) -> Vec<String> {
     let stays = all(seen).filter(|s| s.mark != Some(Mark::Removed));
-    let look = |s: &Shown| format!("{} {:?} {:?} {:?}", s.id, s.state, s.degree, s.steady_hz);
+    let look = |s: &Shown| {
+        format!(
+            "{} {:?} {:?} {:?}",
+            s.id, s.state, s.confidence, s.steady_hz
+        )
+    };
     stays.map(look).collect()
 }
 
@@ -122,7 +127,7 @@ fn an_element_shows_the_rates_of_its_event_instead_of_their_mean() {
     for (k, frame) in view.frames.iter().enumerate() {
         let seen = view.seen(k);
         for change in frame.headlines.iter().filter(|h| h.kind == Kind::Rate) {
-            let own = all(&seen).filter(|s| s.entries == [change.entry]);
+            let own = all(&seen).filter(|s| s.events == [change.event]);
             let rates: Vec<_> = own.map(|s| s.rates).collect();
             events += 1;
             assert!(!rates.is_empty() && !rates.contains(&None), "window {k}");

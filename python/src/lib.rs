@@ -311,8 +311,8 @@ impl Mission {
     }
 
     fn __repr__(&self) -> String {
-        let (windows, entries) = (self.0.windows.len(), self.0.ledger.entries.len());
-        format!("<bagreel.Mission: {windows} windows, {entries} entries>")
+        let (windows, events) = (self.0.windows.len(), self.0.log.events.len());
+        format!("<bagreel.Mission: {windows} windows, {events} events>")
     }
 }
 

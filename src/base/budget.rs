@@ -49,7 +49,7 @@ pub(crate) const NAME: usize = 1 << 16;
 /// The most bytes of all names, types and states of a mission together.
 pub(crate) const NAMES_BYTES: usize = 32 << 20;
 
-/// The most claims about those names, each by one source: eight for each name.
+/// The most observations about those names, each by one source: eight for each name.
 pub(crate) const CLAIMS: usize = 1 << 19;
 
 /// The most lines of evidence listed for a query: more than anyone reads.

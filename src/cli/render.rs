@@ -181,7 +181,7 @@ fn wrote(done: &Rendered, what: &str, seconds: f64) -> String {
     let mission = &done.mission;
     let names = done.written.iter().map(|w| w.path.display().to_string());
     let names: Vec<String> = names.collect();
-    let changes = mission.ledger.headlines(mission.span).count();
+    let changes = mission.log.headlines(mission.span).count();
     let changes = words::count(changes, "change");
     format!(
         "wrote {}: {what}{changes}, in {seconds:.1} s",

@@ -13,8 +13,8 @@ use crate::base::columns::fitted;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words::{self, visible};
+use crate::mission::event_log::Kind;
 use crate::mission::events::LogLine;
-use crate::mission::ledger::Kind;
 use crate::pipeline::{Stage, Watch};
 use progress::Progress;
 

@@ -1,4 +1,4 @@
-//! A collector that takes in any number of bags: the times of all messages, and the claims of their contents.
+//! A collector that takes in any number of bags: the times of all messages, and the observations of their contents.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -12,11 +12,11 @@ use crate::base::name::in_space;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claims, SourceId};
+use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::numbers::{Numbers, is_numbered};
-use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::observation::{Observations, SourceId};
 use crate::evidence::publishers;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
@@ -114,7 +114,7 @@ pub struct Collector {
     told: Vec<bool>,
     texts: Vec<(Stamp, String)>,
     messages: Stamps,
-    facts: Claims,
+    facts: Observations,
     notices: Notices,
     /// The stream of each connection of each bag.
     bags: Vec<Vec<usize>>,
@@ -192,7 +192,7 @@ impl Collector {
         self.messages.extent()
     }
 
-    /// The number of connections and claims: it grows with everything that was not known before.
+    /// The number of connections and observations: it grows with everything that was not known before.
     pub(crate) fn known(&self) -> usize {
         self.streams.len() + self.facts.list.len()
     }
@@ -334,7 +334,7 @@ impl Collector {
                 kind: NoticeKind::Damaged,
                 count: self.facts.dropped,
                 text:
-                    "there are more names, or longer ones, than any robot has: a claim was left out"
+                    "there are more names, or longer ones, than any robot has: an observation was left out"
                         .to_owned(),
             });
         }
@@ -488,7 +488,7 @@ pub struct Recorded {
     pub(crate) messages: Stamps,
     /// The numbers in the headers of streams, by place, as far as they were read.
     pub(crate) numbers: BTreeMap<usize, Numbers>,
-    pub(crate) facts: Claims,
+    pub(crate) facts: Observations,
     /// The texts of the topic that was asked for, sorted by time.
     pub texts: Vec<(Stamp, String)>,
     /// Problems that did not stop the reading.

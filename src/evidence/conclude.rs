@@ -13,17 +13,17 @@ use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claims, Measurement, Name};
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
-use crate::evidence::proof::{
-    Conclusions, ElementKey, Incident, IncidentKind, Proof, Stream, Validity, offers,
+use crate::evidence::inference::{
+    Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
+use crate::evidence::observation::{Measurement, Name, Observations};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::substitution::ANONYMOUS;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
-use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
+use crate::evidence::{Confidence, EvidenceLine, SOURCES, unknown};
 
 /// Additions to the contents of the bags.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub struct Findings {
     /// The connections, as in [`Recorded`] except for the numbers of names.
     pub(crate) streams: Vec<Stream>,
     /// Every proof of an element.
-    pub(crate) proofs: Vec<Proof>,
+    pub(crate) inferences: Vec<Inference>,
     /// Statements besides who is in the graph.
     pub(crate) incidents: Vec<Incident>,
     /// Publications, as node and topic, whose messages are byte-for-byte copies of another topic's.
@@ -90,33 +90,33 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     let mission = known.mission;
     let Conclusions {
         mut facts,
-        mut proofs,
+        mut inferences,
         mut incidents,
         copies,
         gone,
         ..
     } = known;
     // Neither their headers nor what follows from these shows that they are there.
-    proofs.retain(|proof| {
-        let node = match proof.what {
+    inferences.retain(|inference| {
+        let node = match inference.what {
             ElementKey::Topic(_) => None,
             ElementKey::Node(node)
             | ElementKey::Publish(node, _)
             | ElementKey::Subscribe(_, node) => Some(node),
         };
-        let is_sign = !matches!(proof.when, Validity::Messages(_) | Validity::Like(_));
+        let is_sign = !matches!(inference.when, Validity::Messages(_) | Validity::Like(_));
         is_sign || node.is_none() || !gone.contains(&node)
     });
     let roles = if options.roles {
-        fold(&mut proofs, &mut facts)
+        fold(&mut inferences, &mut facts)
     } else {
         BTreeMap::new()
     };
-    proofs.shrink_to_fit();
+    inferences.shrink_to_fit();
     let new = facts.renumber();
     let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
-    for proof in &mut proofs {
-        proof.rename(&to);
+    for inference in &mut inferences {
+        inference.rename(&to);
     }
     let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
     let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
@@ -163,7 +163,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         offers: offers(&facts.offers, &streams),
         names: facts.into_texts(),
         streams,
-        proofs,
+        inferences,
         incidents,
         measured,
         lines,
@@ -267,19 +267,20 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
 
 /// Explains proofs that rest on no single message, for elements that `why` asks about.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
-    let is_asked = |proof: &&Proof| {
-        known.facts.is_watched(proof.what.names())
-            && !known.worded.contains(&(proof.what, proof.source))
+    let is_asked = |inference: &&Inference| {
+        known.facts.is_watched(inference.what.names())
+            && !known.worded.contains(&(inference.what, inference.source))
     };
     let mut pieces = Vec::new();
-    for proof in known.proofs.iter().filter(is_asked) {
-        if let (Some(source), Some((time, text))) =
-            (SOURCES.get(proof.source), explained(known, messages, proof))
-        {
+    for inference in known.inferences.iter().filter(is_asked) {
+        if let (Some(source), Some((time, text))) = (
+            SOURCES.get(inference.source),
+            explained(known, messages, inference),
+        ) {
             pieces.push(EvidenceLine {
                 time,
                 source: source.word,
-                degree: proof.degree,
+                confidence: inference.confidence,
                 text,
             });
         }
@@ -287,16 +288,18 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     known.facts.pieces.extend(pieces);
 }
 
-/// The time and the words of a proof; `None` where claims with their own words made it.
+/// The time and the words of a proof; `None` where observations with their own words made it.
 fn explained(
     known: &Conclusions<'_>,
     messages: &Stamps,
-    proof: &Proof,
+    inference: &Inference,
 ) -> Option<(Option<Stamp>, String)> {
-    let what = sentence(known, proof.what);
-    let about = SOURCES.get(proof.source).map_or("", |source| source.about);
+    let what = sentence(known, inference.what);
+    let about = SOURCES
+        .get(inference.source)
+        .map_or("", |source| source.about);
     let first = |at: usize| messages.bounds(known.streams[at].times).map(|(t, _)| t);
-    match &proof.when {
+    match &inference.when {
         Validity::Messages(at) => {
             let many = match messages.count(known.streams[*at].times) {
                 0 => "no message".to_owned(),
@@ -370,32 +373,32 @@ fn told(
             Validity::Begins { signs, ends }
         }
     };
-    let (word, degree) = if entry.declared {
-        ("launch", Degree::Declared)
+    let (word, confidence) = if entry.declared {
+        ("launch", Confidence::Declared)
     } else {
-        ("topology", Degree::Stated)
+        ("topology", Confidence::Stated)
     };
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     if known.facts.is_watched(what.names()) {
         known.facts.pieces.push(EvidenceLine {
             time: None,
             source: word,
-            degree,
+            confidence,
             text: entry.place.clone(),
         });
     }
-    let proof = |when| Proof {
+    let inference = |when| Inference {
         what,
         source,
-        degree,
+        confidence,
         when,
     };
-    known.prove(proof(when));
+    known.add(inference(when));
     // Nobody knows when it was launched: while others in its namespace live.
     if entry.declared
         && let Some(neighbour) = neighbour(known, what, messages)
     {
-        known.prove(proof(Validity::Like(ElementKey::Node(neighbour))));
+        known.add(inference(Validity::Like(ElementKey::Node(neighbour))));
     }
 }
 
@@ -430,7 +433,7 @@ fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Op
 }
 
 /// Puts every node under the name of its role; returns the names that changed.
-fn fold(proofs: &mut [Proof], facts: &mut Claims) -> BTreeMap<Name, Name> {
+fn fold(inferences: &mut [Inference], facts: &mut Observations) -> BTreeMap<Name, Name> {
     let mut roles = BTreeMap::new();
     let mut to = |node: Name| {
         let text = facts.text(node);
@@ -443,9 +446,9 @@ fn fold(proofs: &mut [Proof], facts: &mut Claims) -> BTreeMap<Name, Name> {
             }
         }
     };
-    for proof in proofs {
-        proof.what = proof.what.with_node(&mut to);
-        if let Validity::Like(other) = &mut proof.when {
+    for inference in inferences {
+        inference.what = inference.what.with_node(&mut to);
+        if let Validity::Like(other) = &mut inference.when {
             *other = other.with_node(&mut to);
         }
     }

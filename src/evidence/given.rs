@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::bag::{self, Input, OpenOptions};
 use crate::base::error::Result;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::Claim;
 use crate::evidence::collector::{CollectOptions, Collector};
+use crate::evidence::observation::Observation;
 use crate::evidence::topology::{self, NamedElement, Topology, TopologyEntry};
 
 /// Reads several files into one topology.
@@ -39,16 +39,18 @@ fn recorded(path: &Path) -> Result<Topology> {
     reader.read(None, &mut collector.bag(&mut |_, _| ()))?;
     let recorded = collector.finish()?;
     let text = |name| recorded.facts.text(name).to_string();
-    let element = |claim: &Claim| match *claim {
-        Claim::Node(node) => Some(NamedElement::Node(text(node))),
-        Claim::Publish(node, topic) => Some(NamedElement::Publish(text(node), text(topic))),
-        Claim::Subscribe(node, topic) => Some(NamedElement::Subscribe(text(node), text(topic))),
-        Claim::Topic(topic) => Some(NamedElement::Topic(text(topic))),
-        Claim::Type(topic, kind) => Some(NamedElement::Type(text(topic), text(kind))),
+    let element = |observation: &Observation| match *observation {
+        Observation::Node(node) => Some(NamedElement::Node(text(node))),
+        Observation::Publish(node, topic) => Some(NamedElement::Publish(text(node), text(topic))),
+        Observation::Subscribe(node, topic) => {
+            Some(NamedElement::Subscribe(text(node), text(topic)))
+        }
+        Observation::Topic(topic) => Some(NamedElement::Topic(text(topic))),
+        Observation::Type(topic, kind) => Some(NamedElement::Type(text(topic), text(kind))),
         _ => None,
     };
-    let claims = recorded.facts.list.iter();
-    let claims = claims.filter(|fact| {
+    let observations = recorded.facts.list.iter();
+    let observations = observations.filter(|fact| {
         SOURCES
             .get(fact.source)
             .is_some_and(|s| s.word == "rosgraph")
@@ -60,8 +62,8 @@ fn recorded(path: &Path) -> Result<Topology> {
         declared: false,
         place: bag::file_name(path),
     };
-    let mut entries: Vec<_> = claims
-        .filter_map(|fact| element(&fact.claim))
+    let mut entries: Vec<_> = observations
+        .filter_map(|fact| element(&fact.observation))
         .map(entry)
         .collect();
     if entries.is_empty() {

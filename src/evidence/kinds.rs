@@ -1,7 +1,7 @@
 //! A set of kinds of evidence, as small as a number.
 
 use super::SOURCES;
-use super::claim::SourceId;
+use super::observation::SourceId;
 
 /// A set of kinds of evidence: bits at the places of rows in [`SOURCES`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -9,9 +9,9 @@ use std::io;
 use crate::base::name::is_player;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claim, Claims, Name};
+use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::numbers::Numbers;
-use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::observation::{Name, Observation, Observations};
 use crate::evidence::times::Stamps;
 
 /// Lowers the reliability of streams with unreliable headers, and divides those that outlive their publisher; returns a
@@ -21,7 +21,7 @@ use crate::evidence::times::Stamps;
 /// If the temporary file of times cannot be read.
 pub(crate) fn judge(
     streams: &mut Vec<Stream>,
-    facts: &mut Claims,
+    facts: &mut Observations,
     messages: &mut Stamps,
     numbers: &BTreeMap<usize, Numbers>,
 ) -> io::Result<Vec<Notice>> {
@@ -76,17 +76,17 @@ struct NamedTopics {
 }
 
 impl NamedTopics {
-    fn new(facts: &Claims) -> Self {
+    fn new(facts: &Observations) -> Self {
         let mut all = Self {
             topics: BTreeMap::new(),
             guests: BTreeMap::new(),
         };
         for fact in &facts.list {
-            match fact.claim {
-                Claim::Lists(node, topic) | Claim::Publish(node, topic) => {
+            match fact.observation {
+                Observation::Lists(node, topic) | Observation::Publish(node, topic) => {
                     all.topics.entry(topic).or_default().insert(node);
                 }
-                Claim::Carries(host, guest) => {
+                Observation::Carries(host, guest) => {
                     all.guests.entry(host).or_default().insert(guest);
                 }
                 _ => {}
@@ -114,7 +114,7 @@ const SOON_NS: i64 = 5_000_000_000;
 fn is_alone(
     stream: &Stream,
     node: Name,
-    (named, facts): (&NamedTopics, &Claims),
+    (named, facts): (&NamedTopics, &Observations),
     (messages, numbers): (&Stamps, Option<&Numbers>),
 ) -> io::Result<bool> {
     let count = messages.count(stream.times);
@@ -122,8 +122,8 @@ fn is_alone(
         return Ok(false);
     };
     let shown = |of: Name| {
-        let claims = facts.list.iter();
-        claims.filter(move |fact| successors::shown(fact.claim) == Some(of))
+        let observations = facts.list.iter();
+        observations.filter(move |fact| successors::shown(fact.observation) == Some(of))
     };
     let mut signs = Vec::new();
     for fact in shown(node) {

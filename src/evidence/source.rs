@@ -1,4 +1,4 @@
-//! The interface of a kind of evidence: the messages that it reads, and the collection of its claims. One file per
+//! The interface of a kind of evidence: the messages that it reads, and the collection of its observations. One file per
 //! kind.
 
 pub(crate) mod action;
@@ -39,10 +39,12 @@ pub(crate) mod topic_statistics;
 use crate::base::name::in_space;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, Claims, Degree, Measurement, Name, SourceId, Statement};
+use crate::evidence::inference::{Conclusions, Stream};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{LayoutFit, MessageLayout};
-use crate::evidence::proof::{Conclusions, Stream};
+use crate::evidence::observation::{
+    Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
+};
 
 /// A kind of evidence.
 pub struct Source {
@@ -52,7 +54,7 @@ pub struct Source {
     pub about: &'static str,
     /// The layouts of the messages that it reads.
     pub(crate) reads: &'static [(MessageLayout, Read)],
-    /// Whether nodes make these claims about themselves, so that the node was there at that time.
+    /// Whether nodes make these observations about themselves, so that the node was there at that time.
     pub(crate) own: bool,
     /// Whether each of its snapshots holds until the next one: they are made whenever something changes.
     pub(crate) holds: bool,
@@ -76,9 +78,9 @@ pub(crate) const NOTHING: Source = Source {
     conclude: &[],
 };
 
-/// The input of a source, and the collection of its claims.
+/// The input of a source, and the collection of its observations.
 pub(crate) struct SourceContext<'a> {
-    pub(crate) facts: &'a mut Claims,
+    pub(crate) facts: &'a mut Observations,
     /// The namespace of the names in this recording; empty for none.
     pub(crate) space: &'a str,
     pub(crate) stream: &'a Stream,
@@ -111,17 +113,22 @@ impl SourceContext<'_> {
         });
     }
 
-    /// Adds a claim, made now, with its explanation.
-    pub(crate) fn claim(&mut self, claim: Claim, degree: Degree, words: impl FnOnce() -> String) {
+    /// Adds an observation, made now, with its explanation.
+    pub(crate) fn observation(
+        &mut self,
+        observation: Observation,
+        confidence: Confidence,
+        words: impl FnOnce() -> String,
+    ) {
         let said = Statement {
-            claim,
-            degree,
+            observation,
+            confidence,
             snapshot: None,
         };
         self.say(said, words);
     }
 
-    /// Adds a claim that may belong to a snapshot.
+    /// Adds an observation that may belong to a snapshot.
     pub(crate) fn say(&mut self, said: Statement, words: impl FnOnce() -> String) {
         let word = SOURCES.get(self.source).map_or("", |s| s.word);
         self.facts.explain(said, word, self.time, words);

@@ -7,8 +7,8 @@
 use crate::base::name::is_quiet;
 use crate::base::words::count;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::source::contract::Owners;
 
 /// Adds a box for every recorded topic that lacks publishers.
@@ -108,12 +108,12 @@ fn add(
         Validity::Whole
     };
     for (what, when) in [(ElementKey::Node(node), life), (edge, topics())] {
-        let proof = Proof {
+        let inference = Inference {
             what,
             source,
-            degree: Degree::Declared,
+            confidence: Confidence::Declared,
             when,
         };
-        known.because(proof, None, |_| words());
+        known.because(inference, None, |_| words());
     }
 }

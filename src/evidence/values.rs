@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::base::name::SERVICE;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::{Claim, Claims, Name};
+use crate::evidence::observation::{Name, Observation, Observations};
 
 /// Stated values by node or topic.
 #[derive(Debug, Default)]
@@ -18,20 +18,20 @@ pub(crate) struct StatedValues {
 }
 
 impl StatedValues {
-    pub(crate) fn new(facts: &Claims, role: impl Fn(Name) -> Name) -> io::Result<Self> {
+    pub(crate) fn new(facts: &Observations, role: impl Fn(Name) -> Name) -> io::Result<Self> {
         let mut all = Self::default();
         for fact in &facts.list {
-            match fact.claim {
-                Claim::Lifecycle(node, state) => {
+            match fact.observation {
+                Observation::Lifecycle(node, state) => {
                     let state = facts.text(state);
                     let times = facts.times(fact)?.into_iter();
                     let states = all.states.entry(role(node)).or_default();
                     states.extend(times.map(|time| (time, Arc::clone(&state))));
                 }
-                Claim::Type(topic, kind) => {
+                Observation::Type(topic, kind) => {
                     all.types.entry(topic).or_default().insert(facts.text(kind));
                 }
-                Claim::Quality(topic, words) => {
+                Observation::Quality(topic, words) => {
                     all.qualities
                         .entry(topic)
                         .or_default()

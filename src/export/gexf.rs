@@ -91,7 +91,7 @@ fn inside(xml: &mut Xml, mission: &Mission, part: &SpellOf) {
     let messages = part.messages.map(|n| n.to_string());
     let values = [
         Some(part.kind),
-        Some(part.degree.word()),
+        Some(part.confidence.word()),
         Some(part.evidence.as_str()),
         messages.as_deref(),
     ];

@@ -62,7 +62,7 @@ fn inside(xml: &mut Xml, mission: &Mission, part: &SpellOf) {
     let values = [
         Some(part.label.clone()),
         Some(part.kind.to_owned()),
-        Some(part.degree.word().to_owned()),
+        Some(part.confidence.word().to_owned()),
         Some(part.evidence.clone()),
         part.messages.map(|n| n.to_string()),
         part.spells.first().map(|span| second(span.start)),

@@ -41,12 +41,12 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
         .map(|at| (at, GRAPH, ends.graph(mission, at)));
     let mut all: Vec<(Stamp, usize, Vec<u8>)> = graphs.collect();
     let last = mission.span.end.plus(-1);
-    let parts = mission.ledger.all_parts();
-    for (id, entry) in (0..).zip(&mission.ledger.entries) {
-        if entry.is_headline() {
-            let at = entry.time.max(mission.span.start).min(last);
-            let says = sentence(mission, &parts, id, entry);
-            all.push((at, LOG, log(entry.time, &says, entry.kind.is_remark())));
+    let parts = mission.log.all_parts();
+    for (id, event) in (0..).zip(&mission.log.events) {
+        if event.is_headline() {
+            let at = event.time.max(mission.span.start).min(last);
+            let says = sentence(mission, &parts, id, event);
+            all.push((at, LOG, log(event.time, &says, event.kind.is_remark())));
         }
     }
     all.push((last, LOG, log(last, "the recording ends", false)));

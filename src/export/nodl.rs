@@ -12,7 +12,7 @@ use super::tables::folder::{Folder, file_stem};
 use super::{Started, Written, at_end};
 use crate::base::error::{Error, Result};
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::evidence::source::qos::{depth, policy};
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
@@ -75,9 +75,9 @@ const FRAMEWORK: [&str; 3] = ["/rosout", "/rosout_agg", "/parameter_events"];
 /// The documents by the names of their nodes, and the number of ends that do not fit the schema.
 fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>, usize) {
     let elements = &mission.elements;
-    let degrees = mission.graphs.degrees(elements);
+    let confidences = mission.graphs.confidences(elements);
     let is_known = |what: Element| {
-        let is_sure = degrees.of(what) != Some(&Degree::Inferred);
+        let is_sure = confidences.of(what) != Some(&Confidence::Inferred);
         !elements.evidence(what).is_guess() && (has_inferred || is_sure)
     };
     let mut lists: BTreeMap<NodeId, [String; 6]> = BTreeMap::new();
@@ -92,7 +92,7 @@ fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>
         let Some(lists) = lists.get_mut(&edge.node) else {
             continue;
         };
-        match end(what, topic, &degrees) {
+        match end(what, topic, &confidences) {
             Some((list, text)) => lists[list].push_str(&text),
             None if is_part(topic) => {}
             None => untyped += 1,
@@ -121,7 +121,11 @@ fn is_part(topic: &Topic) -> bool {
 }
 
 /// The list that an end of a topic belongs to, and its entry; `None` for one that does not belong or does not fit.
-fn end(what: Element, topic: &Topic, degrees: &PerElement<Degree>) -> Option<(usize, String)> {
+fn end(
+    what: Element,
+    topic: &Topic,
+    confidences: &PerElement<Confidence>,
+) -> Option<(usize, String)> {
     if is_part(topic) {
         return None;
     }
@@ -145,8 +149,10 @@ fn end(what: Element, topic: &Topic, degrees: &PerElement<Degree>) -> Option<(us
         let offered = topic.qos.as_deref().filter(|_| is_sent);
         let _ = writeln!(text, "    qos: {{{}}}", quality(offered));
     }
-    let degree = degrees.of(what).map_or("", |degree| degree.word());
-    let _ = writeln!(text, "    description: {degree}");
+    let confidence = confidences
+        .of(what)
+        .map_or("", |confidence| confidence.word());
+    let _ = writeln!(text, "    description: {confidence}");
     Some((list, text))
 }
 

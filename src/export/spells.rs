@@ -2,7 +2,7 @@
 
 use crate::base::time::Span;
 use crate::base::words::visible;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::Element;
 use crate::mission::Mission;
 
@@ -16,8 +16,8 @@ pub(super) struct SpellOf {
     pub(super) kind: &'static str,
     /// The names of both ends of an edge; empty for others.
     pub(super) ends: (String, String),
-    /// Its best degree.
-    pub(super) degree: Degree,
+    /// Its best confidence.
+    pub(super) confidence: Confidence,
     /// Its kinds of evidence, separated by spaces.
     pub(super) evidence: String,
     /// Messages in all windows; `None` if unknown.
@@ -69,7 +69,7 @@ impl SpellOf {
             label,
             kind: what.word(),
             ends: ends.unwrap_or_default(),
-            degree: Degree::Declared,
+            confidence: Confidence::Declared,
             evidence: elements
                 .evidence(what)
                 .words()
@@ -81,7 +81,7 @@ impl SpellOf {
         };
         for (at, row) in mission.graphs.rows(what) {
             let span = mission.graphs.spans()[at];
-            all.degree = all.degree.min(row.degree);
+            all.confidence = all.confidence.min(row.confidence);
             // A node's count is that of its topics' messages.
             if let (Some(count), false) = (row.count, matches!(what, Element::Node(_))) {
                 *all.messages.get_or_insert(0) += count;

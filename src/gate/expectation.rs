@@ -12,7 +12,7 @@ use super::range::{During, Range};
 use crate::base::time::{Period, Stamp};
 use crate::base::words::worded;
 pub(crate) use crate::base::yaml::YamlPlace;
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 pub(crate) use parse::read;
 
@@ -173,17 +173,17 @@ pub(crate) enum Demand {
     Order(Vec<At<Pattern>>),
     /// An event that follows another within this many nanoseconds.
     Reaction {
-        when: Event,
-        expect: Event,
+        when: ExpectedEvent,
+        expect: ExpectedEvent,
         within: i64,
     },
     /// The range of the number of reconfigurations.
     Changes { during: Option<During>, many: Range },
 }
 
-/// An event of the ledger.
+/// An event of the event log.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Event {
+pub(crate) struct ExpectedEvent {
     pub(crate) kind: EventKind,
     pub(crate) name: Pattern,
     /// The sender or value before; any if `None`.

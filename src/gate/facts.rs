@@ -11,19 +11,19 @@ use crate::base::notice::NoticeKind;
 use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::Bound;
 use crate::graph::{Edge, Element, NodeId, PerElement, State, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Entry, Kind};
+use crate::mission::event_log::{Event, Kind};
 
 pub(crate) use tempo::{Rate, TopicSilence};
 
 /// A mission with precomputed facts.
 pub(crate) struct Facts<'a> {
     pub(crate) mission: &'a Mission,
-    /// The strongest degree to which each element is known.
-    degrees: PerElement<Degree>,
+    /// The strongest confidence to which each element is known.
+    confidences: PerElement<Confidence>,
     /// The number of messages of each topic.
     messages: Vec<u64>,
     /// Whether a tool rewrote the bag, so that it names wrong publishers.
@@ -65,8 +65,8 @@ impl<'a> Facts<'a> {
     /// The facts of a mission.
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let elements = &mission.elements;
-        let degrees = mission.graphs.degrees(elements);
-        let is_there = |id| degrees.of(Element::Node(id)) < Some(&Degree::Declared);
+        let confidences = mission.graphs.confidences(elements);
+        let is_there = |id| confidences.of(Element::Node(id)) < Some(&Confidence::Declared);
         let count = |id| {
             let rows = mission.graphs.rows(Element::Topic(id));
             rows.filter_map(|(_, row)| row.count).sum()
@@ -83,7 +83,7 @@ impl<'a> Facts<'a> {
         }
         Self {
             mission,
-            degrees,
+            confidences,
             messages: topics.clone().map(|(id, _)| count(id)).collect(),
             is_rewritten: mission
                 .notices
@@ -191,34 +191,34 @@ impl<'a> Facts<'a> {
         is_quiet(self.topic(topic))
     }
 
-    fn degree(&self, what: Element) -> Degree {
-        let known = self.degrees.of(what).copied();
-        known.unwrap_or(Degree::Declared)
+    fn confidence(&self, what: Element) -> Confidence {
+        let known = self.confidences.of(what).copied();
+        known.unwrap_or(Confidence::Declared)
     }
 
     /// Whether a role is measured or stated, not only inferred.
     pub(crate) fn is_sure(&self, nodes: &[NodeId]) -> bool {
-        let sure = |id: &NodeId| self.degree(Element::Node(*id)) <= Degree::Stated;
+        let sure = |id: &NodeId| self.confidence(Element::Node(*id)) <= Confidence::Stated;
         nodes.iter().any(sure)
     }
 
-    /// The publishers of a topic: the node, the publication, and its degree; one known only from code and launch
+    /// The publishers of a topic: the node, the publication, and its confidence; one known only from code and launch
     /// files is declared.
-    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
+    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Confidence)> {
         let own = self.edges[0][topic as usize].iter();
         own.map(|id| {
             let edge = &self.mission.elements.publishes[*id as usize];
-            (edge.node, *id, self.degree(Element::Publish(*id)))
+            (edge.node, *id, self.confidence(Element::Publish(*id)))
         })
         .collect()
     }
 
     /// The subscribers of a topic, in the same form.
-    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
+    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Confidence)> {
         let own = self.edges[1][topic as usize].iter();
         own.map(|id| {
             let edge = &self.mission.elements.subscribes[*id as usize];
-            (edge.node, *id, self.degree(Element::Subscribe(*id)))
+            (edge.node, *id, self.confidence(Element::Subscribe(*id)))
         })
         .collect()
     }
@@ -253,7 +253,9 @@ impl<'a> Facts<'a> {
         let known = self.publishers(topic);
         !self.is_rewritten
             && unknown.unwrap_or(0) == 0
-            && known.iter().any(|(.., degree)| *degree <= Degree::Stated)
+            && known
+                .iter()
+                .any(|(.., confidence)| *confidence <= Confidence::Stated)
     }
 
     /// Whether the bag lists all subscribers, in general or for these nodes, so that an unlisted node is not a
@@ -297,10 +299,10 @@ impl<'a> Facts<'a> {
         Some((span, rows.filter_map(|(_, row)| row.count).sum()))
     }
 
-    /// Entries of the ledger about any of these nodes, but not about their edges.
-    pub(crate) fn entries(&self, nodes: &[NodeId], kind: Kind) -> Vec<&'a Entry> {
-        let own = |e: &&Entry| matches!(e.what, Element::Node(id) if nodes.contains(&id));
-        let all = self.mission.ledger.entries.iter().filter(own);
+    /// Entries of the event log about any of these nodes, but not about their edges.
+    pub(crate) fn events(&self, nodes: &[NodeId], kind: Kind) -> Vec<&'a Event> {
+        let own = |e: &&Event| matches!(e.what, Element::Node(id) if nodes.contains(&id));
+        let all = self.mission.log.events.iter().filter(own);
         all.filter(|e| e.kind == kind).collect()
     }
 
@@ -333,14 +335,14 @@ impl<'a> Facts<'a> {
     /// The best estimate of the time at which a role first appeared, with its bounds.
     pub(crate) fn began(&self, nodes: &[NodeId]) -> Option<Bound> {
         let first = self.lives(nodes).first()?.start;
-        let started = self.entries(nodes, Kind::Started);
-        let entry = started.into_iter().find(|e| e.time >= first);
-        let is_first = |e: &&Entry| e.time.since(first) < 1_000_000_000;
-        Some(match entry.filter(is_first) {
-            Some(entry) => Bound {
-                time: entry.time,
-                earliest: entry.earliest,
-                latest: entry.latest,
+        let started = self.events(nodes, Kind::Started);
+        let event = started.into_iter().find(|e| e.time >= first);
+        let is_first = |e: &&Event| e.time.since(first) < 1_000_000_000;
+        Some(match event.filter(is_first) {
+            Some(event) => Bound {
+                time: event.time,
+                earliest: event.earliest,
+                latest: event.latest,
             },
             None => Bound {
                 time: first,
@@ -356,7 +358,7 @@ impl<'a> Facts<'a> {
         if self.mission.span.end.since(end) <= CLOSING_NS {
             return None;
         }
-        let stopped = self.entries(nodes, Kind::Stopped);
+        let stopped = self.events(nodes, Kind::Stopped);
         let doubt = stopped.last().map_or(0, |e| e.latest.since(e.earliest));
         Some((end, doubt))
     }

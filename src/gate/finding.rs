@@ -111,7 +111,7 @@ kinds! {
          must follow; times count as uncertain as they are known.";
     TooManyChanges "too-many-changes":
         "There were more, or fewer, reconfigurations than allowed.",
-        "`during: -30s.., changes: ..0` counts the entries that `bagreel events` prints.";
+        "`during: -30s.., changes: ..0` counts the events that `bagreel events` prints.";
     UnexpectedNode "unexpected-node":
         "A node in the bag is not in the file.",
         "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.";
@@ -164,7 +164,7 @@ worded! {
     }
 }
 
-/// The cause of findings in the ledger, by which they are grouped.
+/// The cause of findings in the event log, by which they are grouped.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Cause {
     /// The time at which it happened, if known.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use super::{EdgeState, Element, Elements, Graph, NodeState, PerElement, TopicState};
 use crate::base::time::Span;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 
 /// A graph per window, in order.
 #[derive(Clone, Debug, Default)]
@@ -81,11 +81,11 @@ impl Graphs {
         (0..self.spans.len()).filter_map(row)
     }
 
-    /// The strongest degree to which each element is known in any window.
-    pub(crate) fn degrees(&self, elements: &Elements) -> PerElement<Degree> {
+    /// The strongest confidence to which each element is known in any window.
+    pub(crate) fn confidences(&self, elements: &Elements) -> PerElement<Confidence> {
         PerElement::new(elements, |what| {
-            let degrees = self.rows(what).map(|(_, row)| row.degree);
-            degrees.min().unwrap_or(Degree::Declared)
+            let confidences = self.rows(what).map(|(_, row)| row.confidence);
+            confidences.min().unwrap_or(Confidence::Declared)
         })
     }
 

@@ -1,7 +1,7 @@
 //! A mission in continuous time: the lives of each element with their uncertainty, and the messages of every sender as
 //! stretches of one rate.
 //!
-//! Made once, from claims and stamps; windows, events, phases and figures are readings of it. Nothing here depends on
+//! Made once, from observations and stamps; windows, events, phases and figures are readings of it. Nothing here depends on
 //! windows.
 
 use std::cmp::Reverse;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
 use crate::base::time::Span;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::evidence::collector::Collector;
 use crate::evidence::conclude::ConcludeOptions;
 use crate::evidence::topology::NamedElement::{Node, Subscribe};
@@ -127,13 +127,13 @@ fn a_node_starts_only_where_something_shows_that_it_was_absent() {
     let life = all.lives.of(Element::Publish(edge)).unwrap()[0];
     assert_eq!((life.span.start, life.began), (Stamp(0), None));
     // Before its first message it is only inferred.
-    let degrees = all.graphs.iter().take(5).map(|graph| {
+    let confidences = all.graphs.iter().take(5).map(|graph| {
         let state = graph.publishes.iter().find(|state| state.id == edge);
-        state.map(|state| state.degree)
+        state.map(|state| state.confidence)
     });
-    let [before, after] = [Some(Degree::Inferred), Some(Degree::Measured)];
+    let [before, after] = [Some(Confidence::Inferred), Some(Confidence::Measured)];
     assert_eq!(
-        degrees.collect::<Vec<_>>(),
+        confidences.collect::<Vec<_>>(),
         [before, before, before, after, after]
     );
 }

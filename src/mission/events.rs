@@ -1,4 +1,4 @@
-//! The event log of a mission: its ledger as lines for people or rows for programs, independent of windows.
+//! The event log of a mission: its log as lines for people or rows for programs, independent of windows.
 
 mod sentence;
 
@@ -6,22 +6,22 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 pub(crate) use self::sentence::{predicate, sentence, sentence_with};
-use super::json::entries::rows;
-pub(crate) use super::json::entries::text as quoted;
+use super::json::events::rows;
+pub(crate) use super::json::events::text as quoted;
 use crate::base::columns::hang;
 use crate::base::csv::table;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::graph::Element;
 use crate::mission::Mission;
-use crate::mission::ledger::{
-    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
+use crate::mission::event_log::{
+    Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
 };
 
 /// The format of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LogFormat {
-    /// A line per entry, for people.
+    /// A line per event, for people.
     #[default]
     Text,
     /// A table with a head, times in nanoseconds since 1970.
@@ -34,14 +34,14 @@ pub enum LogFormat {
     Markdown,
 }
 
-/// Options for the entries of a log.
+/// Options for the events of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LogOptions {
     /// Whether to write each headline's parts below it.
     pub parts: bool,
-    /// Whether to write housekeeping and the recorder's entries.
+    /// Whether to write housekeeping and the recorder's events.
     pub all: bool,
-    /// Whether to write a line before the first entry of each phase.
+    /// Whether to write a line before the first event of each phase.
     pub phases: bool,
 }
 
@@ -50,8 +50,8 @@ pub(crate) enum LogRow<'a> {
     Phase(usize, &'a Phase),
     Interruption(&'a Interruption),
     Switch(Switch),
-    Entry(EntryId, &'a Entry),
-    Part(EntryId, &'a Entry),
+    Event(EventId, &'a Event),
+    Part(EventId, &'a Event),
 }
 
 /// The log of a mission; ends in a new line unless it is empty. Control and direction characters in names are
@@ -92,7 +92,7 @@ pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -
     if format == LogFormat::Ndjson {
         return ndjson(mission, rows).lines().map(str::to_owned).collect();
     }
-    let parts = mission.ledger.all_parts();
+    let parts = mission.log.all_parts();
     let text = |row| {
         let (when, words) = when_and_what(mission, &parts, row);
         format!("{when:>13}  {words}")
@@ -102,11 +102,11 @@ pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -
 
 /// The rows with a row before each switch to another mode, which is no event of its own.
 fn with_switches<'a>(mission: &Mission, rows: Vec<LogRow<'a>>) -> Vec<LogRow<'a>> {
-    let mut switches = mission.ledger.switches().into_iter().peekable();
+    let mut switches = mission.log.switches().into_iter().peekable();
     let mut all = Vec::with_capacity(rows.len());
     for row in rows {
-        if let LogRow::Entry(_, entry) = &row {
-            let next = switches.next_if(|switch| switch.time <= entry.time);
+        if let LogRow::Event(_, event) = &row {
+            let next = switches.next_if(|switch| switch.time <= event.time);
             all.extend(next.map(LogRow::Switch));
         }
         all.push(row);
@@ -115,30 +115,29 @@ fn with_switches<'a>(mission: &Mission, rows: Vec<LogRow<'a>>) -> Vec<LogRow<'a>
 }
 
 fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
-    let ledger = &mission.ledger;
+    let log = &mission.log;
     let parts = if options.parts {
-        ledger.all_parts()
+        log.all_parts()
     } else {
         BTreeMap::new()
     };
-    let phases = ledger.phases.iter().enumerate();
+    let phases = log.phases.iter().enumerate();
     let mut phases = phases.filter(|_| options.phases).peekable();
-    let mut interruptions = ledger.interruptions.iter().peekable();
+    let mut interruptions = log.interruptions.iter().peekable();
     let mut rows = Vec::new();
-    for (id, entry) in (0..).zip(&ledger.entries) {
-        while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= entry.time) {
+    for (id, event) in (0..).zip(&log.events) {
+        while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= event.time) {
             rows.push(LogRow::Phase(at, phase));
         }
-        while let Some(one) = interruptions.next_if(|one| one.time <= entry.time) {
+        while let Some(one) = interruptions.next_if(|one| one.time <= event.time) {
             rows.push(LogRow::Interruption(one));
         }
-        if entry.part_of.is_some() || entry.quiet && !options.all {
+        if event.part_of.is_some() || event.quiet && !options.all {
             continue;
         }
-        rows.push(LogRow::Entry(id, entry));
+        rows.push(LogRow::Event(id, event));
         let own = parts.get(&id).into_iter().flatten();
-        let own =
-            own.filter_map(|part| Some(LogRow::Part(*part, ledger.entries.get(*part as usize)?)));
+        let own = own.filter_map(|part| Some(LogRow::Part(*part, log.events.get(*part as usize)?)));
         rows.extend(own);
     }
     rows.extend(phases.map(|(at, phase)| LogRow::Phase(at, phase)));
@@ -152,13 +151,13 @@ const SURE_NS: i64 = 4_000_000_000;
 /// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range.
 const ABOUT_NS: i64 = 10_000_000_000;
 
-/// The time of an entry, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
-fn at(mission: &Mission, entry: &Entry) -> String {
+/// The time of an event, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
+fn at(mission: &Mission, event: &Event) -> String {
     let second = |time: Stamp| words::offset_seconds(mission.offset(time));
-    match entry.latest.since(entry.earliest) {
-        doubt if doubt <= SURE_NS => words::offset_tenths(mission.offset(entry.time)),
-        doubt if doubt <= ABOUT_NS => format!("~{}", second(entry.time)),
-        _ => format!("{}–{}", second(entry.earliest), second(entry.latest)),
+    match event.latest.since(event.earliest) {
+        doubt if doubt <= SURE_NS => words::offset_tenths(mission.offset(event.time)),
+        doubt if doubt <= ABOUT_NS => format!("~{}", second(event.time)),
+        _ => format!("{}–{}", second(event.earliest), second(event.latest)),
     }
 }
 
@@ -191,14 +190,14 @@ impl LogLine {
 /// The log as lines for people, sorted by the time that each shows.
 pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
     let rows = with_switches(mission, chosen(mission, options));
-    let parts = mission.ledger.all_parts();
+    let parts = mission.log.all_parts();
     let shown = sorted(&rows).into_iter().map(|row| {
         let (when, words) = when_and_what(mission, &parts, row);
         let (kind, inner, words) = match row {
             LogRow::Phase(..) => (None, "", format!("── {words} ──")),
             LogRow::Interruption(_) | LogRow::Switch(_) => (None, "", words),
-            LogRow::Entry(_, entry) => (Some(entry.kind), "", words),
-            LogRow::Part(_, entry) => (Some(entry.kind), "  ", words),
+            LogRow::Event(_, event) => (Some(event.kind), "", words),
+            LogRow::Part(_, event) => (Some(event.kind), "  ", words),
         };
         LogLine {
             kind,
@@ -216,8 +215,8 @@ fn when_and_what(mission: &Mission, parts: &Parts, row: &LogRow<'_>) -> (String,
         LogRow::Phase(number, phase) => (tenths(phase.span.start), title(*number, phase)),
         LogRow::Interruption(one) => (tenths(one.time), sentence::interrupted(one)),
         LogRow::Switch(one) => (tenths(one.time), sentence::switched(one)),
-        LogRow::Entry(id, entry) | LogRow::Part(id, entry) => {
-            (at(mission, entry), sentence(mission, parts, *id, entry))
+        LogRow::Event(id, event) | LogRow::Part(id, event) => {
+            (at(mission, event), sentence(mission, parts, *id, event))
         }
     }
 }
@@ -230,7 +229,7 @@ fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
             LogRow::Phase(_, phase) => phase.span.start,
             LogRow::Interruption(one) => one.time,
             LogRow::Switch(one) => one.time,
-            LogRow::Entry(_, entry) => shown(entry),
+            LogRow::Event(_, event) => shown(event),
             LogRow::Part(..) => time,
         };
         (time, row)
@@ -240,18 +239,18 @@ fn sorted<'a, 'm>(rows: &'a [LogRow<'m>]) -> Vec<&'a LogRow<'m>> {
     timed.into_iter().map(|(_, row)| row).collect()
 }
 
-/// The printed time of an entry: the earliest possible one if a range is printed.
-fn shown(entry: &Entry) -> Stamp {
-    if entry.latest.since(entry.earliest) > ABOUT_NS {
-        entry.earliest
+/// The printed time of an event: the earliest possible one if a range is printed.
+fn shown(event: &Event) -> Stamp {
+    if event.latest.since(event.earliest) > ABOUT_NS {
+        event.earliest
     } else {
-        entry.time
+        event.time
     }
 }
 
 fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = "| when | what |\n|---:|---|\n".to_owned();
-    let parts = mission.ledger.all_parts();
+    let parts = mission.log.all_parts();
     for row in sorted(rows) {
         let (when, words) = when_and_what(mission, &parts, row);
         let words = match row {
@@ -305,49 +304,49 @@ fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
             LogRow::Phase(at, phase) => phase_cells(*at, phase),
             LogRow::Interruption(one) => interruption_cells(one),
             LogRow::Switch(_) => Vec::new(),
-            LogRow::Entry(id, entry) | LogRow::Part(id, entry) => cells(mission, *id, entry),
+            LogRow::Event(id, event) | LogRow::Part(id, event) => cells(mission, *id, event),
         }),
     )
 }
 
-fn cells(mission: &Mission, id: EntryId, entry: &Entry) -> Vec<String> {
+fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
     let elements = &mission.elements;
-    let (node, topic) = elements.ends(entry.what);
+    let (node, topic) = elements.ends(event.what);
     let node = node.map(|id| visible(elements.nodes[id as usize].name.as_str()).into_owned());
     let topic = topic.map(|id| visible(elements.topics[id as usize].name.as_str()).into_owned());
-    let (name, topic) = match entry.what {
+    let (name, topic) = match event.what {
         Element::Topic(_) => (topic, None),
         _ => (node, topic),
     };
-    let (before, after) = values(mission, entry);
+    let (before, after) = values(mission, event);
     vec![
-        entry.time.0.to_string(),
-        entry.kind.word().to_owned(),
-        entry.what.word().to_owned(),
+        event.time.0.to_string(),
+        event.kind.word().to_owned(),
+        event.what.word().to_owned(),
         name.unwrap_or_default(),
         topic.unwrap_or_default(),
         id.to_string(),
-        entry.earliest.0.to_string(),
-        entry.latest.0.to_string(),
-        entry.until.map_or_else(String::new, |t| t.0.to_string()),
+        event.earliest.0.to_string(),
+        event.latest.0.to_string(),
+        event.until.map_or_else(String::new, |t| t.0.to_string()),
         before,
         after,
-        entry.degree.word().to_owned(),
-        entry.evidence.words().collect::<Vec<_>>().join(" "),
-        entry.part_of.map_or_else(String::new, |of| of.to_string()),
-        entry.quiet.to_string(),
-        entry.weight.to_string(),
+        event.confidence.word().to_owned(),
+        event.evidence.words().collect::<Vec<_>>().join(" "),
+        event.part_of.map_or_else(String::new, |of| of.to_string()),
+        event.quiet.to_string(),
+        event.weight.to_string(),
     ]
 }
 
-/// The values of an entry before and after: numbers, names or texts.
-fn values(mission: &Mission, entry: &Entry) -> (String, String) {
+/// The values of an event before and after: numbers, names or texts.
+fn values(mission: &Mission, event: &Event) -> (String, String) {
     let names = |nodes: &[u32]| {
         let name =
             |id: &u32| visible(mission.elements.nodes[*id as usize].name.as_str()).into_owned();
         nodes.iter().map(name).collect::<Vec<_>>().join(" ")
     };
-    match &entry.detail {
+    match &event.detail {
         Detail::None => (String::new(), String::new()),
         Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
         Detail::Count(many) => (String::new(), many.to_string()),
@@ -383,7 +382,7 @@ fn until(one: &Interruption) -> Stamp {
 }
 
 fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
-    let entries = rows_of(mission);
+    let events = rows_of(mission);
     let mut all = String::new();
     for row in rows {
         match row {
@@ -396,8 +395,8 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
                 );
             }
             LogRow::Switch(_) => continue,
-            LogRow::Entry(id, _) | LogRow::Part(id, _) => {
-                all.push_str(entries.get(*id as usize).map_or("{}", String::as_str));
+            LogRow::Event(id, _) | LogRow::Part(id, _) => {
+                all.push_str(events.get(*id as usize).map_or("{}", String::as_str));
             }
         }
         all.push('\n');
@@ -405,16 +404,16 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     all
 }
 
-/// Every entry as an object on one line.
+/// Every event as an object on one line.
 fn rows_of(mission: &Mission) -> Vec<String> {
-    rows(&mission.ledger, &mission.elements)
+    rows(&mission.log, &mission.elements)
         .map(|row| harmless(&row))
         .collect()
 }
 
 fn phase_line(at: usize, phase: &Phase) -> String {
     let (start, end) = (phase.span.start.0, phase.span.end.0);
-    let name = crate::mission::json::entries::text(&phase.name);
+    let name = crate::mission::json::events::text(&phase.name);
     let number = at + 1;
     harmless(&format!(
         "{{\"kind\":\"phase\",\"number\":{number},\"name\":{name},\"time_ns\":{start},\"until_ns\":{end}}}"

@@ -21,7 +21,7 @@ pub use why::why;
 
 use crate::base::name::is_recorder;
 use crate::base::words::visible_json;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::{Edge, EdgeId, Element, NodeId};
 use crate::mission::Mission;
 
@@ -40,12 +40,12 @@ pub struct Info {
     pub duration_s: f64,
     /// The number of messages.
     pub messages: u64,
-    /// The number of nodes by degree of evidence.
-    pub nodes_by_degree: DegreeCounts,
-    /// The number of publications by degree of evidence.
-    pub publishes_by_degree: DegreeCounts,
-    /// The number of subscriptions by degree of evidence.
-    pub subscribes_by_degree: DegreeCounts,
+    /// The number of nodes by confidence of evidence.
+    pub nodes_by_degree: ConfidenceCounts,
+    /// The number of publications by confidence of evidence.
+    pub publishes_by_degree: ConfidenceCounts,
+    /// The number of subscriptions by confidence of evidence.
+    pub subscribes_by_degree: ConfidenceCounts,
     /// The number of topics with messages and without a known publisher.
     pub topics_without_publisher: usize,
     /// The number of topics with messages and without a known subscriber, not counting the recorder.
@@ -80,36 +80,38 @@ pub struct BagInfo {
     pub facts: Vec<(String, String)>,
 }
 
-/// The numbers of elements by their best degree of evidence.
+/// The numbers of elements by their best confidence of evidence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[expect(missing_docs, reason = "the names are those of `Degree`")]
-pub struct DegreeCounts {
+#[expect(missing_docs, reason = "the names are those of `Confidence`")]
+pub struct ConfidenceCounts {
     pub measured: usize,
     pub stated: usize,
     pub inferred: usize,
     pub declared: usize,
 }
 
-impl DegreeCounts {
-    fn add(&mut self, degree: Degree) {
-        match degree {
-            Degree::Measured => self.measured += 1,
-            Degree::Stated => self.stated += 1,
-            Degree::Inferred => self.inferred += 1,
-            Degree::Declared => self.declared += 1,
+impl ConfidenceCounts {
+    fn add(&mut self, confidence: Confidence) {
+        match confidence {
+            Confidence::Measured => self.measured += 1,
+            Confidence::Stated => self.stated += 1,
+            Confidence::Inferred => self.inferred += 1,
+            Confidence::Declared => self.declared += 1,
         }
     }
 
-    /// The sum of all degrees.
+    /// The sum of all confidences.
     pub fn total(&self) -> usize {
         self.measured + self.stated + self.inferred + self.declared
     }
 }
 
-impl FromIterator<Degree> for DegreeCounts {
-    fn from_iter<T: IntoIterator<Item = Degree>>(degrees: T) -> Self {
+impl FromIterator<Confidence> for ConfidenceCounts {
+    fn from_iter<T: IntoIterator<Item = Confidence>>(confidences: T) -> Self {
         let mut all = Self::default();
-        degrees.into_iter().for_each(|degree| all.add(degree));
+        confidences
+            .into_iter()
+            .for_each(|confidence| all.add(confidence));
         all
     }
 }
@@ -159,8 +161,9 @@ pub struct TopicInfo {
 pub struct NodeInfo {
     /// The name.
     pub name: String,
-    /// The word of the best degree of evidence.
-    pub degree: &'static str,
+    /// The word of the best confidence of evidence.
+    #[serde(rename = "degree")]
+    pub confidence: &'static str,
     /// The kinds of evidence for it.
     pub evidence: Vec<&'static str>,
     /// The time from which it is known to exist, as in the log; ns since 1970.
@@ -180,11 +183,11 @@ pub struct NodeInfo {
 /// The summary of a mission; its windows become the parts of each topic's activity.
 pub fn info(mission: &Mission) -> Info {
     let elements = &mission.elements;
-    let best = mission.graphs.degrees(elements);
-    let degrees = |is_kind: fn(&Element) -> bool| -> DegreeCounts {
+    let best = mission.graphs.confidences(elements);
+    let confidences = |is_kind: fn(&Element) -> bool| -> ConfidenceCounts {
         let own = best.iter().filter(|(what, _)| is_kind(what));
         let known = own.filter(|(what, _)| !elements.evidence(*what).is_guess());
-        known.map(|(_, degree)| *degree).collect()
+        known.map(|(_, confidence)| *confidence).collect()
     };
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
@@ -192,10 +195,10 @@ pub fn info(mission: &Mission) -> Info {
     let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
     let nodes = named.map(|(id, node)| {
         let own = &traffic[id as usize];
-        let degree = best.of(Element::Node(id));
+        let confidence = best.of(Element::Node(id));
         NodeInfo {
             name: node.name.to_string(),
-            degree: degree.map_or("", |degree| degree.word()),
+            confidence: confidence.map_or("", |confidence| confidence.word()),
             evidence: node.evidence.words().collect(),
             first_ns: node.runs.first().map(|run| run.start.0),
             last_ns: node.runs.last().map(|run| run.end.0 - 1),
@@ -212,8 +215,8 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: degrees(|what| matches!(what, Element::Node(_))),
-        publishes_by_degree: degrees(|what| matches!(what, Element::Publish(_))),
+        nodes_by_degree: confidences(|what| matches!(what, Element::Node(_))),
+        publishes_by_degree: confidences(|what| matches!(what, Element::Publish(_))),
         subscribes_by_degree: listeners(mission)
             .filter(|(_, edge)| !edge.evidence.is_guess())
             .filter_map(|(id, _)| best.of(Element::Subscribe(id)).copied())

@@ -2,7 +2,7 @@
 
 pub(crate) mod changes;
 pub(crate) mod elements;
-pub(crate) mod entries;
+pub(crate) mod events;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod raw;

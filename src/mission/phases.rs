@@ -20,7 +20,7 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::history::Sending;
 use crate::graph::{Elements, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::Phase;
+use crate::mission::event_log::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
 /// mission (one in so many).

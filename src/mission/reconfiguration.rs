@@ -101,7 +101,7 @@ impl Reconfiguration {
             run: run.to_owned(),
             span: mission.span,
             period_s: mission.period.nanos() as f64 / 1e9,
-            changes: mission.ledger.headlines(mission.span).count(),
+            changes: mission.log.headlines(mission.span).count(),
             lives: lives.collect(),
             windows,
         }

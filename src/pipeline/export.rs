@@ -304,7 +304,7 @@ fn write(job: &Render, sequence: &Sequence<'_>, watch: &mut dyn Watch) -> Result
 
 /// The name of the phase of every window: the last one that begins before its end.
 fn captions(mission: &Mission) -> Vec<String> {
-    let phases = &mission.ledger.phases;
+    let phases = &mission.log.phases;
     let name = |end| {
         let next = phases.partition_point(|phase| phase.span.start < end);
         let phase = next.checked_sub(1).map(|at| phases[at].name.to_string());

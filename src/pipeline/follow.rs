@@ -85,7 +85,7 @@ impl Follow {
         Ok(growth)
     }
 
-    /// The number of connections and claims, which grows with every new fact.
+    /// The number of connections and observations, which grows with every new fact.
     pub(crate) fn known(&self) -> usize {
         self.collector.known()
     }

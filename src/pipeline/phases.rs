@@ -9,7 +9,7 @@ use crate::base::time::{Span, Stamp, parse_nanos};
 use crate::base::{budget, file};
 use crate::graph::Elements;
 use crate::graph::history::Sending;
-use crate::mission::ledger::Phase;
+use crate::mission::event_log::Phase;
 use crate::mission::phases::{of_spans, phases};
 
 /// The source of phases and of their names.

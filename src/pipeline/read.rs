@@ -24,7 +24,7 @@ use crate::graph::diff::RATE_CHANGE;
 use crate::graph::history::Sending;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, Windowed, graphs, made, traffic, unread};
-use crate::mission::ledger::{self, Interruption, InterruptionKind, Ledger};
+use crate::mission::event_log::{self, EventLog, Interruption, InterruptionKind};
 use crate::mission::{Mission, Window, read_json};
 
 /// The inputs of a mission and the options of reading them.
@@ -267,9 +267,9 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         sending: &mission.sending,
         whole: mission.span,
         texts: &[],
-        earlier: std::mem::take(&mut mission.ledger.phases),
+        earlier: std::mem::take(&mut mission.log.phases),
     };
-    mission.ledger.phases = wanted(reading, basis)?;
+    mission.log.phases = wanted(reading, basis)?;
     Ok(mission)
 }
 
@@ -295,12 +295,12 @@ fn mission(
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
     let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
-    let ledger = ledger_of(&history, collected, reading)?;
-    let mut windows = divided(reading, collected.range, &ledger)?;
+    let log = log_of(&history, collected, reading)?;
+    let mut windows = divided(reading, collected.range, &log)?;
     let period = windows.period;
     let mut windowed = graphs(&windows.spans, reading.grace)?;
-    let mut list = list(&windows, &windowed, &history, &ledger);
-    let is_still = reading.is_still_if_unchanged && is_still(&windows, &ledger);
+    let mut list = list(&windows, &windowed, &history, &log);
+    let is_still = reading.is_still_if_unchanged && is_still(&windows, &log);
     if reading.skip_unchanged || is_still {
         windows.spans = if is_still {
             vec![windows.span]
@@ -308,7 +308,7 @@ fn mission(
             merged(&list)
         };
         windowed = graphs(&windows.spans, reading.grace)?;
-        list = self::list(&windows, &windowed, &history, &ledger);
+        list = self::list(&windows, &windowed, &history, &log);
     }
     let mut notices: Notices = recorded.notices.clone();
     notices.extend(findings.notices.iter());
@@ -331,7 +331,7 @@ fn mission(
         elements: history.elements,
         windows: list,
         graphs: windowed.graphs,
-        ledger,
+        log,
         sending: history.sending,
         undrawn: findings.undrawn.clone(),
         layout: None,
@@ -354,28 +354,28 @@ fn doubled(history: &History) -> Option<Notice> {
 const NAMED: usize = 3;
 
 /// The windows: of equal length, or from change to change.
-fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
+fn divided(reading: &Reading, span: Span, log: &EventLog) -> Result<Windows> {
     let windows = match reading.division.cut {
         None => return window::divide(&reading.division, span),
-        Some(Cut::Phases) if ledger.phases.is_empty() => {
+        Some(Cut::Phases) if log.phases.is_empty() => {
             return Err(Error::usage(
                 "`--cut phases` needs phases, but `--phases none` removes them",
                 "leave out `--phases none`",
             ));
         }
         Some(Cut::Phases) => {
-            let phases = ledger.phases.iter().skip(1);
+            let phases = log.phases.iter().skip(1);
             window::at_turns(span, phases.map(|phase| phase.span.start))
         }
-        Some(Cut::Changes) => window::at_turns(span, ledger.turns(span).into_iter()),
+        Some(Cut::Changes) => window::at_turns(span, log.turns(span).into_iter()),
     };
     Ok(windows)
 }
 
-/// The ledger: the events of the mission, and its phases.
-fn ledger_of(history: &History, collected: &Collected, reading: &Reading) -> Result<Ledger> {
+/// The log: the events of the mission, and its phases.
+fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result<EventLog> {
     let elements = &history.elements;
-    let entries = ledger::make(&ledger::LedgerInput {
+    let events = event_log::make(&event_log::LogInput {
         elements,
         history,
         rate_change: reading.rate_change,
@@ -399,34 +399,34 @@ fn ledger_of(history: &History, collected: &Collected, reading: &Reading) -> Res
     });
     let mut interruptions: Vec<Interruption> = back.chain(nothing).collect();
     interruptions.sort_unstable();
-    Ok(Ledger {
+    Ok(EventLog {
         interruptions,
-        entries,
+        events,
         phases: wanted(reading, basis)?,
-        ..Ledger::default()
+        ..EventLog::default()
     })
 }
 
 /// The windows, and the changes from each to the next.
-fn list(windows: &Windows, windowed: &Windowed, history: &History, ledger: &Ledger) -> Vec<Window> {
+fn list(windows: &Windows, windowed: &Windowed, history: &History, log: &EventLog) -> Vec<Window> {
     let graphs = windows.spans.iter().copied().zip(&windowed.graphs);
-    let changes = ledger::explain(graphs, &history.elements, ledger);
-    let window = |(index, (messages, (changes, entries)))| Window {
+    let changes = event_log::explain(graphs, &history.elements, log);
+    let window = |(index, (messages, (changes, events)))| Window {
         index,
         span: windows.spans[index],
         partial: windows.partial(index),
         messages,
         changes,
-        entries,
+        events,
     };
     let parts = windowed.messages.iter().copied().zip(changes);
     parts.enumerate().map(window).collect()
 }
 
 /// Whether no event begins, ends or lasts after the first window.
-fn is_still(windows: &Windows, ledger: &Ledger) -> bool {
+fn is_still(windows: &Windows, log: &EventLog) -> bool {
     let first = windows.spans.first().map_or(windows.span.end, |s| s.end);
-    let all = ledger.headlines(windows.span);
+    let all = log.headlines(windows.span);
     let mut later = all.filter(|(_, e)| e.until.unwrap_or(e.time) >= first);
     later.next().is_none()
 }

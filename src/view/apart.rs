@@ -71,8 +71,8 @@ impl Viewed {
             .iter()
             .filter(|reason| reason.is_none());
         let is_rule = 2 * is_busy.iter().filter(|busy| **busy).count() >= seen.count();
-        for entry in bundles::news(mission) {
-            if let (Some(node), _) = mission.elements.ends(entry.what) {
+        for event in bundles::news(mission) {
+            if let (Some(node), _) = mission.elements.ends(event.what) {
                 is_busy[node as usize] = true;
             }
         }

@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::graph::window::default_period;
 use crate::graph::{Elements, NodeId, Topic};
 use crate::mission::Mission;
-use crate::mission::ledger::{Entry, Kind};
+use crate::mission::event_log::{Event, Kind};
 
 /// The name of each topic in a bundle: that of its group, if it is in one.
 pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
@@ -45,9 +45,9 @@ pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     {
         return vec![true; drawn.len()];
     }
-    let entries = mission.ledger.entries.iter();
-    for entry in entries.filter(|entry| entry.is_headline()) {
-        if let (Some(_), Some(topic)) = elements.ends(entry.what) {
+    let events = mission.log.events.iter();
+    for event in events.filter(|event| event.is_headline()) {
+        if let (Some(_), Some(topic)) = elements.ends(event.what) {
             drawn[topic as usize] = true;
         }
     }
@@ -118,8 +118,8 @@ fn changing_nodes(
 ) -> (Vec<bool>, Vec<bool>) {
     let mut changes = vec![false; mission.elements.nodes.len()];
     let mut changes_itself = changes.clone();
-    for entry in news(mission) {
-        let nodes = match mission.elements.ends(entry.what) {
+    for event in news(mission) {
+        let nodes = match mission.elements.ends(event.what) {
             (Some(node), _) => {
                 changes_itself[node as usize] = true;
                 vec![node]
@@ -139,17 +139,17 @@ fn changing_nodes(
 pub(crate) fn beginning(mission: &Mission) -> Option<Stamp> {
     let first = default_period(mission.span.nanos());
     let end = mission.span.start.plus(first.nanos());
-    (mission.windows.len() == 1 && !mission.ledger.compares).then_some(end)
+    (mission.windows.len() == 1 && !mission.log.compares).then_some(end)
 }
 
 /// The headlines but for the starts in the first window, or in the beginning of the only one.
-pub(crate) fn news(mission: &Mission) -> impl Iterator<Item = &Entry> {
+pub(crate) fn news(mission: &Mission) -> impl Iterator<Item = &Event> {
     let first = mission.windows.first().map(|window| window.span.end);
     let first = beginning(mission).or(first);
     let is_first =
-        move |e: &Entry| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
-    let entries = mission.ledger.entries.iter();
-    entries.filter(move |entry| entry.is_headline() && !is_first(entry))
+        move |e: &Event| e.kind == Kind::Started && first.is_some_and(|end| e.time < end);
+    let events = mission.log.events.iter();
+    events.filter(move |event| event.is_headline() && !is_first(event))
 }
 
 /// These nodes with their looks, by the innermost namespace with a box.

@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
+use crate::mission::event_log::{Detail, EventId, EventLog, Kind};
 use crate::view::lasting::Part;
 
 /// The largest length of a name in characters; longer ones are cut.
@@ -26,9 +26,9 @@ const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::
 pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
-    ledger: &'a Ledger,
+    log: &'a EventLog,
     /// The parts of each event of the log.
-    parts: BTreeMap<EntryId, Vec<EntryId>>,
+    parts: BTreeMap<EventId, Vec<EventId>>,
     start: Stamp,
     /// Whether there is but one window.
     is_still: bool,
@@ -45,8 +45,8 @@ impl<'a> Speaker<'a> {
         Self {
             elements: &mission.elements,
             viewed,
-            ledger: &mission.ledger,
-            parts: mission.ledger.all_parts(),
+            log: &mission.log,
+            parts: mission.log.all_parts(),
             start: mission.span.start,
             is_still: mission.windows.len() == 1,
             last: None,
@@ -61,42 +61,42 @@ impl<'a> Speaker<'a> {
         let home: &'a str = home(whats.filter_map(|what| self.subject(what)));
         let mut groups = Groups::new();
         for headline in &frame.headlines {
-            let part = self.entry(headline.entry).map(|e| Part::of(e, frame.span));
+            let part = self.event(headline.event).map(|e| Part::of(e, frame.span));
             let phrase = self.phrase(headline, part.unwrap_or(Part::Whole), home);
-            add(&mut groups, phrase, headline.entry);
+            add(&mut groups, phrase, headline.event);
             // Equal events of others at the same time are parts of it.
-            for id in self.parts.get(&headline.entry).into_iter().flatten() {
-                if let Some(part) = self.entry(*id)
+            for id in self.parts.get(&headline.event).into_iter().flatten() {
+                if let Some(part) = self.event(*id)
                     && CROWDED.contains(&part.kind)
                     && part.kind == headline.kind
                     && discriminant(&part.what) == discriminant(&headline.what)
                     && self.viewed.sees(part.what)
                 {
                     let other = Headline {
-                        entry: *id,
+                        event: *id,
                         what: part.what,
                         ..*headline
                     };
                     let phrase = self.phrase(&other, Part::Whole, home);
-                    add(&mut groups, phrase, headline.entry);
+                    add(&mut groups, phrase, headline.event);
                 }
             }
         }
         for lasting in &frame.lasting {
-            add(&mut groups, self.lasting(lasting, home), lasting.entry);
+            add(&mut groups, self.lasting(lasting, home), lasting.event);
         }
         frame.caption = groups.into_values().map(plural).collect();
         frame.note = self.note(frame, home);
     }
 
-    fn entry(&self, id: EntryId) -> Option<&'a crate::mission::ledger::Entry> {
-        self.ledger.entries.get(id as usize)
+    fn event(&self, id: EventId) -> Option<&'a crate::mission::event_log::Event> {
+        self.log.events.get(id as usize)
     }
 
     /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing
     /// changes `no change since 3:20`.
     fn note(&mut self, frame: &Frame, home: &str) -> String {
-        if self.ledger.compares {
+        if self.log.compares {
             let none = frame.caption.is_empty().then_some("no difference");
             return none.unwrap_or_default().to_owned();
         }
@@ -127,8 +127,8 @@ impl<'a> Speaker<'a> {
             parts.push(format!("since {}", self.moment(one.since)));
         }
         let leaves = frame.headlines.iter().filter(|h| {
-            let entry = self.entry(h.entry);
-            entry.is_some_and(|e| Part::of(e, frame.span) == Part::Leaves)
+            let event = self.event(h.event);
+            event.is_some_and(|e| Part::of(e, frame.span) == Part::Leaves)
         });
         let away = frame.lasting.iter().filter(|l| l.ended.is_none());
         let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
@@ -185,7 +185,7 @@ impl<'a> Speaker<'a> {
     fn phrase(&self, headline: &Headline, part: Part, home: &str) -> (u8, Phrase) {
         let name = self.name(headline.what, home);
         let kind = headline.kind;
-        if self.ledger.compares {
+        if self.log.compares {
             return self.compared(headline, home);
         }
         if part == Part::Leaves {
@@ -197,8 +197,8 @@ impl<'a> Speaker<'a> {
             Kind::Silent => (3, said(' ', "", name, "falls silent")),
             Kind::Started => (4, said('+', "", name, "starts")),
             Kind::Restarted => {
-                let entry = self.entry(headline.entry);
-                let away = entry.and_then(|e| Some(e.until?.since(e.time)));
+                let event = self.event(headline.event);
+                let away = event.and_then(|e| Some(e.until?.since(e.time)));
                 let away = away.filter(|nanos| *nanos > 0);
                 let tail = away.map_or_else(String::new, |nanos| {
                     format!("after {}", words::duration(nanos))
@@ -218,7 +218,7 @@ impl<'a> Speaker<'a> {
     }
 
     fn changed(&self, headline: &Headline, name: String, home: &str) -> (u8, Phrase) {
-        match self.entry(headline.entry).map(|e| &e.detail) {
+        match self.event(headline.event).map(|e| &e.detail) {
             Some(Detail::Rates { from_hz, to_hz }) => {
                 let change = words::rate_change(*from_hz, *to_hz);
                 (11, said(' ', "", format!("{name} {change}"), ""))
@@ -271,8 +271,8 @@ impl<'a> Speaker<'a> {
             Kind::Started | Kind::Appeared => (1, '+'),
             Kind::Rate | Kind::HandedOver => return self.changed(headline, name, home),
             _ => {
-                let entry = self.entry(headline.entry);
-                let Some(Detail::Values { from, to }) = entry.map(|e| &e.detail) else {
+                let event = self.event(headline.event);
+                let Some(Detail::Values { from, to }) = event.map(|e| &e.detail) else {
                     return self.changed(headline, name, home);
                 };
                 let change = format!("{name} {} → {}", clip(from), clip(to));
@@ -288,10 +288,7 @@ impl<'a> Speaker<'a> {
             }
             _ => String::new(),
         };
-        (
-            place,
-            said(sign, &lead, name, self.ledger.word(headline.kind)),
-        )
+        (place, said(sign, &lead, name, self.log.word(headline.kind)))
     }
 
     /// The name of a node (as a role) or topic below `home`, in full outside it; of an edge, that of its topic.
@@ -338,13 +335,13 @@ fn said(sign: char, lead: &str, name: String, tail: &str) -> Phrase {
         sign,
         lead: lead.to_owned(),
         names: vec![name],
-        entries: Vec::new(),
+        events: Vec::new(),
         tail: tail.to_owned(),
     }
 }
 
 /// Adds the phrase of an event to an equal one.
-fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), entry: EntryId) {
+fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), event: EventId) {
     let key = (place, [phrase.lead.clone(), phrase.tail.clone()]);
     let names = phrase.names.clone();
     let all = groups.entry(key).or_insert(Phrase {
@@ -354,7 +351,7 @@ fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), entry: EntryId) {
     for name in names {
         if !all.names.contains(&name) {
             all.names.push(name);
-            all.entries.push(entry);
+            all.events.push(event);
         }
     }
 }

@@ -151,12 +151,12 @@ impl Drawn {
             let look = look.zip(line).map(|(look, line)| {
                 // A connection that came or went is the change of the row, too.
                 let told = if look.mark.is_some() { look } else { line };
-                let entries = look.entries.iter().chain(&line.entries);
-                let entries: BTreeSet<_> = entries.copied().collect();
+                let events = look.events.iter().chain(&line.events);
+                let events: BTreeSet<_> = events.copied().collect();
                 Shown {
                     mark: told.mark,
                     rates: told.rates,
-                    entries: entries.into_iter().collect(),
+                    events: events.into_iter().collect(),
                     ..(if is_plumbing { line } else { look }).clone()
                 }
             });
@@ -291,10 +291,10 @@ fn both_ways(ways: [&Showing; 2]) -> Showing {
             .flatten()
             .find(is_told)
             .or(looks.iter().flatten().next());
-        let entries = looks.iter().flatten().flat_map(|look| &look.entries);
-        let entries: BTreeSet<_> = entries.copied().collect();
+        let events = looks.iter().flatten().flat_map(|look| &look.events);
+        let events: BTreeSet<_> = events.copied().collect();
         let shown = look.map(|look| Shown {
-            entries: entries.into_iter().collect(),
+            events: events.into_iter().collect(),
             topics: vec![TopicRow {
                 topic: 0,
                 ways: looks.map(|look| look.is_some()),

@@ -102,10 +102,10 @@ pub struct Collapsible {
 /// The node or topic that each headline is about: an edge's topic.
 pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_ {
     let elements = &mission.elements;
-    let entries = mission.ledger.entries.iter().filter(|e| e.is_headline());
-    entries.map(|entry| match elements.ends(entry.what) {
+    let events = mission.log.events.iter().filter(|e| e.is_headline());
+    events.map(|event| match elements.ends(event.what) {
         (Some(_), Some(topic)) => Element::Topic(topic),
-        _ => entry.what,
+        _ => event.what,
     })
 }
 

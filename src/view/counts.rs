@@ -2,7 +2,7 @@
 
 use super::{Counts, Headline};
 use crate::graph::Element;
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 impl Counts {
     /// The number of headlines of each kind.

@@ -6,12 +6,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Frame, Mark, SeenWindow, Shown, View};
 use crate::graph::Element;
 use crate::mission::Mission;
-use crate::mission::ledger::{EntryId, Kind};
+use crate::mission::event_log::{EventId, Kind};
 
 /// The most things that have a colour, and a word in the headline, each on its own.
 const MOST: usize = 5;
 /// The event of words that stand for several.
-const FOLDED: EntryId = EntryId::MAX;
+const FOLDED: EventId = EventId::MAX;
 
 /// Changes of one kind in one namespace that are one coloured frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,8 +22,8 @@ pub struct Crowd {
     pub mark: Mark,
     /// The words on the frame: `+4 nodes`.
     pub words: String,
-    /// The headlines, sorted: places in the ledger.
-    pub entries: Vec<EntryId>,
+    /// The headlines, sorted: places in the event log.
+    pub events: Vec<EventId>,
 }
 
 /// Draws crowds as one in every window.
@@ -50,11 +50,11 @@ fn largest(
 ) -> Option<(usize, Vec<usize>, Option<usize>)> {
     let mut groups: BTreeMap<(bool, usize, usize), Vec<usize>> = BTreeMap::new();
     for (at, phrase) in frame.caption.iter().enumerate() {
-        for (name, entry) in phrase.entries.iter().enumerate() {
-            if *entry == FOLDED {
+        for (name, event) in phrase.events.iter().enumerate() {
+            if *event == FOLDED {
                 continue;
             }
-            let around = around(view, subject(mission, *entry));
+            let around = around(view, subject(mission, *event));
             // The whole graph comes after all namespaces.
             let outermost = around.first().copied().unwrap_or(usize::MAX);
             if outermost < usize::MAX {
@@ -77,10 +77,10 @@ fn largest(
             (*is_framed, stays, names.len(), order)
         });
     let ((_, at, _), names) = best?;
-    let entries = &frame.caption[at].entries;
+    let events = &frame.caption[at].events;
     let spaces = names
         .iter()
-        .map(|name| around(view, subject(mission, entries[*name])));
+        .map(|name| around(view, subject(mission, events[*name])));
     let common = spaces.reduce(|a, b| {
         let same = a.into_iter().zip(b).take_while(|(a, b)| a == b);
         same.map(|(a, _)| a).collect()
@@ -102,9 +102,9 @@ fn around(view: &View, name: &str) -> Vec<usize> {
 }
 
 /// The node that an event is about, or else the topic.
-fn subject(mission: &Mission, entry: EntryId) -> &str {
-    let entry = mission.ledger.entries.get(entry as usize);
-    let names = entry.map(|entry| mission.elements.names(entry.what));
+fn subject(mission: &Mission, event: EventId) -> &str {
+    let event = mission.log.events.get(event as usize);
+    let names = event.map(|event| mission.elements.names(event.what));
     names
         .and_then(|(node, topic)| node.or(topic))
         .unwrap_or_default()
@@ -119,27 +119,24 @@ fn fold(
     mission: &Mission,
 ) {
     let phrase = &mut frame.caption[at];
-    let first = mission
-        .ledger
-        .entries
-        .get(phrase.entries[names[0]] as usize);
-    let noun = first.map_or("changes", |entry| match (entry.kind, entry.what) {
+    let first = mission.log.events.get(phrase.events[names[0]] as usize);
+    let noun = first.map_or("changes", |event| match (event.kind, event.what) {
         (Kind::Rate, _) => "rates",
         (_, Element::Node(_)) => "nodes",
         _ => "topics",
     });
-    let mut entries: Vec<EntryId> = names.iter().map(|name| phrase.entries[*name]).collect();
+    let mut events: Vec<EventId> = names.iter().map(|name| phrase.events[*name]).collect();
     let space_name = space.map(|at| &*view.namespaces[at].name);
     let place = space_name.filter(|space| !frame.note.starts_with(space));
     let place = place.map_or_else(String::new, |space| format!(" in {space}"));
     let count = names.len();
     for name in names.iter().rev() {
         phrase.names.remove(*name);
-        phrase.entries.remove(*name);
+        phrase.events.remove(*name);
     }
     phrase.names.insert(0, format!("{count} {noun}{place}"));
-    phrase.entries.insert(0, FOLDED);
-    entries.sort_unstable();
+    phrase.events.insert(0, FOLDED);
+    events.sort_unstable();
     let (mark, sign) = match phrase.sign {
         '+' => (Mark::Added, "+"),
         '−' => (Mark::Removed, "−"),
@@ -149,7 +146,7 @@ fn fold(
         space,
         mark,
         words: format!("{sign}{count} {noun}"),
-        entries,
+        events,
     });
 }
 
@@ -165,7 +162,7 @@ impl View {
             let arrow = self.arrows.get(shown.id as usize);
             arrow.into_iter().flat_map(|arrow| [arrow.from, arrow.to])
         };
-        let is_news = |shown: &&Shown| !shown.entries.is_empty() && !frame.is_crowd(shown);
+        let is_news = |shown: &&Shown| !shown.events.is_empty() && !frame.is_crowd(shown);
         let told: BTreeSet<u32> = seen.arrows.iter().filter(is_news).flat_map(ends).collect();
         let stays = |shown: &Shown| told.contains(&shown.id).then(|| shown.clone());
         let items = seen.items.iter();
@@ -184,11 +181,11 @@ impl View {
 impl Frame {
     /// Whether all events of something are those of a crowd.
     fn is_crowd(&self, shown: &Shown) -> bool {
-        let in_crowd = |entry: &EntryId| {
+        let in_crowd = |event: &EventId| {
             let mut crowds = self.crowds.iter();
-            crowds.any(|crowd| crowd.entries.binary_search(entry).is_ok())
+            crowds.any(|crowd| crowd.events.binary_search(event).is_ok())
         };
-        !shown.entries.is_empty() && shown.entries.iter().all(in_crowd)
+        !shown.events.is_empty() && shown.events.iter().all(in_crowd)
     }
 
     /// A look without its colour, if its events are those of a crowd; `None` for something gone.

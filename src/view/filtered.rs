@@ -6,15 +6,15 @@ use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
-use crate::mission::ledger::{Detail, Entry};
-use crate::mission::{EntryId, Ledger, Mission, Window};
+use crate::mission::event_log::{Detail, Event};
+use crate::mission::{EventId, EventLog, Mission, Window};
 
 /// The mission without the elements that the view leaves out. Topics in groups and elements inside collapsed namespaces
 /// are seen, so they stay, under their own names; so do changes, as they were found in the whole graph.
 pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(mission, options);
     let mut keep = Keep::new(&mission.elements, options, &viewed);
-    let ledger = keep.ledger(&mission.ledger);
+    let log = keep.log(&mission.log);
     let windows = mission.windows.iter();
     let graphs = mission.each();
     let graphs = graphs.map(|(window, graph)| (window.span, keep.graph(&graph, options, &viewed)));
@@ -22,7 +22,7 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
         elements: keep.elements(&mission.elements),
         windows: windows.map(|w| keep.window(w)).collect(),
         graphs: graphs.collect(),
-        ledger,
+        log,
         sending: keep.sending(&mission.sending),
         ..mission.clone()
     }
@@ -34,8 +34,8 @@ struct Keep {
     topics: Vec<Option<u32>>,
     publishes: Vec<Option<u32>>,
     subscribes: Vec<Option<u32>>,
-    /// Per entry of the ledger its new place, if it stays.
-    entries: Vec<Option<EntryId>>,
+    /// Per event of the event log its new place, if it stays.
+    events: Vec<Option<EventId>>,
 }
 
 impl Keep {
@@ -58,37 +58,37 @@ impl Keep {
             subscribes: numbered(elements.subscribes.iter().map(stays)),
             nodes,
             topics,
-            entries: Vec::new(),
+            events: Vec::new(),
         }
     }
 
-    /// The entries about elements that stay. An entry that is part of one that does not stay becomes one of its own.
-    fn ledger(&mut self, all: &Ledger) -> Ledger {
-        let stays = |entry: &Entry| self.element(entry.what).is_some();
-        self.entries = numbered(all.entries.iter().map(stays));
-        let entries = all.entries.iter().filter_map(|entry| {
-            Some(Entry {
-                what: self.element(entry.what)?,
-                part_of: entry.part_of.and_then(|whole| new_id(&self.entries, whole)),
-                detail: match &entry.detail {
+    /// The events about elements that stay. An event that is part of one that does not stay becomes one of its own.
+    fn log(&mut self, all: &EventLog) -> EventLog {
+        let stays = |event: &Event| self.element(event.what).is_some();
+        self.events = numbered(all.events.iter().map(stays));
+        let events = all.events.iter().filter_map(|event| {
+            Some(Event {
+                what: self.element(event.what)?,
+                part_of: event.part_of.and_then(|whole| new_id(&self.events, whole)),
+                detail: match &event.detail {
                     Detail::Senders { from, to } => Detail::Senders {
                         from: self.kept_nodes(from),
                         to: self.kept_nodes(to),
                     },
                     other => other.clone(),
                 },
-                ..entry.clone()
+                ..event.clone()
             })
         });
-        let mut entries: Vec<Entry> = entries.collect();
-        let parts = entries.iter().filter_map(|entry| entry.part_of);
-        let mut weights = vec![1; entries.len()];
+        let mut events: Vec<Event> = events.collect();
+        let parts = events.iter().filter_map(|event| event.part_of);
+        let mut weights = vec![1; events.len()];
         parts.for_each(|whole| weights[whole as usize] += 1);
-        for (entry, weight) in entries.iter_mut().zip(weights) {
-            entry.weight = weight.min(entry.weight);
+        for (event, weight) in events.iter_mut().zip(weights) {
+            event.weight = weight.min(event.weight);
         }
-        Ledger {
-            entries,
+        EventLog {
+            events,
             phases: all.phases.clone(),
             interruptions: all.interruptions.clone(),
             compares: all.compares,
@@ -119,14 +119,14 @@ impl Keep {
     }
 
     fn window(&self, window: &Window) -> Window {
-        let told = window.changes.iter().zip(&window.entries);
-        let kept = told.filter_map(|(change, entry)| {
-            Some((self.change(change)?, new_id(&self.entries, *entry)?))
+        let told = window.changes.iter().zip(&window.events);
+        let kept = told.filter_map(|(change, event)| {
+            Some((self.change(change)?, new_id(&self.events, *event)?))
         });
-        let (changes, entries) = kept.unzip();
+        let (changes, events) = kept.unzip();
         Window {
             changes,
-            entries,
+            events,
             ..window.clone()
         }
     }

@@ -3,13 +3,13 @@
 use super::{Attendance, Counts, Crowd, Lasting};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::mission::ledger::{EntryId, Kind};
+use crate::mission::event_log::{EventId, Kind};
 
 /// An event of the log that begins in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Headline {
-    /// Its place in the ledger.
-    pub entry: EntryId,
+    /// Its place in the event log.
+    pub event: EventId,
     /// The kind of event.
     pub kind: Kind,
     /// The element it is about.
@@ -23,7 +23,7 @@ impl Headline {
     #[cfg(test)]
     pub(crate) fn started() -> Self {
         Self {
-            entry: 0,
+            event: 0,
             kind: Kind::Started,
             what: Element::Node(0),
             time: Stamp(0),
@@ -40,8 +40,8 @@ pub struct Phrase {
     pub lead: String,
     /// The names, one per event.
     pub names: Vec<String>,
-    /// The event of each name: places in the ledger.
-    pub entries: Vec<EntryId>,
+    /// The event of each name: places in the event log.
+    pub events: Vec<EventId>,
     /// The words after the names: `start`.
     pub tail: String,
 }
@@ -78,7 +78,7 @@ pub struct Frame {
     /// For each namespace that stands for several, in the order of [`View::namespaces`](super::View::namespaces), the
     /// presence of each of them.
     pub rolls: Vec<Vec<Attendance>>,
-    /// The events that begin in it, in the order of the ledger. Headline, marks and timeline are all made from these.
+    /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
     pub headlines: Vec<Headline>,
     /// The events of earlier windows that last into it or end in it: marked and in words, but counted once, where they
     /// begin.
@@ -125,9 +125,9 @@ impl Frame {
     }
 
     /// The events that it reports: the ids of those that begin in it, and of those that last.
-    pub fn entries(&self) -> impl Iterator<Item = EntryId> {
-        let lasting = self.lasting.iter().map(|l| l.entry);
-        self.headlines.iter().map(|h| h.entry).chain(lasting)
+    pub fn events(&self) -> impl Iterator<Item = EventId> {
+        let lasting = self.lasting.iter().map(|l| l.event);
+        self.headlines.iter().map(|h| h.event).chain(lasting)
     }
 
     /// The caption in at most `most` phrases of three names each, the rest counted: `− a stops; + b starts; +3`.

@@ -1,4 +1,4 @@
-//! The windows one after the other, each with the headlines of the ledger in it.
+//! The windows one after the other, each with the headlines of the event log in it.
 
 use super::bundles::beginning;
 use super::caption::Speaker;
@@ -79,13 +79,13 @@ fn join_empty(frames: &mut [Frame]) {
     }
 }
 
-/// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before, or
+/// For each window, whether it is the first, or an event of the event log begins or ends in it or in the window before, or
 /// the first message of a topic comes: in all others everything stays as it is.
 fn turns(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
     let mut turns = vec![false; windows.len()];
-    let entries = mission.ledger.entries.iter();
-    let times = entries.flat_map(|entry| [Some(entry.time), entry.until]);
+    let events = mission.log.events.iter();
+    let times = events.flat_map(|event| [Some(event.time), event.until]);
     let first = mission.elements.topics.iter().map(|topic| topic.first);
     for time in times.chain(first).flatten() {
         let from = windows.partition_point(|w| w.span.end <= time);
@@ -168,8 +168,8 @@ impl<'a> ShownWindows<'a> {
             mission,
             viewed,
             lives: ItemTurns::new(mission),
-            parts: mission.ledger.all_parts(),
-            lasting: LastingEvents::new(&mission.ledger, viewed),
+            parts: mission.log.all_parts(),
+            lasting: LastingEvents::new(&mission.log, viewed),
             beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
@@ -205,7 +205,7 @@ impl<'a> ShownWindows<'a> {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
             news: News::new(
-                &self.mission.ledger,
+                &self.mission.log,
                 (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),
                 self.viewed,
@@ -249,7 +249,7 @@ impl<'a> ShownWindows<'a> {
             let shown = shown.and_then(|shown| {
                 let news = &self.turn.news;
                 let ends = [arrow.from, arrow.to].map(|id| news.items.get(&id));
-                let ends = ends.map(|told| told.map(|told| (told.mark, &told.entries[..])));
+                let ends = ends.map(|told| told.map(|told| (told.mark, &told.events[..])));
                 let told = news.arrows.get(&id).cloned();
                 let told = told.or_else(|| with_ends((true, true), ends));
                 marked(shown, (true, true), told.as_ref())
@@ -404,7 +404,7 @@ mod tests {
         };
         let windows = ["/a>/t~ /b</t~ /c>/t", "/a>/t~ /b</t~"];
         assert_eq!(seen(&windows, &options)[0], "/a /b /c /t /c>/t /t>/b");
-        // Silence has no sign: the ledger has no entry for an end.
+        // Silence has no sign: the event log has no event for an end.
         assert_eq!(seen(&windows, &options)[1], "/a /b -/c");
     }
 

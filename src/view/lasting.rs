@@ -3,15 +3,15 @@
 use super::items::Viewed;
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::mission::ledger::{Entry, EntryId, Kind, Ledger};
+use crate::mission::event_log::{Event, EventId, EventLog, Kind};
 
 /// An event of an earlier window that lasts into this one or ends in it: a node is away, or something is back.
 ///
 /// A silence without a proof of an absence is listed where it ends only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lasting {
-    /// Its place in the ledger.
-    pub entry: EntryId,
+    /// Its place in the event log.
+    pub event: EventId,
     /// The element it is about.
     pub what: Element,
     /// Its beginning.
@@ -35,8 +35,8 @@ pub(crate) enum Part {
 
 impl Part {
     /// The part of an event that lies in the window in which it begins.
-    pub(crate) fn of(entry: &Entry, window: Span) -> Self {
-        let leaves = entry.kind == Kind::Restarted && entry.until.is_some_and(|t| t >= window.end);
+    pub(crate) fn of(event: &Event, window: Span) -> Self {
+        let leaves = event.kind == Kind::Restarted && event.until.is_some_and(|t| t >= window.end);
         if leaves { Self::Leaves } else { Self::Whole }
     }
 }
@@ -54,7 +54,7 @@ impl Lasting {
 /// The events that last, from window to window.
 pub(crate) struct LastingEvents<'a> {
     /// Those with an end, in the order of their beginnings.
-    all: Vec<(EntryId, &'a Entry)>,
+    all: Vec<(EventId, &'a Event)>,
     /// The first of them that begins in or after the present window.
     next: usize,
     /// The places of those that began before it and do not end before it.
@@ -62,13 +62,13 @@ pub(crate) struct LastingEvents<'a> {
 }
 
 impl<'a> LastingEvents<'a> {
-    pub(crate) fn new(ledger: &'a Ledger, viewed: &Viewed) -> Self {
-        let lasts = |entry: &Entry| {
-            entry.until.is_some_and(|until| until > entry.time)
-                && entry.is_headline()
-                && viewed.sees(entry.what)
+    pub(crate) fn new(log: &'a EventLog, viewed: &Viewed) -> Self {
+        let lasts = |event: &Event| {
+            event.until.is_some_and(|until| until > event.time)
+                && event.is_headline()
+                && viewed.sees(event.what)
         };
-        let all = (0..).zip(&ledger.entries).filter(|(_, entry)| lasts(entry));
+        let all = (0..).zip(&log.events).filter(|(_, event)| lasts(event));
         Self {
             all: all.collect(),
             next: 0,
@@ -87,11 +87,11 @@ impl<'a> LastingEvents<'a> {
         let end = |at: usize| all[at].1.until.unwrap_or(window.start);
         self.open.retain(|at| end(*at) >= window.start);
         let lasting = self.open.iter().filter_map(|at| {
-            let (entry, event) = all[*at];
+            let (id, event) = all[*at];
             let ended = Some(end(*at)).filter(|end| *end < window.end);
             let is_told = ended.is_some() || event.kind == Kind::Restarted;
             is_told.then_some(Lasting {
-                entry,
+                event: id,
                 what: event.what,
                 since: event.time,
                 ended,

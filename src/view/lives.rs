@@ -1,12 +1,12 @@
-//! The lives of elements by the ledger: one without a beginning in it was there before, one without an end stays.
+//! The lives of elements by the event log: one without a beginning in it was there before, one without an end stays.
 //!
 //! The picture follows from these and not from the messages that fall into a window, so that nothing comes, goes or
-//! changes its look without an entry.
+//! changes its look without an event.
 
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, Element, Elements, PerElement};
 use crate::mission::Mission;
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 /// Beginnings and ends in continuous time.
 pub(crate) struct ItemTurns<'a> {
@@ -27,29 +27,29 @@ impl<'a> ItemTurns<'a> {
             turns: PerElement::new(&mission.elements, |_| Vec::new()),
             pauses: PerElement::new(&mission.elements, |_| Vec::new()),
         };
-        let entries = &mission.ledger.entries;
-        for entry in entries {
+        let events = &mission.log.events;
+        for event in events {
             // A part is reported with its whole, so that it comes and goes with it. What restarts keeps its parts; of a
             // role one run ends there and the next one begins, without which each of them would live all the time.
-            let whole = entry.part_of.and_then(|id| entries.get(id as usize));
+            let whole = event.part_of.and_then(|id| events.get(id as usize));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
-            if is_kept && !matches!(entry.what, Element::Node(_)) {
+            if is_kept && !matches!(event.what, Element::Node(_)) {
                 continue;
             }
-            let begins = match entry.kind {
+            let begins = match event.kind {
                 Kind::Started | Kind::Appeared => true,
                 Kind::Stopped | Kind::Vanished => false,
                 Kind::Restarted | Kind::Silent => {
-                    let (start, end) = (entry.time, entry.until.unwrap_or(entry.time));
-                    if let Some(pauses) = lives.pauses.of_mut(entry.what) {
+                    let (start, end) = (event.time, event.until.unwrap_or(event.time));
+                    if let Some(pauses) = lives.pauses.of_mut(event.what) {
                         pauses.push(Span::new(start, end));
                     }
                     continue;
                 }
                 _ => continue,
             };
-            let turn = (whole.unwrap_or(entry).time, begins);
-            if let Some(turns) = lives.turns.of_mut(entry.what) {
+            let turn = (whole.unwrap_or(event).time, begins);
+            if let Some(turns) = lives.turns.of_mut(event.what) {
                 turns.push(turn);
             }
         }

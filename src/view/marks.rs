@@ -1,4 +1,4 @@
-//! The marks of a window: the entries of the ledger in it, gathered by item and arrow of the picture.
+//! The marks of a window: the events of the event log in it, gathered by item and arrow of the picture.
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use super::lasting::Part;
 use super::{Headline, ItemKind, Lasting, Mark};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::mission::Ledger;
-use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
+use crate::mission::EventLog;
+use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
 /// The news of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
@@ -21,11 +21,11 @@ pub(crate) struct Told {
     /// Messages per second before and after.
     pub(crate) rates: Option<(f64, f64)>,
     /// The headlines behind the mark, sorted.
-    pub(crate) entries: Vec<EntryId>,
+    pub(crate) events: Vec<EventId>,
 }
 
-/// The parts of each headline, by their places in the ledger.
-pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
+/// The parts of each headline, by their places in the event log.
+pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// The news of one window by the id of the item or arrow.
 #[derive(Default)]
@@ -41,35 +41,35 @@ impl News {
     /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is no
     /// news.
     pub(crate) fn new(
-        ledger: &Ledger,
+        log: &EventLog,
         (parts, beginning): (&Parts, Option<Stamp>),
         (span, lasting): (Span, Vec<Lasting>),
         viewed: &Viewed,
     ) -> Self {
         let mut news = Self::default();
         for last in &lasting {
-            if let Some(entry) = ledger.entries.get(last.entry as usize) {
-                news.tell(viewed, entry, last.entry, last.part());
+            if let Some(event) = log.events.get(last.event as usize) {
+                news.tell(viewed, event, last.event, last.part());
             }
         }
         news.lasting = lasting;
-        for (id, entry) in ledger.headlines(span) {
-            let is_start = matches!(entry.kind, Kind::Started | Kind::Appeared);
-            let is_first = is_start && beginning.is_some_and(|end| entry.time < end);
-            if is_first || !viewed.sees(entry.what) {
+        for (id, event) in log.headlines(span) {
+            let is_start = matches!(event.kind, Kind::Started | Kind::Appeared);
+            let is_first = is_start && beginning.is_some_and(|end| event.time < end);
+            if is_first || !viewed.sees(event.what) {
                 continue;
             }
             news.headlines.push(Headline {
-                entry: id,
-                kind: entry.kind,
-                what: entry.what,
-                time: entry.time,
+                event: id,
+                kind: event.kind,
+                what: event.what,
+                time: event.time,
             });
-            news.tell(viewed, entry, id, Part::of(entry, span));
+            news.tell(viewed, event, id, Part::of(event, span));
             // A return has its own mark.
-            let parts = parts.get(&id).filter(|_| entry.kind != Kind::Restarted);
+            let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
-                if let Some(part) = ledger.entries.get(*part as usize) {
+                if let Some(part) = log.events.get(*part as usize) {
                     news.tell(viewed, part, id, Part::Whole);
                 }
             }
@@ -77,10 +77,10 @@ impl News {
         news
     }
 
-    fn tell(&mut self, viewed: &Viewed, entry: &Entry, headline: EntryId, part: Part) {
-        let sign = EntrySign::of(entry, headline, part);
-        self.add(viewed, entry.what, &sign);
-        match (&entry.detail, entry.what) {
+    fn tell(&mut self, viewed: &Viewed, event: &Event, headline: EventId, part: Part) {
+        let sign = EventSign::of(event, headline, part);
+        self.add(viewed, event.what, &sign);
+        match (&event.detail, event.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
                 for node in from.iter().chain(to) {
                     if let Ok(edge) = viewed.published.binary_search(&(*node, topic)) {
@@ -90,7 +90,7 @@ impl News {
                 }
             }
             (Detail::Rates { .. }, Element::Publish(edge)) => {
-                self.add_carriers(viewed, entry.what, &sign);
+                self.add_carriers(viewed, event.what, &sign);
                 let topic = viewed.published.get(edge as usize);
                 let topic = topic.map(|(_, topic)| Element::Topic(*topic));
                 if let Some(topic) = topic.filter(|t| viewed.has_single_sender(*t)) {
@@ -98,15 +98,15 @@ impl News {
                 }
             }
             (Detail::Rates { .. }, Element::Topic(_))
-                if viewed.has_single_sender(entry.what) || !viewed.pairs.is_empty() =>
+                if viewed.has_single_sender(event.what) || !viewed.pairs.is_empty() =>
             {
-                self.add_carriers(viewed, entry.what, &sign);
+                self.add_carriers(viewed, event.what, &sign);
             }
             _ => {}
         }
     }
 
-    fn add(&mut self, viewed: &Viewed, what: Element, sign: &EntrySign) {
+    fn add(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
         let item = |items: &[Option<u32>], id: u32| items.get(id as usize).copied().flatten();
         let place = match what {
             Element::Node(id) => item(&viewed.node, id).map(EdgePlace::Item),
@@ -128,14 +128,14 @@ impl News {
     }
 
     /// Marks the arrows that carry a topic or publication.
-    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &EntrySign) {
+    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
         for id in viewed.carriers.get(&what).into_iter().flatten() {
             sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
     }
 }
 
-/// The relation of the element of an entry to its box or arrow.
+/// The relation of the element of an event to its box or arrow.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
     /// It is the only one in it.
@@ -175,20 +175,20 @@ impl Reach {
     }
 }
 
-/// The effect of one entry on the item or arrow that it is reported on.
-struct EntrySign {
+/// The effect of one event on the item or arrow that it is reported on.
+struct EventSign {
     kind: Kind,
     part: Part,
     rates: Option<(f64, f64)>,
-    headline: EntryId,
+    headline: EventId,
 }
 
-impl EntrySign {
-    fn of(entry: &Entry, headline: EntryId, part: Part) -> Self {
+impl EventSign {
+    fn of(event: &Event, headline: EventId, part: Part) -> Self {
         Self {
-            kind: entry.kind,
+            kind: event.kind,
             part,
-            rates: match entry.detail {
+            rates: match event.detail {
                 Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
                 _ => None,
             },
@@ -218,13 +218,13 @@ impl EntrySign {
         }
     }
 
-    /// Notes the entry for an item or arrow; of several marks on the same one, the more telling one stays.
+    /// Notes the event for an item or arrow; of several marks on the same one, the more telling one stays.
     fn keep(&self, all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach) {
         let told = all.entry(id).or_default();
         told.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
         told.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
-        if let Err(place) = told.entries.binary_search(&self.headline) {
-            told.entries.insert(place, self.headline);
+        if let Err(place) = told.events.binary_search(&self.headline) {
+            told.events.insert(place, self.headline);
         }
         let mark = self.mark(reach);
         if mark.map(weight) > told.mark.map(weight) {

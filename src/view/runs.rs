@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Serialize, Serializer};
 
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, Mark, Showing, Shown, TopicRow, View};
 
@@ -109,7 +109,7 @@ impl Runs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct LookClass {
     state: State,
-    degree: Degree,
+    confidence: Confidence,
     mark: Option<Mark>,
     /// The step of an arrow's thickness, 0..=[`STEPS`]; 0 for items.
     step: u8,
@@ -119,7 +119,7 @@ impl LookClass {
     fn of(shown: &Shown, arrow: Option<&Arrow>) -> Self {
         Self {
             state: shown.state,
-            degree: shown.degree,
+            confidence: shown.confidence,
             mark: shown.mark,
             step: arrow.map_or(0, |arrow| width_step(arrow.flow(shown))),
         }
@@ -127,8 +127,8 @@ impl LookClass {
 
     fn words(self) -> String {
         let mut words = vec![self.state.word().to_owned()];
-        if self.degree != Degree::Measured {
-            words.push(self.degree.word().to_owned());
+        if self.confidence != Confidence::Measured {
+            words.push(self.confidence.word().to_owned());
         }
         if let Some(mark) = self.mark {
             words.push(mark.class().to_owned());
@@ -328,7 +328,7 @@ mod tests {
                 mark,
                 hz: Some(hz),
                 steady_hz: Some(hz),
-                ..Shown::plain(0, State::Active, Degree::Measured)
+                ..Shown::plain(0, State::Active, Confidence::Measured)
             })
         };
         let story: Vec<_> = story.iter().map(shown).collect();

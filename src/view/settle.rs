@@ -1,13 +1,13 @@
-//! Looks that do not flicker: between two entries of the ledger, an element keeps its state, the thickness of its rate,
+//! Looks that do not flicker: between two events of the event log, an element keeps its state, the thickness of its rate,
 //! and the number that is written as long as chance alone may make the difference.
 
 use super::showing::{Showing, ShowingWriter};
 use super::{Mark, Shown};
 use crate::base::time::Span;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 
-/// The length of all windows before each, in nanoseconds; the last entry is the length of all.
+/// The length of all windows before each, in nanoseconds; the last event is the length of all.
 pub(crate) struct Lengths(Vec<i64>);
 
 impl Lengths {
@@ -35,7 +35,7 @@ impl Lengths {
 /// The facts gathered so far about an element's present life.
 #[derive(Clone, Copy, Default)]
 struct PresentLife {
-    look: Option<(State, Degree)>,
+    look: Option<(State, Confidence)>,
     /// Messages and nanoseconds since its rate last changed.
     sent: (f64, f64),
     is_measured: bool,
@@ -49,17 +49,17 @@ struct LookRun<'a> {
     to: u32,
     place: u32,
     shown: &'a Shown,
-    /// Its state, its degree and its average rate, settled.
-    look: (State, Degree),
+    /// Its state, its confidence and its average rate, settled.
+    look: (State, Confidence),
     steady_hz: Option<f64>,
     held: Option<(f64, Option<u64>)>,
 }
 
-/// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest degree, and its average rate
+/// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest confidence, and its average rate
 /// between two changes of it.
 ///
 /// A topic with a message per minute is equally alive in the seconds in between; only a pause
-/// that the ledger knows is drawn as one.
+/// that the event log knows is drawn as one.
 pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
     let mut runs = runs(raw, lengths.windows());
     let mut life = PresentLife::default();
@@ -97,7 +97,7 @@ fn runs(raw: &Showing, windows: u32) -> Vec<LookRun<'_>> {
             to,
             place,
             shown,
-            look: (shown.state, shown.degree),
+            look: (shown.state, shown.confidence),
             steady_hz: None,
             held: None,
         })
@@ -173,10 +173,10 @@ fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
         let at = run.place as usize;
         places.resize(places.len().max(at + 1), None);
         let place = *places[at].get_or_insert_with(|| {
-            let (state, degree) = run.look;
+            let (state, confidence) = run.look;
             writer.look(Shown {
                 state,
-                degree,
+                confidence,
                 steady_hz: run.steady_hz,
                 held: run.held,
                 ..run.shown.clone()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Mark, Members, Shown, sum};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 
 /// A topic on a line between two boxes in a window, or several that are shown as one.
@@ -104,7 +104,7 @@ impl Showing {
         &self.runs
     }
 
-    /// The looks in the windows of a sequence, one entry per window.
+    /// The looks in the windows of a sequence, one event per window.
     pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
         let mut writer = ShowingWriter::default();
         for (window, shown) in (0..).zip(windows) {
@@ -128,7 +128,7 @@ const FEW: usize = 4;
 
 /// The properties that distinguish looks without marks.
 type LookKey = (
-    (State, Degree, bool, bool),
+    (State, Confidence, bool, bool),
     [Option<u64>; 3],
     (usize, Members),
     Vec<RowKey>,
@@ -194,7 +194,12 @@ impl ShowingWriter {
 fn key(shown: &Shown) -> LookKey {
     let bits = |hz: Option<f64>| hz.map(f64::to_bits);
     (
-        (shown.state, shown.degree, shown.is_paused, shown.is_starved),
+        (
+            shown.state,
+            shown.confidence,
+            shown.is_paused,
+            shown.is_starved,
+        ),
         [bits(shown.hz), bits(shown.steady_hz), shown.count],
         (shown.each, shown.members),
         shown.topics.iter().map(TopicRow::key).collect(),
@@ -231,7 +236,7 @@ mod tests {
         Some(Shown {
             hz: Some(hz),
             mark,
-            ..Shown::plain(7, State::Active, Degree::Measured)
+            ..Shown::plain(7, State::Active, Confidence::Measured)
         })
     }
 

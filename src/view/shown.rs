@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{Counts, TopicRow};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::mission::ledger::EntryId;
+use crate::mission::event_log::EventId;
 
 /// The sum of two numbers of which one, or both, may be unknown.
 pub(super) fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Option<T> {
@@ -76,7 +76,7 @@ pub struct Shown {
     /// Its state; for a ghost, the last one before its end.
     pub state: State,
     /// The strength of the evidence for it.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// Its change in the window, if any.
     pub mark: Option<Mark>,
     /// Messages per second in the window, if known (0 for a ghost).
@@ -88,13 +88,13 @@ pub struct Shown {
     pub held: Option<(f64, Option<u64>)>,
     /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
-    /// Whether it is silent or away all through the window, with a beginning and an end in the ledger, or no message
+    /// Whether it is silent or away all through the window, with a beginning and an end in the event log, or no message
     /// came yet.
     pub is_paused: bool,
     /// Whether the receiver gets nothing, as the qualities of service do not match.
     pub is_starved: bool,
-    /// The headlines behind `mark`, sorted: places in the ledger.
-    pub entries: Vec<EntryId>,
+    /// The headlines behind `mark`, sorted: places in the event log.
+    pub events: Vec<EventId>,
     /// The topics that a bundle carries, sorted by their places; empty for all else.
     pub topics: Vec<TopicRow>,
     /// The number of equal namespaces it stands for in the window; 0 for all else.
@@ -132,11 +132,11 @@ impl Members {
 
 impl Shown {
     /// An element of which nothing more is known.
-    pub fn plain(id: u32, state: State, degree: Degree) -> Self {
+    pub fn plain(id: u32, state: State, confidence: Confidence) -> Self {
         Self {
             id,
             state,
-            degree,
+            confidence,
             mark: None,
             hz: None,
             steady_hz: None,
@@ -144,7 +144,7 @@ impl Shown {
             rates: None,
             is_paused: false,
             is_starved: false,
-            entries: Vec::new(),
+            events: Vec::new(),
             topics: Vec::new(),
             each: 0,
             members: Members::default(),

@@ -6,26 +6,26 @@ use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
 use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions, sum};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
-use crate::mission::ledger::{Entry, Kind};
-use crate::mission::{EntryId, Mission};
+use crate::mission::event_log::{Event, Kind};
+use crate::mission::{EventId, Mission};
 
-/// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
+/// Takes in an element of an item or arrow: the liveliest state and the strongest confidence count, rates and counts are
 /// summed.
 fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
-    let (state, degree) = (one.state, one.degree);
+    let (state, confidence) = (one.state, one.confidence);
     let shown = slot.get_or_insert_with(|| Shown {
         is_paused: true,
         is_starved: true,
-        ..Shown::plain(id, state, degree)
+        ..Shown::plain(id, state, confidence)
     });
     // Those that are there and send nothing would water down the rate of each.
     shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
     shown.is_paused &= one.is_paused;
     shown.is_starved &= one.is_starved;
     shown.state = shown.state.min(state);
-    shown.degree = shown.degree.min(degree);
+    shown.confidence = shown.confidence.min(confidence);
     shown.hz = sum(shown.hz, one.hz, |a, b| a + b);
     shown.count = sum(shown.count, one.count, u64::saturating_add);
 }
@@ -34,7 +34,7 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
 #[derive(Clone, Copy)]
 struct One {
     state: State,
-    degree: Degree,
+    confidence: Confidence,
     hz: Option<f64>,
     count: Option<u64>,
     is_paused: bool,
@@ -45,17 +45,17 @@ impl One {
     /// An element that is alive without a message in the window.
     const UNHEARD: Self = Self {
         state: State::Silent,
-        degree: Degree::Declared,
+        confidence: Confidence::Declared,
         hz: None,
         count: None,
         is_paused: false,
         is_starved: false,
     };
 
-    fn new(state: State, degree: Degree) -> Self {
+    fn new(state: State, confidence: Confidence) -> Self {
         Self {
             state,
-            degree,
+            confidence,
             ..Self::UNHEARD
         }
     }
@@ -182,7 +182,7 @@ impl<'a> Now<'a> {
         let heard = |row: &Row| One {
             hz: row.hz(self.span),
             count: row.count,
-            ..One::new(row.state, row.degree)
+            ..One::new(row.state, row.confidence)
         };
         alive.is(what).then(|| {
             let row = self.rows.of(what).and_then(Option::as_ref);
@@ -366,7 +366,7 @@ impl<'a> Now<'a> {
             let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
             let joined = One {
                 state: p.state.max(s.state),
-                degree: p.degree.max(s.degree),
+                confidence: p.confidence.max(s.confidence),
                 hz: p.hz.or_else(|| topic.and_then(|t| t.hz)),
                 count: p.count,
                 is_paused: p.is_paused,
@@ -407,8 +407,8 @@ impl<'a> Now<'a> {
     }
 
     /// An event of the log.
-    pub(crate) fn entry(&self, id: EntryId) -> Option<&Entry> {
-        self.mission.ledger.entries.get(id as usize)
+    pub(crate) fn event(&self, id: EventId) -> Option<&Event> {
+        self.mission.log.events.get(id as usize)
     }
 
     /// Whether the options hide elements without messages in a window.
@@ -444,14 +444,14 @@ impl<'a> Now<'a> {
 
 /// The subscriptions that get nothing according to the event log: from that event to the end of the subscription.
 fn starved(mission: &Mission) -> Vec<(Element, Span)> {
-    let entries = mission.ledger.entries.iter();
-    let entries = entries.filter(|entry| entry.kind == Kind::Starved);
-    let edges = entries.filter(|entry| matches!(entry.what, Element::Subscribe(_)));
-    let lasts = |entry: &Entry| {
-        let mut runs = mission.elements.runs(entry.what).iter();
-        let run = runs.find(|run| run.contains(entry.time));
+    let events = mission.log.events.iter();
+    let events = events.filter(|event| event.kind == Kind::Starved);
+    let edges = events.filter(|event| matches!(event.what, Element::Subscribe(_)));
+    let lasts = |event: &Event| {
+        let mut runs = mission.elements.runs(event.what).iter();
+        let run = runs.find(|run| run.contains(event.time));
         let end = run.map_or(mission.span.end, |run| run.end);
-        (entry.what, Span::new(entry.time, end))
+        (event.what, Span::new(event.time, end))
     };
     edges.map(lasts).collect()
 }

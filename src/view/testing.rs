@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
     Edge, EdgeState, Elements, Graph, Measures, Node, NodeState, State, Topic, TopicState,
 };
@@ -29,7 +29,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         partial: false,
         messages: 0,
         changes: Vec::new(),
-        entries: Vec::new(),
+        events: Vec::new(),
     });
     let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();
@@ -43,7 +43,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         elements,
         windows,
         graphs,
-        ledger: crate::mission::Ledger::default(),
+        log: crate::mission::EventLog::default(),
         sending: crate::graph::history::Sending::default(),
         layout: None,
         notices: Notices::new(),
@@ -173,7 +173,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             graph.nodes.push(NodeState {
                 id,
                 state,
-                degree: Degree::Measured,
+                confidence: Confidence::Measured,
                 hz,
                 lifecycle: None,
             });
@@ -190,7 +190,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             graph.topics.push(TopicState {
                 id,
                 state,
-                degree: Degree::Measured,
+                confidence: Confidence::Measured,
                 count: count(hz).unwrap_or(0),
                 bytes: None,
                 hz,
@@ -217,7 +217,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
                 word(edge).map(|w| EdgeState {
                     id,
                     state: w.state,
-                    degree: Degree::Measured,
+                    confidence: Confidence::Measured,
                     count: count(w.hz),
                     hz: w.hz,
                     bytes: None,

@@ -4,7 +4,7 @@ use super::items::Viewed;
 use super::marks::{News, Told};
 use super::state::{LivingItems, Now};
 use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
-use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
+use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
 /// The items and arrows there before and after a window, and the news in between.
 #[derive(Default)]
@@ -59,7 +59,7 @@ impl WindowTurn {
             let is_kept = ends.iter().any(is_back);
             let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
             let told = self.news.arrows.get(&id).cloned();
-            let ends = ends.map(|end| Some((end.mark, &end.entries[..])));
+            let ends = ends.map(|end| Some((end.mark, &end.events[..])));
             let told = told.or_else(|| with_ends(there, ends));
             let shown = marked(shown, there, told.as_ref())?;
             if arrow.kind != ArrowKind::Bundle {
@@ -96,10 +96,10 @@ impl WindowTurn {
                 (true, false) => row.mark = Some(Mark::Removed),
                 _ => {
                     let name = &arrow.topics[row.topic as usize];
-                    for entry in shown.entries.iter().filter_map(|id| now.entry(*id)) {
-                        let topic = viewed.topic_of(entry.what);
+                    for event in shown.events.iter().filter_map(|id| now.event(*id)) {
+                        let topic = viewed.topic_of(event.what);
                         if topic.is_some_and(|topic| viewed.bundled[topic as usize] == *name) {
-                            (row.mark, row.rates) = changed(entry);
+                            (row.mark, row.rates) = changed(event);
                         }
                     }
                 }
@@ -111,14 +111,14 @@ impl WindowTurn {
     /// The number of headlines reported on a folded namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let told = self.news.headlines.iter();
-        let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));
+        let counts = Counts::of(told.filter(|h| shown.events.binary_search(&h.event).is_ok()));
         (counts.total() > 0).then(|| Box::new(counts))
     }
 }
 
 /// The mark of a topic of a bundle for an event, with its rates before and after.
-fn changed(entry: &Entry) -> (Option<Mark>, Option<(f64, f64)>) {
-    match (entry.kind, &entry.detail) {
+fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
+    match (event.kind, &event.detail) {
         (_, Detail::Rates { from_hz, to_hz }) => {
             let mark = if to_hz > from_hz {
                 Mark::Faster
@@ -137,7 +137,7 @@ fn changed(entry: &Entry) -> (Option<Mark>, Option<(f64, f64)>) {
 /// before and is there after.
 pub(super) fn with_ends(
     there: (bool, bool),
-    ends: [Option<(Option<Mark>, &[EntryId])>; 2],
+    ends: [Option<(Option<Mark>, &[EventId])>; 2],
 ) -> Option<Told> {
     let marks: &[Mark] = match there {
         (false, true) => &[Mark::Added],
@@ -147,18 +147,18 @@ pub(super) fn with_ends(
     };
     let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
     let mut ends = ends.into_iter().flatten();
-    let (mark, entries) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
+    let (mark, events) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
     Some(Told {
         came: mark == Mark::Added,
         went: mark == Mark::Removed,
         mark: Some(mark).filter(|_| there == (true, true)),
-        entries: entries.to_vec(),
+        events: events.to_vec(),
         ..Told::default()
     })
 }
 
 /// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
-/// entry.
+/// event.
 pub(super) fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
     let Some(told) = told else {
         return there.1.then_some(shown);
@@ -179,7 +179,7 @@ pub(super) fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> 
         rates: told
             .rates
             .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
-        entries: told.entries.clone(),
+        events: told.events.clone(),
         ..shown
     })
 }

@@ -61,7 +61,7 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
             mark: None,
             hz: shown.hz.map(|hz| hz * length),
             rates: None,
-            entries: Vec::new(),
+            events: Vec::new(),
             inside: None,
             lifecycle: None,
             count,
@@ -76,7 +76,7 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
         }
     }
     sum.state = sum.state.min(shown.state);
-    sum.degree = sum.degree.min(shown.degree);
+    sum.confidence = sum.confidence.min(shown.confidence);
     sum.is_starved &= shown.is_starved;
     sum.hz = added(sum.hz, shown.hz.map(|hz| hz * length), |a, b| a + b);
     sum.count = added(sum.count, count, u64::saturating_add);

@@ -7,7 +7,7 @@ use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::scene::Stroke;
-use crate::mission::ledger::Phase;
+use crate::mission::event_log::Phase;
 
 /// The height of the band in millimetres.
 pub(crate) const HEIGHT: f64 = 3.3;

@@ -5,7 +5,7 @@ use crate::base::words::visible;
 use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
-use crate::mission::EntryId;
+use crate::mission::EventId;
 
 /// No line of a page has room for a text of more characters than this; what is behind them is not measured.
 const LONGEST: usize = 1000;
@@ -106,9 +106,9 @@ impl<'a> PaperCanvas<'a> {
 
     /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about
     /// them is its title.
-    pub(crate) fn begin_mark(&mut self, class: &str, entries: &[EntryId], title: String) {
+    pub(crate) fn begin_mark(&mut self, class: &str, events: &[EventId], title: String) {
         let id = format!("{class}-{}", self.groups.len());
-        self.open(&id, class, entry_data(entries));
+        self.open(&id, class, event_data(events));
         if let Some(group) = self.group() {
             group.title = title;
         }
@@ -118,19 +118,19 @@ impl<'a> PaperCanvas<'a> {
     pub(crate) fn begin_box<'n>(
         &mut self,
         names: impl Iterator<Item = &'n str>,
-        entries: &[EntryId],
+        events: &[EventId],
     ) {
         let id = format!("node-{}", self.groups.len());
         let names: Vec<String> = names.map(|name| visible(name).into_owned()).collect();
         let name = vec![("name", names.join(" "))];
-        self.open(&id, "node", [name, entry_data(entries)].concat());
+        self.open(&id, "node", [name, event_data(events)].concat());
     }
 
     /// Begins the group of a step: its number, counted from 1, and the events of the log in it.
-    pub(crate) fn begin_step(&mut self, number: usize, entries: &[EntryId]) {
+    pub(crate) fn begin_step(&mut self, number: usize, events: &[EventId]) {
         let id = format!("step-{number}");
         let step = vec![("step", number.to_string())];
-        self.open(&id, &id, [step, entry_data(entries)].concat());
+        self.open(&id, &id, [step, event_data(events)].concat());
     }
 
     fn open(&mut self, id: &str, class: &str, data: Vec<(&'static str, String)>) {
@@ -308,8 +308,8 @@ impl<'a> PaperCanvas<'a> {
 
 /// The attribute of a mark that names the events of the log it stands for: `data-entry` for one, `data-entries` for
 /// several.
-pub(crate) fn entry_data(entries: &[EntryId]) -> Vec<(&'static str, String)> {
-    match entries {
+pub(crate) fn event_data(events: &[EventId]) -> Vec<(&'static str, String)> {
+    match events {
         [] => Vec::new(),
         [one] => vec![("entry", one.to_string())],
         all => {

@@ -11,8 +11,8 @@ use super::tracks::{SendingBar, Track, TrackLife};
 use crate::base::name::last_part;
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
-use crate::mission::EntryId;
-use crate::mission::ledger::{Entry, Kind, Phase};
+use crate::mission::EventId;
+use crate::mission::event_log::{Event, Kind, Phase};
 
 /// The course of a mission below its picture: the phases, and a row per group of nodes that come and go together.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +44,7 @@ pub(crate) struct CourseRow {
 pub(crate) struct CourseMark {
     pub(crate) at: Stamp,
     pub(crate) sign: Sign,
-    pub(crate) entries: Vec<EntryId>,
+    pub(crate) events: Vec<EventId>,
 }
 
 /// The part of the mission, one in this many, within which starts, or ends, are drawn as one.
@@ -143,12 +143,12 @@ fn row(lives: &LivesFigure<'_>, tracks: &[usize], signs: &[RowMark]) -> CourseRo
             Some(other) => {
                 let is_later = (other.sign == Sign::End) == (mark.at > other.at);
                 other.at = if is_later { mark.at } else { other.at };
-                other.entries.push(mark.entry);
+                other.events.push(mark.event);
             }
             None => marks.push(CourseMark {
                 at: mark.at,
                 sign: mark.sign,
-                entries: vec![mark.entry],
+                events: vec![mark.event],
             }),
         }
     }
@@ -161,17 +161,17 @@ fn row(lives: &LivesFigure<'_>, tracks: &[usize], signs: &[RowMark]) -> CourseRo
 
 /// The events of the log without a row.
 fn unplaced(source: &FigureSource<'_>, signs: &[RowMark]) -> Vec<CourseMark> {
-    let placed: BTreeSet<EntryId> = signs.iter().map(|s| s.entry).collect();
-    let all = source.mission.ledger.headlines(source.span());
+    let placed: BTreeSet<EventId> = signs.iter().map(|s| s.event).collect();
+    let all = source.mission.log.headlines(source.span());
     let others = all.filter(|(id, _)| !placed.contains(id));
-    let mark = |(id, entry): (EntryId, &Entry)| CourseMark {
-        at: entry.time,
-        sign: match entry.kind {
+    let mark = |(id, event): (EventId, &Event)| CourseMark {
+        at: event.time,
+        sign: match event.kind {
             Kind::Started | Kind::Appeared => Sign::Start,
             Kind::Stopped | Kind::Vanished => Sign::End,
             _ => Sign::Dot,
         },
-        entries: vec![id],
+        events: vec![id],
     };
     others.map(mark).collect()
 }
@@ -254,7 +254,7 @@ impl LifeLines {
         let lives = lives.opened();
         let place = |track| lives.rows.iter().position(|row| row.holds(track));
         let signs = lives.marks.signs.iter();
-        let is_hand = |m: &&RowMark| handovers.iter().any(|h| h.entry == m.entry);
+        let is_hand = |m: &&RowMark| handovers.iter().any(|h| h.event == m.event);
         Self {
             marks: signs
                 .filter(|m| !is_hand(m))

@@ -18,7 +18,7 @@ use crate::base::geometry::{Point, Rect};
 use crate::base::words;
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
-use crate::mission::EntryId;
+use crate::mission::EventId;
 use crate::mission::events::sentence;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
@@ -137,7 +137,7 @@ impl<'a> LivesFigure<'a> {
         }
         for (k, Letter { mark, .. }) in self.marks.letters.iter().enumerate() {
             if let Some(y) = y_of(mark.track) {
-                canvas.begin_mark("letter", &[mark.entry], self.sentence(mark.entry));
+                canvas.begin_mark("letter", &[mark.event], self.sentence(mark.event));
                 put_letter(canvas, place, (mark.at, y), k, &mut taken);
             }
         }
@@ -244,11 +244,11 @@ impl<'a> LivesFigure<'a> {
     }
 
     /// The text of an event in the log.
-    fn sentence(&self, entry: EntryId) -> String {
+    fn sentence(&self, id: EventId) -> String {
         let mission = self.source.mission;
-        let event = mission.ledger.entries.get(entry as usize);
-        let parts = mission.ledger.all_parts();
-        event.map_or_else(String::new, |event| sentence(mission, &parts, entry, event))
+        let event = mission.log.events.get(id as usize);
+        let parts = mission.log.all_parts();
+        event.map_or_else(String::new, |event| sentence(mission, &parts, id, event))
     }
 
     /// Draws the ticks, the crosses and the small circles.
@@ -266,7 +266,7 @@ impl<'a> LivesFigure<'a> {
                 Sign::End => "end",
                 Sign::Dot => "event",
             };
-            canvas.begin_mark(class, &[mark.entry], self.sentence(mark.entry));
+            canvas.begin_mark(class, &[mark.event], self.sentence(mark.event));
             match mark.sign {
                 Sign::Start => start(canvas, x, y),
                 Sign::End => cross(canvas, x, y),
@@ -297,7 +297,7 @@ impl<'a> LivesFigure<'a> {
             {
                 x += 1.0;
             }
-            canvas.begin_mark("handover", &[handover.entry], self.sentence(handover.entry));
+            canvas.begin_mark("handover", &[handover.event], self.sentence(handover.event));
             let side = if to > from { -1.0 } else { 1.0 };
             let tip = Point::new(x, to + side * 0.15);
             canvas.line(Point::new(x, from), Point::new(x, to + side * 1.0), &stroke);

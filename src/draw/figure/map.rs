@@ -425,7 +425,7 @@ fn paint(
     let boxes = drawn.looks.iter().zip(&drawn.members);
     for ((look, members), rect) in boxes.zip(&placed.boxes) {
         let names = members.iter().map(|at| &*tracks[*at].name);
-        canvas.begin_box(names, &marks.entries(members));
+        canvas.begin_box(names, &marks.events(members));
         match look {
             MapBox::Pill(name, phases) => pill(canvas, *rect, name, phases),
             MapBox::List(all) => list(canvas, *rect, all),

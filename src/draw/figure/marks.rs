@@ -9,9 +9,9 @@ use crate::base::name::{last_part, namespace};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, NodeId, TopicId};
-use crate::mission::EntryId;
+use crate::mission::EventId;
+use crate::mission::event_log::{Detail, Event, Kind};
 use crate::mission::events::predicate;
-use crate::mission::ledger::{Detail, Entry, Kind};
 
 /// The most letters, and the most arrows: more crowd the rows. What has none is marked by a small circle.
 const MOST: (usize, usize) = (10, 6);
@@ -34,7 +34,7 @@ pub(crate) struct RowMark {
     pub(crate) track: usize,
     pub(crate) at: Stamp,
     pub(crate) sign: Sign,
-    pub(crate) entry: EntryId,
+    pub(crate) event: EventId,
 }
 
 impl RowMark {
@@ -64,7 +64,7 @@ pub(crate) struct Handover {
     pub(crate) to: usize,
     /// The topic's last part.
     pub(crate) topic: String,
-    pub(crate) entry: EntryId,
+    pub(crate) event: EventId,
 }
 
 impl Handover {
@@ -97,7 +97,7 @@ impl Marks {
         let rows = Rows::new(tracks);
         let mut marks = Self::default();
         let mut circles: Vec<RowMark> = Vec::new();
-        for (entry, event) in (0..).zip(&source.mission.ledger.entries) {
+        for (id, event) in (0..).zip(&source.mission.log.events) {
             if event.quiet {
                 continue;
             }
@@ -105,7 +105,7 @@ impl Marks {
                 track,
                 at,
                 sign,
-                entry,
+                event: id,
             };
             if let (Some(from), Some(to)) = rows.hands(source, event)
                 && marks.handovers.len() < MOST.1
@@ -116,7 +116,7 @@ impl Marks {
                     from,
                     to,
                     topic: last_part(source.name(event.what)).to_owned(),
-                    entry,
+                    event: id,
                 });
                 continue;
             }
@@ -147,11 +147,11 @@ impl Marks {
     /// Gives letters to the weightiest of what is not a tick or a cross, in order of time; a restart without a letter
     /// has its cross and tick.
     fn letter(&mut self, source: &FigureSource<'_>, tracks: &[Track], circles: Vec<RowMark>) {
-        let entries = &source.mission.ledger.entries;
+        let events = &source.mission.log.events;
         let whole = source.span().nanos().max(1) as f64;
         let weight = |mark: &RowMark| {
-            entries
-                .get(mark.entry as usize)
+            events
+                .get(mark.event as usize)
                 .map_or(0.0, |e| weight(e, whole))
         };
         let mut order: Vec<usize> = (0..circles.len()).collect();
@@ -161,16 +161,16 @@ impl Marks {
                 .then(a.cmp(b))
         });
         // A circle suffices for a connection: labels for all of them would fill the page.
-        let has_words = |e: &Entry| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
+        let has_words = |e: &Event| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
         let is_lettered = |at: &usize| {
-            entries
-                .get(circles[*at].entry as usize)
+            events
+                .get(circles[*at].event as usize)
                 .is_some_and(has_words)
         };
         let lettered = order.into_iter().filter(is_lettered).take(MOST.0);
         let lettered: BTreeSet<usize> = lettered.collect();
         for (at, mark) in circles.into_iter().enumerate() {
-            let Some(event) = entries.get(mark.entry as usize) else {
+            let Some(event) = events.get(mark.event as usize) else {
                 continue;
             };
             if lettered.contains(&at) {
@@ -184,13 +184,13 @@ impl Marks {
             }
         }
         self.letters
-            .sort_by_key(|l| (l.mark.at, l.mark.track, l.mark.entry));
+            .sort_by_key(|l| (l.mark.at, l.mark.track, l.mark.event));
     }
 
     /// The same with small circles instead of letters, and without arrows: for rows without room for words.
     pub(crate) fn plain(mut self) -> Self {
         let letters = std::mem::take(&mut self.letters).into_iter();
-        let is_restart = |mark: &RowMark| self.signs.iter().any(|s| s.entry == mark.entry);
+        let is_restart = |mark: &RowMark| self.signs.iter().any(|s| s.event == mark.event);
         let dots: Vec<RowMark> = letters.map(|l| l.mark).filter(|m| !is_restart(m)).collect();
         self.signs.extend(dots);
         for hand in std::mem::take(&mut self.handovers) {
@@ -198,7 +198,7 @@ impl Marks {
                 track: hand.to,
                 at: hand.at,
                 sign: Sign::Dot,
-                entry: hand.entry,
+                event: hand.event,
             });
         }
         self.unlettered = 0;
@@ -206,14 +206,14 @@ impl Marks {
     }
 
     /// The events marked on some rows, sorted.
-    pub(crate) fn entries(&self, tracks: &[usize]) -> Vec<EntryId> {
-        let signs = self.signs.iter().map(|s| (s.track, s.entry));
-        let letters = self.letters.iter().map(|l| (l.mark.track, l.mark.entry));
+    pub(crate) fn events(&self, tracks: &[usize]) -> Vec<EventId> {
+        let signs = self.signs.iter().map(|s| (s.track, s.event));
+        let letters = self.letters.iter().map(|l| (l.mark.track, l.mark.event));
         let hands = self.handovers.iter();
-        let hands = hands.flat_map(|h| [(h.from, h.entry), (h.to, h.entry)]);
+        let hands = hands.flat_map(|h| [(h.from, h.event), (h.to, h.event)]);
         let all = signs.chain(letters).chain(hands);
         let own = all.filter(|(track, _)| tracks.contains(track));
-        let own: BTreeSet<EntryId> = own.map(|(_, entry)| entry).collect();
+        let own: BTreeSet<EventId> = own.map(|(_, event)| event).collect();
         own.into_iter().collect()
     }
 
@@ -236,7 +236,7 @@ impl Marks {
 }
 
 /// The weight of an event by which it gets a letter; `whole` is the length of the mission in nanoseconds.
-fn weight(event: &Entry, whole: f64) -> f64 {
+fn weight(event: &Event, whole: f64) -> f64 {
     let lasts = event
         .until
         .map_or(0.0, |until| until.since(event.time) as f64 / whole);
@@ -250,7 +250,7 @@ fn weight(event: &Entry, whole: f64) -> f64 {
 }
 
 /// The text of a letter, the name as short as the row allows, the rest in the log's words.
-fn text(source: &FigureSource<'_>, event: &Entry, track: &Track) -> String {
+fn text(source: &FigureSource<'_>, event: &Event, track: &Track) -> String {
     let said = predicate(source.mission, &[], event);
     let (node, topic) = source.mission.elements.ends(event.what);
     let row = words::visible(last_part(&track.name)).into_owned();
@@ -303,7 +303,7 @@ impl Rows {
     }
 
     /// The rows that hand a topic over and take it.
-    fn hands(&self, source: &FigureSource<'_>, event: &Entry) -> (Option<usize>, Option<usize>) {
+    fn hands(&self, source: &FigureSource<'_>, event: &Event) -> (Option<usize>, Option<usize>) {
         let topic = source.mission.elements.ends(event.what).1;
         let is_shown = topic.is_some_and(|topic| source.shows(topic));
         let (Detail::Senders { from, to }, true) = (&event.detail, is_shown) else {
@@ -315,7 +315,7 @@ impl Rows {
 
     /// The row on which an event is marked: that of its element; of an edge that of its node or topic; of a topic,
     /// among nodes, that of a sender. A part of another event is marked only where it is a row that begins or ends.
-    fn of(&self, source: &FigureSource<'_>, event: &Entry) -> Option<usize> {
+    fn of(&self, source: &FigureSource<'_>, event: &Event) -> Option<usize> {
         let elements = &source.mission.elements;
         let (node, topic) = elements.ends(event.what);
         if topic.is_some_and(|id| !source.shows(id)) {

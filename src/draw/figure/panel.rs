@@ -7,7 +7,7 @@ use super::talks::Talk;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
-use crate::mission::EntryId;
+use crate::mission::EventId;
 
 /// The room inside a panel's border in millimetres.
 pub(crate) const INSIDE: f64 = 1.3;
@@ -28,7 +28,7 @@ pub(crate) struct PanelBox {
     pub(crate) space: String,
     pub(crate) lines: Vec<String>,
     /// The events of the log in it.
-    pub(crate) entries: Vec<EntryId>,
+    pub(crate) events: Vec<EventId>,
 }
 
 impl PanelBox {
@@ -61,7 +61,7 @@ impl PanelBox {
 /// A panel laid out, its top left corner at (0, 0).
 pub(crate) struct Panel {
     /// The events of the log in it.
-    pub(crate) entries: Vec<EntryId>,
+    pub(crate) events: Vec<EventId>,
     /// Its number and its words.
     pub(crate) heading: (String, String),
     /// The namespace of the names that have none before them; empty if there is none.
@@ -146,7 +146,7 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
         placed.label(canvas, at, lines);
     }
     for (look, rect) in panel.looks.iter().zip(&placed.boxes) {
-        canvas.begin_mark("box", &look.entries, String::new());
+        canvas.begin_mark("box", &look.events, String::new());
         boxed(canvas, look, *rect);
     }
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use crate::base::name::{is_quiet, last_part};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::history::Sender;
 use crate::graph::{Edge, EdgeId, Element, Node, NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::Phase;
+use crate::mission::event_log::Phase;
 use crate::mission::phases::knows_publishers;
 use crate::view::NameFilter;
 
@@ -56,7 +56,7 @@ impl<'a> FigureSource<'a> {
                 published[edge.node as usize].push(id);
             }
         }
-        let phases = &mission.ledger.phases[..];
+        let phases = &mission.log.phases[..];
         Self {
             mission,
             roles,
@@ -146,10 +146,14 @@ impl<'a> FigureSource<'a> {
         inside.filter(|life| life.start < life.end)
     }
 
-    /// The strongest degree to which an element is known.
-    pub(crate) fn degree(&self, what: Element) -> Degree {
-        let rows = self.mission.graphs.rows(what).map(|(_, row)| row.degree);
-        rows.min().unwrap_or(Degree::Declared)
+    /// The strongest confidence to which an element is known.
+    pub(crate) fn confidence(&self, what: Element) -> Confidence {
+        let rows = self
+            .mission
+            .graphs
+            .rows(what)
+            .map(|(_, row)| row.confidence);
+        rows.min().unwrap_or(Confidence::Declared)
     }
 
     /// The name of a node, or the topic of anything else.

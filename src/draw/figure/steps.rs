@@ -25,7 +25,7 @@ use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::layout::{Outline, Plan, Vertex};
-use crate::mission::EntryId;
+use crate::mission::EventId;
 use crate::mission::phases::{Configuration, configurations};
 
 /// The number of steps shown unless some are asked for.
@@ -211,7 +211,7 @@ impl<'s> StepSource<'s> {
                     .flat_map(|t| members.iter().filter_map(|m| t.get(m)));
                 events.extend(turned.flatten());
                 let mut look = self.look(*fate, members, named, home);
-                look.entries = events.into_iter().collect();
+                look.events = events.into_iter().collect();
                 look
             })
             .collect();
@@ -227,8 +227,8 @@ impl<'s> StepSource<'s> {
             ..self.drawn(k, format!("{k} → {}", k + 1), looks, placed)
         };
         (panel.talks, panel.labels) = (talks, labels);
-        panel.entries.sort_unstable();
-        panel.entries.dedup();
+        panel.events.sort_unstable();
+        panel.events.dedup();
         Some(panel)
     }
 
@@ -236,8 +236,8 @@ impl<'s> StepSource<'s> {
     fn drawn(&self, k: usize, number: String, looks: Vec<PanelBox>, placed: PlacedPanel) -> Panel {
         let source = self.sheet.source;
         let handed = if k > 0 { self.handed(k) } else { Vec::new() };
-        let mut entries: Vec<EntryId> = looks.iter().flat_map(|l| &l.entries).copied().collect();
-        entries.extend(handed.iter().map(|h| h.3));
+        let mut events: Vec<EventId> = looks.iter().flat_map(|l| &l.events).copied().collect();
+        events.extend(handed.iter().map(|h| h.3));
         let notes: Vec<_> = handed
             .iter()
             .map(|(topic, from, to, _)| {
@@ -249,7 +249,7 @@ impl<'s> StepSource<'s> {
         let foot = flow(&mut self.sheet.canvas(), inside, 0.0, &items(&notes));
         let start = source.phases[k].span.start.since(source.span().start);
         Panel {
-            entries,
+            events,
             heading: (number, format!("{} {}", clock(start), title(source, k))),
             home: String::new(),
             looks,
@@ -340,7 +340,7 @@ impl<'s> StepSource<'s> {
         k: usize,
         vertex: &[Option<usize>],
         fates: &[Fate],
-        handed: &[(u32, Arc<str>, Arc<str>, EntryId)],
+        handed: &[(u32, Arc<str>, Arc<str>, EventId)],
     ) -> Vec<(Talk, Fate)> {
         let source = self.sheet.source;
         let mut all = Vec::new();
@@ -419,7 +419,7 @@ impl<'s> StepSource<'s> {
             fate,
             space: space.to_owned(),
             lines,
-            entries: Vec::new(),
+            events: Vec::new(),
         }
     }
 
@@ -455,7 +455,7 @@ impl<'s> StepSource<'s> {
             let high = row.iter().map(|p| p.height).fold(0.0, f64::max);
             for (column, panel) in row.iter().enumerate() {
                 number += 1;
-                canvas.begin_step(number, &panel.entries);
+                canvas.begin_step(number, &panel.events);
                 let x = (wide + BETWEEN) * column as f64;
                 paint(&mut canvas, panel, Rect::new(x + 0.1, y, wide - 0.2, high));
             }

@@ -8,7 +8,7 @@ use super::tracks::{Steps, Track, mean};
 use crate::base::name::last_part;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::{Element, TopicId};
 use crate::layout::Link;
 
@@ -71,7 +71,7 @@ struct EdgePresence {
     track: usize,
     topic: TopicId,
     lives: Vec<Span>,
-    degree: Degree,
+    confidence: Confidence,
     hz: f64,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Talks<'a> {
                 track,
                 topic,
                 lives: source.lives(what).collect(),
-                degree: source.degree(what),
+                confidence: source.confidence(what),
                 hz: hz.unwrap_or(0.0),
             })
         };
@@ -142,7 +142,7 @@ impl<'a> Talks<'a> {
                 if from == to || shared(&send.lives, &other.lives, time) <= least {
                     continue;
                 }
-                let inferred = send.degree.max(other.degree) >= Degree::Inferred;
+                let inferred = send.confidence.max(other.confidence) >= Confidence::Inferred;
                 let (topics, all_inferred) =
                     all.entry((from, to)).or_insert((BTreeMap::new(), true));
                 let hz = topics.entry(send.topic).or_insert(0.0);

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use super::source::FigureSource;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::history::{Sender, Stretch};
 use crate::graph::{Element, NodeId, TopicId};
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 /// The length from which on a silence interrupts a bar, so that it can be seen: in nanoseconds, and as one in so many
 /// parts of the mission.
@@ -99,8 +99,8 @@ fn row(
 ) -> Track {
     let whole = source.span();
     let lives = elements.iter().flat_map(|what| source.lives(*what));
-    let degree = elements.iter().map(|what| source.degree(*what)).min();
-    let is_inferred = senders.is_empty() && degree.is_some_and(|d| d >= Degree::Inferred);
+    let confidence = elements.iter().map(|what| source.confidence(*what)).min();
+    let is_inferred = senders.is_empty() && confidence.is_some_and(|d| d >= Confidence::Inferred);
     let life = |span| TrackLife { span, is_inferred };
     let lives: Vec<TrackLife> = Span::joined(lives.collect(), 0)
         .into_iter()
@@ -143,8 +143,8 @@ pub(crate) struct Steps(BTreeSet<(TopicId, Option<NodeId>, Stamp)>);
 
 impl Steps {
     pub(crate) fn new(source: &FigureSource<'_>) -> Self {
-        let entries = source.mission.ledger.entries.iter();
-        let steps = entries.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
+        let events = source.mission.log.events.iter();
+        let steps = events.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
             let (node, topic) = source.mission.elements.ends(e.what);
             Some((topic?, node, e.time))
         });

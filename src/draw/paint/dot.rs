@@ -130,11 +130,11 @@ impl<'a> DotView<'a> {
 /// The line of an arrow: solid for one that is known, dashed for one that is inferred or gone, dotted for one that is
 /// silent.
 fn line(shown: &Shown) -> &'static str {
-    use crate::evidence::Degree;
-    match (shown.mark, shown.degree, shown.state) {
+    use crate::evidence::Confidence;
+    match (shown.mark, shown.confidence, shown.state) {
         (Some(Mark::Away), ..) => "dotted",
-        (Some(Mark::Removed), ..) | (_, Degree::Inferred, _) => "dashed",
-        (_, Degree::Declared, _) | (.., State::Silent | State::Declared) => "dotted",
+        (Some(Mark::Removed), ..) | (_, Confidence::Inferred, _) => "dashed",
+        (_, Confidence::Declared, _) | (.., State::Silent | State::Declared) => "dotted",
         _ => "solid",
     }
 }

@@ -128,10 +128,10 @@ impl Boxes<'_> {
         let last = places.last()?.y;
         let names: Vec<&str> = seen.iter().map(|(item, ..)| &*item.name).collect();
         let mut data = vec![("names", names.join(" "))];
-        let entries = seen.iter().flat_map(|(_, shown, _)| &shown.entries);
-        let entries: BTreeSet<_> = entries.collect();
-        if !entries.is_empty() {
-            let places: Vec<String> = entries.iter().map(ToString::to_string).collect();
+        let events = seen.iter().flat_map(|(_, shown, _)| &shown.events);
+        let events: BTreeSet<_> = events.collect();
+        if !events.is_empty() {
+            let places: Vec<String> = events.iter().map(ToString::to_string).collect();
             data.push(("entries", places.join(" ")));
         }
         let mut group = Group {

@@ -105,11 +105,11 @@ impl Boxes<'_> {
         } else {
             0.0
         });
-        let entries: Vec<String> = crowd.entries.iter().map(ToString::to_string).collect();
+        let events: Vec<String> = crowd.events.iter().map(ToString::to_string).collect();
         let group = |part: &str| Group {
             id: format!("crowd{part}{}{}", crowd.mark.word(), super::encoded(name)),
             class: format!("crowd {}", crowd.mark.class()),
-            data: vec![("name", name.to_owned()), ("entries", entries.join(" "))],
+            data: vec![("name", name.to_owned()), ("entries", events.join(" "))],
             title: format!("{name} {}", crowd.words).trim_start().to_owned(),
             ..Group::default()
         };
@@ -373,23 +373,23 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
     told(data, shown)
 }
 
-/// The attributes of an element, with the places in the ledger of its headlines in this window.
+/// The attributes of an element, with the places in the event log of its headlines in this window.
 pub(crate) fn told(
     mut data: Vec<(&'static str, String)>,
     shown: &Shown,
 ) -> Vec<(&'static str, String)> {
-    if !shown.entries.is_empty() {
-        let places: Vec<String> = shown.entries.iter().map(ToString::to_string).collect();
+    if !shown.events.is_empty() {
+        let places: Vec<String> = shown.events.iter().map(ToString::to_string).collect();
         data.push(("entries", places.join(" ")));
     }
     data
 }
 
-/// The class words of an element, `node added active measured`: its kind, its mark, its state, its degree.
+/// The class words of an element, `node added active measured`: its kind, its mark, its state, its confidence.
 pub(crate) fn class(what: &str, shown: &Shown) -> String {
     let mut words = vec![what];
     words.extend(shown.mark.map(Mark::class));
-    words.extend([shown.state.word(), shown.degree.word()]);
+    words.extend([shown.state.word(), shown.confidence.word()]);
     if matches!(shown.mark, Some(Mark::HandedOver)) {
         words.push("handed-over");
     }

@@ -91,7 +91,7 @@ pub(crate) fn rate_in_window(hz: Option<f64>, count: Option<u64>) -> Option<Stri
 pub(crate) fn facts(shown: &Shown) -> String {
     let mut parts = vec![
         shown.state.word().to_owned(),
-        shown.degree.word().to_owned(),
+        shown.confidence.word().to_owned(),
     ];
     if let Some(mark) = shown.mark {
         parts.insert(0, mark.class().to_owned());

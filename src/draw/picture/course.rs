@@ -2,13 +2,13 @@
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time::{Span, Stamp};
-use crate::draw::figure::canvas::entry_data;
+use crate::draw::figure::canvas::event_data;
 use crate::draw::figure::course::{Course, CourseMark, CoursePhase, CourseRow};
 use crate::draw::figure::marks::Sign;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::mission::EntryId;
+use crate::mission::EventId;
 
 /// The smallest text on a screen, in pixels.
 const SMALLEST_TEXT: f64 = 10.0;
@@ -260,13 +260,13 @@ impl CourseStrip<'_> {
     fn marks(&self, k: usize, row: &CourseRow) -> Vec<Group> {
         let (y, bar, pen) = (self.y(k), self.sizes.bar, 1.8 * self.unit.max(0.8));
         let mut groups: Vec<Group> = Vec::new();
-        let mut last: Option<(f64, Sign, Vec<EntryId>)> = None;
+        let mut last: Option<(f64, Sign, Vec<EventId>)> = None;
         for (
             at,
             CourseMark {
                 at: time,
                 sign,
-                entries,
+                events,
             },
         ) in row.marks.iter().enumerate()
         {
@@ -288,14 +288,14 @@ impl CourseStrip<'_> {
                     Shape::line(both, Stroke::solid(self.style.removed.color, pen))
                 }
                 Sign::Dot => {
-                    let near = |(other, sign, _): &(f64, Sign, Vec<EntryId>)| {
+                    let near = |(other, sign, _): &(f64, Sign, Vec<EventId>)| {
                         *sign == Sign::Dot && (x - other).abs() < bar * 0.7
                     };
                     if let (Some((.., all)), Some(group)) =
                         (last.as_mut().filter(|l| near(l)), groups.last_mut())
                     {
-                        all.extend(entries);
-                        group.data = entry_data(all);
+                        all.extend(events);
+                        group.data = event_data(all);
                         continue;
                     }
                     let round = Size::new(bar * 0.8, bar * 0.8);
@@ -305,10 +305,10 @@ impl CourseStrip<'_> {
             };
             let mut group = Group::named(&format!("mark-{k}-{at}"));
             "mark".clone_into(&mut group.class);
-            group.data = entry_data(entries);
+            group.data = event_data(events);
             group.shape(shape);
             groups.push(group);
-            last = Some((x, *sign, entries.clone()));
+            last = Some((x, *sign, events.clone()));
         }
         groups
     }

@@ -165,7 +165,7 @@ impl Gate {
             match &mut all {
                 Some(all) => {
                     all.state = all.state.min(shown.state);
-                    all.degree = all.degree.min(shown.degree);
+                    all.confidence = all.confidence.min(shown.confidence);
                     all.is_paused &= shown.is_paused;
                 }
                 None => all = Some(shown.clone()),

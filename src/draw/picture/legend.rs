@@ -10,7 +10,7 @@ use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{ArrowKind, ItemKind, Mark, Showing, Shown, View};
 
@@ -25,7 +25,7 @@ pub(crate) enum LegendSign {
     Row,
     Change(Mark),
     Box(State),
-    Line(Degree),
+    Line(Confidence),
     Starved,
     Width,
 }
@@ -42,10 +42,10 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         let is_there = looks.any(|s| s.state == state && s.mark.is_none());
         (is_there, LegendSign::Box(state), words)
     };
-    let degree = |degree, words| {
+    let confidence = |confidence, words| {
         let mut looks = view.arrows_shown.iter().flat_map(Showing::looks);
-        let is_there = looks.any(|s| s.degree == degree);
-        (is_there, LegendSign::Line(degree), words)
+        let is_there = looks.any(|s| s.confidence == confidence);
+        (is_there, LegendSign::Line(confidence), words)
     };
     let (added, removed) = if view.compares {
         ("only in B", "only in A")
@@ -93,8 +93,8 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         state(State::Silent, "silent"),
         state(State::Latched, "latched"),
         state(State::Declared, "declared only"),
-        degree(Degree::Stated, "stated"),
-        degree(Degree::Inferred, "inferred"),
+        confidence(Confidence::Stated, "stated"),
+        confidence(Confidence::Inferred, "inferred"),
         (
             any(&|s| s.is_starved),
             LegendSign::Starved,
@@ -189,8 +189,8 @@ pub(crate) fn legend(
 }
 
 fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: f64) {
-    let arrow_of = |kind, degree, mark| {
-        options::of_arrow(style, &kind, &shown(State::Active, degree, mark), None)
+    let arrow_of = |kind, confidence, mark| {
+        options::of_arrow(style, &kind, &shown(State::Active, confidence, mark), None)
             .stroke
             .scaled(unit)
     };
@@ -232,7 +232,7 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
             text: "→".to_owned(),
         }),
         LegendSign::Change(mark) => {
-            let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));
+            let stroke = arrow_of(ArrowKind::Publish, Confidence::Measured, Some(*mark));
             group.shape(Shape::line(across(place), stroke));
             badge(group, style, *mark, place.centre(), unit * 0.9);
         }
@@ -255,12 +255,12 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
             fill: style.topic.fill,
             stroke: Stroke::solid(style.topic.stroke, style.topic.width * unit),
         }),
-        LegendSign::Line(degree) => {
-            let stroke = arrow_of(ArrowKind::Subscribe, *degree, None);
+        LegendSign::Line(confidence) => {
+            let stroke = arrow_of(ArrowKind::Subscribe, *confidence, None);
             arrow(group, place, stroke, (Tip::Arrow, style.edge.arrow * unit));
         }
         LegendSign::Starved => {
-            let stroke = arrow_of(ArrowKind::Subscribe, Degree::Stated, None);
+            let stroke = arrow_of(ArrowKind::Subscribe, Confidence::Stated, None);
             arrow(group, place, stroke, (Tip::Stop, style.edge.arrow * unit));
         }
         LegendSign::Width => widths(group, style, place, unit),
@@ -268,20 +268,20 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
 }
 
 /// A sample element in this state.
-fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
+fn shown(state: State, confidence: Confidence, mark: Option<Mark>) -> Shown {
     Shown {
         mark,
-        ..Shown::plain(0, state, degree)
+        ..Shown::plain(0, state, confidence)
     }
 }
 
 fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State, unit: f64) {
     let body = if round { &style.node } else { &style.topic };
-    let degree = match state {
-        State::Declared => Degree::Declared,
-        _ => Degree::Measured,
+    let confidence = match state {
+        State::Declared => Confidence::Declared,
+        _ => Confidence::Measured,
     };
-    let look = options::of_box(style, body, &shown(state, degree, None));
+    let look = options::of_box(style, body, &shown(state, confidence, None));
     let form = if round && body.is_pill() {
         Form::Rect(place, place.h / 2.0)
     } else if round {

@@ -1,9 +1,9 @@
-//! The paint of an element: its mark counts more than its state, and that more than its degree.
+//! The paint of an element: its mark counts more than its state, and that more than its confidence.
 
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
 use crate::draw::text::Weight;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{ArrowKind, Mark, Shown};
 
@@ -54,11 +54,11 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             glow: change.glow,
         };
     }
-    let quiet = match (shown.state, shown.degree) {
-        (State::Declared, _) | (_, Degree::Declared) => &style.declared,
+    let quiet = match (shown.state, shown.confidence) {
+        (State::Declared, _) | (_, Confidence::Declared) => &style.declared,
         (State::Silent, _) => &style.silent,
-        (State::Active | State::Latched, degree) => {
-            let dash: &[f64] = if degree == Degree::Inferred {
+        (State::Active | State::Latched, confidence) => {
+            let dash: &[f64] = if confidence == Confidence::Inferred {
                 &style.inferred.dash
             } else {
                 &[]
@@ -111,8 +111,8 @@ pub(crate) fn of_arrow(
             glow: change.glow,
         };
     }
-    let quiet = match (shown.state, shown.degree) {
-        (State::Declared, _) | (_, Degree::Declared) => Some(&style.declared),
+    let quiet = match (shown.state, shown.confidence) {
+        (State::Declared, _) | (_, Confidence::Declared) => Some(&style.declared),
         (State::Silent, _) => Some(&style.silent),
         _ => None,
     };
@@ -120,11 +120,11 @@ pub(crate) fn of_arrow(
         return quiet_arrow(quiet);
     }
     let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
-    let width = match shown.degree {
-        Degree::Stated if !known => style.stated.width,
+    let width = match shown.confidence {
+        Confidence::Stated if !known => style.stated.width,
         _ => width_of(style, flow),
     };
-    let dash: &[f64] = if shown.degree == Degree::Inferred {
+    let dash: &[f64] = if shown.confidence == Confidence::Inferred {
         &style.inferred.dash
     } else {
         &[]
@@ -165,11 +165,11 @@ fn line(color: Color, width: f64, dash: &[f64]) -> Stroke {
 mod tests {
     use super::*;
 
-    fn shown(state: State, degree: Degree, mark: Option<Mark>, hz: f64) -> Shown {
+    fn shown(state: State, confidence: Confidence, mark: Option<Mark>, hz: f64) -> Shown {
         Shown {
             mark,
             steady_hz: Some(hz),
-            ..Shown::plain(0, state, degree)
+            ..Shown::plain(0, state, confidence)
         }
     }
 
@@ -177,7 +177,7 @@ mod tests {
     fn faster_arrows_are_thicker_up_to_a_limit() {
         let style = Style::builtin("light").unwrap();
         let width = |hz| {
-            let shown = shown(State::Active, Degree::Measured, None, hz);
+            let shown = shown(State::Active, Confidence::Measured, None, hz);
             of_arrow(&style, &ArrowKind::Publish, &shown, Some(hz))
                 .stroke
                 .width
@@ -190,17 +190,17 @@ mod tests {
     fn differences_are_visible_in_greyscale() {
         for name in ["light", "dark", "paper", "rqt"] {
             let style = Style::builtin(name).unwrap();
-            let active = (State::Active, Degree::Measured, None);
+            let active = (State::Active, Confidence::Measured, None);
             let looks = [
                 active,
-                (State::Silent, Degree::Measured, None),
-                (State::Declared, Degree::Declared, None),
-                (State::Active, Degree::Inferred, None),
-                (State::Active, Degree::Measured, Some(Mark::Added)),
-                (State::Active, Degree::Measured, Some(Mark::Removed)),
+                (State::Silent, Confidence::Measured, None),
+                (State::Declared, Confidence::Declared, None),
+                (State::Active, Confidence::Inferred, None),
+                (State::Active, Confidence::Measured, Some(Mark::Added)),
+                (State::Active, Confidence::Measured, Some(Mark::Removed)),
             ];
-            let shape = |(state, degree, mark)| {
-                let look = of_box(&style, &style.topic, &shown(state, degree, mark, 1.0));
+            let shape = |(state, confidence, mark)| {
+                let look = of_box(&style, &style.topic, &shown(state, confidence, mark, 1.0));
                 (look.stroke.dash, (look.stroke.width * 100.0).to_string())
             };
             let mut shapes: Vec<_> = looks.map(shape).to_vec();

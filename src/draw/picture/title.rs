@@ -61,7 +61,7 @@ impl<'a> Title<'a> {
     pub(crate) fn words(&self, frame: &Frame, phase: &str) -> Vec<Group> {
         let (clock, room) = self.clock(frame);
         let mut headline = Group::named("headline");
-        headline.data = vec![("entries", entries(frame))];
+        headline.data = vec![("entries", events(frame))];
         let mut note = Group::named("note");
         let (style, unit) = (&self.style.title, self.page.unit);
         let (size, small) = (style.size * unit, style.quiet_size * unit);
@@ -197,8 +197,8 @@ impl<'a> Title<'a> {
 }
 
 /// The ids of the events that a window reports, separated by blanks.
-fn entries(frame: &Frame) -> String {
-    let ids = frame.entries().map(|entry| entry.to_string());
+fn events(frame: &Frame) -> String {
+    let ids = frame.events().map(|event| event.to_string());
     ids.collect::<Vec<_>>().join(" ")
 }
 

@@ -11,7 +11,7 @@ use super::{Picture, badge, chips, encoded, places};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, ItemKind, Mark, Showing, Shown};
 
@@ -194,6 +194,6 @@ impl Picture<'_> {
 fn plain(hz: Option<f64>) -> Shown {
     Shown {
         hz,
-        ..Shown::plain(0, State::Active, Degree::Measured)
+        ..Shown::plain(0, State::Active, Confidence::Measured)
     }
 }

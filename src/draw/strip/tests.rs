@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::*;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, State};
 use crate::layout;
 use crate::view::{Headline, Item, ItemKind, Mark, Phrase, Showing, Shown};
@@ -22,7 +22,7 @@ fn two_nodes() -> (Mission, View) {
         elements: Elements::default(),
         windows: Vec::new(),
         graphs: crate::graph::Graphs::default(),
-        ledger: crate::mission::Ledger::default(),
+        log: crate::mission::EventLog::default(),
         sending: crate::graph::history::Sending::default(),
         undrawn: Vec::new(),
         layout: None,
@@ -39,7 +39,7 @@ fn two_nodes() -> (Mission, View) {
     };
     let shown = |id, mark| Shown {
         mark,
-        ..Shown::plain(id, State::Active, Degree::Measured)
+        ..Shown::plain(id, State::Active, Confidence::Measured)
     };
     let frame = |(index, mark): (usize, Option<Mark>)| Frame {
         headlines: mark.map(|_| Headline::started()).into_iter().collect(),
@@ -48,7 +48,7 @@ fn two_nodes() -> (Mission, View) {
                 sign: ' ',
                 lead: String::new(),
                 names: vec!["/planner".to_owned()],
-                entries: vec![0],
+                events: vec![0],
                 tail: m.class().to_owned(),
             })
             .into_iter()

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::base::words::{self, worded};
-use crate::evidence::claim::Name;
-use crate::evidence::proof::ElementKey;
+use crate::evidence::inference::ElementKey;
+use crate::evidence::observation::Name;
 
 worded! {
     /// The role of a node on a topic.

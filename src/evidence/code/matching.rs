@@ -15,8 +15,8 @@ use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name, SourceId};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
@@ -217,9 +217,9 @@ impl RecordedTopics {
             topics: BTreeMap::new(),
             told: BTreeSet::new(),
             proved: known
-                .proofs
+                .inferences
                 .iter()
-                .filter(|p| p.degree != Degree::Declared)
+                .filter(|p| p.confidence != Confidence::Declared)
                 .map(|p| p.what)
                 .collect(),
         };
@@ -267,9 +267,9 @@ type NamedNodes = BTreeMap<String, (Name, BTreeSet<&'static str>)>;
 fn named(known: &Conclusions<'_>) -> NamedNodes {
     let mut named = NamedNodes::new();
     let launch = row("launch");
-    let is_named = |p: &&Proof| p.degree != Degree::Declared || p.source == launch;
-    for proof in known.proofs.iter().filter(is_named) {
-        let node = match proof.what {
+    let is_named = |p: &&Inference| p.confidence != Confidence::Declared || p.source == launch;
+    for inference in known.inferences.iter().filter(is_named) {
+        let node = match inference.what {
             ElementKey::Node(node)
             | ElementKey::Publish(node, _)
             | ElementKey::Subscribe(_, node) => node,
@@ -280,7 +280,7 @@ fn named(known: &Conclusions<'_>) -> NamedNodes {
             let (_, words) = named
                 .entry(text.to_string())
                 .or_insert((node, BTreeSet::new()));
-            words.extend(SOURCES.get(proof.source).map(|s| s.word));
+            words.extend(SOURCES.get(inference.source).map(|s| s.word));
         }
     }
     named
@@ -377,13 +377,13 @@ fn draw(
     if recorded.proved.contains(&what) || !has_room || known.denies(what) {
         return false;
     }
-    let proof = Proof {
+    let inference = Inference {
         what,
         source: row("source"),
-        degree: Degree::Declared,
+        confidence: Confidence::Declared,
         when: Validity::Like(ElementKey::Node(node)),
     };
-    known.because(proof, None, |_| sentence(code, found, words));
+    known.because(inference, None, |_| sentence(code, found, words));
     true
 }
 

@@ -14,8 +14,8 @@ use super::workspace::{FileDeclaration, Instance};
 use crate::bag::Encoding;
 use crate::base::name::last_part;
 use crate::base::words::{count, worded};
-use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name};
 use crate::evidence::topology::launch::join;
 
 worded! {
@@ -346,13 +346,13 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     );
     let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
-        let proof = Proof {
+        let inference = Inference {
             what,
             source: row("source_only"),
-            degree: Degree::Declared,
+            confidence: Confidence::Declared,
             when,
         };
-        known.because(proof, None, |_| text.clone());
+        known.because(inference, None, |_| text.clone());
     }
 }
 

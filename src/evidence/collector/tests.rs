@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Claims, Degree, Statement};
+use crate::evidence::observation::{Confidence, Observation, Observations, Statement};
 
 /// A payload under construction.
 pub(super) struct Payload {
@@ -116,8 +116,8 @@ pub(super) fn hear(
     (collector, want)
 }
 
-/// The claims of one message, a line each, sorted.
-pub(super) fn claims(
+/// The observations of one message, a line each, sorted.
+pub(super) fn observations(
     topic: &str,
     kind: &str,
     publisher: Option<&str>,
@@ -128,13 +128,17 @@ pub(super) fn claims(
     source::rosout::settle(&mut collector.facts);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
     let facts = &collector.facts;
-    let line = |claim: Claim| {
-        let debug = format!("{claim:?}");
+    let line = |observation: Observation| {
+        let debug = format!("{observation:?}");
         let kind = debug.split('(').next().unwrap().to_owned();
-        let names = claim.names().into_iter().flatten();
+        let names = observation.names().into_iter().flatten();
         names.fold(kind, |line, name| format!("{line} {}", facts.text(name)))
     };
-    let mut lines: Vec<_> = facts.list.iter().map(|fact| line(fact.claim)).collect();
+    let mut lines: Vec<_> = facts
+        .list
+        .iter()
+        .map(|fact| line(fact.observation))
+        .collect();
     lines.sort();
     lines
 }
@@ -143,7 +147,7 @@ pub(super) fn claims(
 fn roscpp_names_what_it_publishes() {
     let record = Payload::log("/a", "hello", "src/a.cpp", &["/scan"]);
     assert_eq!(
-        claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
+        observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
         [
             "LogsFrom /a a.cpp",
             "Node /a",
@@ -158,7 +162,7 @@ fn roscpp_names_what_it_publishes() {
 fn rospy_names_what_it_publishes_and_subscribes() {
     let record = Payload::log("/a", "hello", "a.py", &["/scan"]);
     assert_eq!(
-        claims("/rosout_agg", "rosgraph_msgs/Log", Some("/rosout"), &record),
+        observations("/rosout_agg", "rosgraph_msgs/Log", Some("/rosout"), &record),
         [
             "Lists /a /scan",
             "LogsFrom /a a.py",
@@ -170,29 +174,32 @@ fn rospy_names_what_it_publishes_and_subscribes() {
 
 #[test]
 fn one_python_record_makes_a_node_one_of_rospy() {
-    let mut facts = Claims::default();
+    let mut facts = Observations::default();
     let [script, driver, topic] = ["/a", "/b", "/scan"].map(|name| facts.name(name));
     for node in [script, driver] {
         let said = Statement {
-            claim: Claim::Lists(node, topic),
-            degree: Degree::Stated,
+            observation: Observation::Lists(node, topic),
+            confidence: Confidence::Stated,
             snapshot: None,
         };
         facts.add(0, said, Some(Stamp(5)));
     }
     facts.rospy.insert(script);
     source::rosout::settle(&mut facts);
-    let claims: Vec<Claim> = facts.list.iter().map(|fact| fact.claim).collect();
+    let observations: Vec<Observation> = facts.list.iter().map(|fact| fact.observation).collect();
     assert_eq!(
-        claims,
-        [Claim::Lists(script, topic), Claim::Publish(driver, topic)]
+        observations,
+        [
+            Observation::Lists(script, topic),
+            Observation::Publish(driver, topic)
+        ]
     );
 }
 
 #[test]
 fn a_log_connection_of_another_node_was_merged() {
     let record = Payload::log("/b", "hello", "a.py", &[]);
-    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    let all = observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
     assert!(all.contains(&"Carries /a /b".to_owned()), "{all:?}");
 }
 
@@ -200,14 +207,14 @@ fn a_log_connection_of_another_node_was_merged() {
 fn roscpp_log_messages_reveal_subscribers() {
     let text = "Connection to subscriber [callerid=[/c] address=[x]] to topic [/scan] dropped";
     let record = Payload::log("/a", text, "link.cpp", &[]);
-    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    let all = observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
     assert!(all.contains(&"Unsubscribe /c /scan".to_owned()), "{all:?}");
 }
 
 #[test]
 fn the_recorder_dates_a_topic() {
     let record = Payload::log("/record_1", "Subscribing to /map", "recorder.cpp", &[]);
-    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/record_1"), &record);
+    let all = observations("/rosout", "rosgraph_msgs/Log", Some("/record_1"), &record);
     assert!(all.contains(&"Appears /map".to_owned()), "{all:?}");
 }
 
@@ -221,7 +228,7 @@ fn statistics_name_both_ends() {
         .time();
     let message = message.u32(10).u32(0).u32(999).raw(&[0; 48]);
     assert_eq!(
-        claims(
+        observations(
             "/statistics",
             "rosgraph_msgs/TopicStatistics",
             Some("/slam"),
@@ -243,7 +250,7 @@ fn diagnostics_name_their_node() {
         .u32(1);
     let message = message.text("k").text("v");
     assert_eq!(
-        claims(
+        observations(
             "/diagnostics",
             "diagnostic_msgs/DiagnosticArray",
             None,
@@ -263,7 +270,7 @@ fn the_status_of_a_goal_names_its_client() {
         .byte(1)
         .text("");
     assert_eq!(
-        claims(
+        observations(
             "/move/status",
             "actionlib_msgs/GoalStatusArray",
             None,

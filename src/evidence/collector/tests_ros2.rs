@@ -1,6 +1,6 @@
 //! Tests of the sources of ROS 2 with single messages.
 
-use super::tests::{Payload, claims};
+use super::tests::{Payload, observations};
 
 #[test]
 fn a_log_record_of_ros2_names_its_logger() {
@@ -13,7 +13,7 @@ fn a_log_record_of_ros2_names_its_logger() {
         .text("g")
         .u32(1);
     assert_eq!(
-        claims("/rosout", "rcl_interfaces/msg/Log", None, &record),
+        observations("/rosout", "rcl_interfaces/msg/Log", None, &record),
         ["Logger /r1/nav /rosout", "LogsFrom /r1/nav f"]
     );
 }
@@ -39,7 +39,7 @@ fn parameter_events_name_their_node() {
         .text("use_sim_time");
     let message = value(message).u32(0).u32(0);
     assert_eq!(
-        claims(
+        observations(
             "/parameter_events",
             "rcl_interfaces/msg/ParameterEvent",
             None,
@@ -64,7 +64,7 @@ fn a_transition_sets_the_state() {
         .byte(3)
         .text("active");
     assert_eq!(
-        claims(
+        observations(
             "/amcl/transition_event",
             "lifecycle_msgs/msg/TransitionEvent",
             None,
@@ -95,7 +95,7 @@ fn a_graph_snapshot_names_everything() {
         .text("sensor_msgs/msg/LaserScan"));
     let message = message.u32(0).u32(0).u32(0);
     assert_eq!(
-        claims(
+        observations(
             "/rosgraph",
             "rosgraph_monitor_msgs/msg/Graph",
             None,
@@ -142,7 +142,7 @@ fn a_single_node_names_services_and_actions() {
     let message = graph_end(message, "/go/_action/status", 1);
     // The definition in the bag may list the outermost fields only.
     assert_eq!(
-        claims(
+        observations(
             "/nodl/observed_node",
             "rosgraph_msgs/msg/Node",
             None,
@@ -174,7 +174,7 @@ fn a_reliable_subscriber_of_a_best_effort_publisher_is_starved() {
     let message = empty(graph_end(message.u32(1), "/t", 2), 5);
     let message = node(message, "/a").u32(0);
     let message = empty(graph_end(message.u32(1), "/t", 1), 4);
-    let all = claims("/rosgraph", "rosgraph_msgs/msg/Graph", None, &message);
+    let all = observations("/rosgraph", "rosgraph_msgs/msg/Graph", None, &message);
     assert!(all.contains(&"Starved /a /t".to_owned()), "{all:?}");
     assert!(all.contains(&"Duplicate /a".to_owned()), "{all:?}");
 }
@@ -188,7 +188,7 @@ fn losses_of_the_recorder_name_the_topic_and_the_number() {
         .u64(2)
         .u64(3);
     assert_eq!(
-        claims(
+        observations(
             "/events/rosbag2_messages_lost",
             "rosbag2_interfaces/msg/MessagesLostEvent",
             None,
@@ -206,7 +206,7 @@ fn topic_statistics_distinguish_publishers_and_subscribers() {
     };
     let message = one(one(Payload::cdr().time().u32(2), 0, "/lidar"), 1, "/slam");
     assert_eq!(
-        claims(
+        observations(
             "/topic_statistics",
             "rosgraph_monitor_msgs/msg/TopicStatistics",
             None,
@@ -226,7 +226,7 @@ fn metrics_name_a_subscriber() {
         .time();
     let message = message.u32(1).byte(1).u64(0);
     assert_eq!(
-        claims(
+        observations(
             "/statistics",
             "statistics_msgs/msg/MetricsMessage",
             None,
@@ -248,7 +248,7 @@ fn discovery_names_nodes_with_either_length_of_identifier() {
             .u32(1)
             .raw(&id)
             .u32(0);
-        let all = claims(
+        let all = observations(
             "ros_discovery_info",
             "rmw_dds_common/msg/ParticipantEntitiesInfo",
             None,
@@ -267,7 +267,7 @@ fn service_events_prove_their_topic() {
         .u64(3)
         .u32(0)
         .u32(0);
-    let all = claims("/add/_service_event", "a/srv/Add_Event", None, &message);
+    let all = observations("/add/_service_event", "a/srv/Add_Event", None, &message);
     assert_eq!(all, ["Topic /add/_service_event"]);
 }
 
@@ -281,14 +281,17 @@ fn a_graph_with_names_near_the_end_is_read_too() {
     let message = message.u32(0).u32(1).text("/go");
     let message = (0..3).fold(message, |p, _| kind(p, "a/action/Go"));
     let message = message.text("/nav").u32(0);
-    let all = claims("/rosgraph", "rosgraph_msgs/msg/Graph", None, &message);
-    for claim in [
+    let all = observations("/rosgraph", "rosgraph_msgs/msg/Graph", None, &message);
+    for observation in [
         "Node /nav",
         "Publish /nav /plan",
         "Subscribe /nav /clear",
         "Type /clear std_srvs/srv/Empty",
         "Publish /nav /go/_action/feedback",
     ] {
-        assert!(all.contains(&claim.to_owned()), "{claim}: {all:?}");
+        assert!(
+            all.contains(&observation.to_owned()),
+            "{observation}: {all:?}"
+        );
     }
 }

@@ -16,7 +16,7 @@ pub(crate) struct MessageLayout {
     pub(crate) fields: &'static [(&'static str, &'static str)],
 }
 
-/// The degree to which a connection fits a layout.
+/// The confidence to which a connection fits a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LayoutFit {
     /// The connection has another type or encoding.

@@ -12,17 +12,17 @@ use super::{NamedTopics, SOON_NS};
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, Claims, Degree, Name, Statement};
-use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::inference::{Reliability, Stream};
+use crate::evidence::observation::{Confidence, Name, Observation, Observations, Statement};
 use crate::evidence::times::{SeriesId, Stamps};
 
 /// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` are the places of its streams. Each
-/// gets a claim of its end; what is left of a topic whose header names it becomes a stream of its own.
+/// gets an observation of its end; what is left of a topic whose header names it becomes a stream of its own.
 pub(super) fn part(
     streams: &mut Vec<Stream>,
     of_bag: &[usize],
     named: &NamedTopics,
-    facts: &mut Claims,
+    facts: &mut Observations,
     messages: &mut Stamps,
 ) -> io::Result<()> {
     let (ends, heirs) = {
@@ -56,10 +56,10 @@ pub(super) fn part(
     }
     let source = SOURCES.iter().position(|s| s.word == "connection");
     for (node, time) in gone {
-        for claim in [Claim::Node(node), Claim::NodeGone(node)] {
+        for observation in [Observation::Node(node), Observation::NodeGone(node)] {
             let said = Statement {
-                claim,
-                degree: Degree::Stated,
+                observation,
+                confidence: Confidence::Stated,
                 snapshot: None,
             };
             let words = || "nothing shows it after a topic of its own fell silent".to_owned();
@@ -84,9 +84,9 @@ struct NodeEnd {
 struct RewrittenBag<'a> {
     streams: &'a [Stream],
     of_bag: &'a [usize],
-    facts: &'a Claims,
+    facts: &'a Observations,
     messages: &'a Stamps,
-    /// The claims about each node.
+    /// The observations about each node.
     told: BTreeMap<Name, Vec<SeriesId>>,
     /// The streams that each node published, as far as is known.
     own: BTreeMap<Name, Vec<usize>>,
@@ -100,12 +100,12 @@ impl<'a> RewrittenBag<'a> {
     fn new(
         streams: &'a [Stream],
         of_bag: &'a [usize],
-        facts: &'a Claims,
+        facts: &'a Observations,
         messages: &'a Stamps,
     ) -> Self {
         let mut told: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
         for fact in &facts.list {
-            if let Some(node) = shown(fact.claim) {
+            if let Some(node) = shown(fact.observation) {
                 told.entry(node).or_default().push(fact.times);
             }
         }
@@ -239,17 +239,17 @@ impl<'a> RewrittenBag<'a> {
     }
 }
 
-/// The node that a claim shows to be there.
-pub(super) fn shown(claim: Claim) -> Option<Name> {
-    match claim {
-        Claim::Node(node)
-        | Claim::Publish(node, _)
-        | Claim::Subscribe(node, _)
-        | Claim::Joins(node, _)
-        | Claim::Refused(node, _)
-        | Claim::Lists(node, _)
-        | Claim::Reports(node, _)
-        | Claim::Lifecycle(node, _) => Some(node),
+/// The node that an observation shows to be there.
+pub(super) fn shown(observation: Observation) -> Option<Name> {
+    match observation {
+        Observation::Node(node)
+        | Observation::Publish(node, _)
+        | Observation::Subscribe(node, _)
+        | Observation::Joins(node, _)
+        | Observation::Refused(node, _)
+        | Observation::Lists(node, _)
+        | Observation::Reports(node, _)
+        | Observation::Lifecycle(node, _) => Some(node),
         _ => None,
     }
 }

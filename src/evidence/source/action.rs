@@ -3,10 +3,10 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{HEADER, MessageLayout};
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use std::collections::BTreeMap;
 
 /// `actionlib_msgs/GoalStatusArray`.
@@ -44,7 +44,11 @@ pub(crate) fn read(
             let node = heard.name(client);
             let goal = heard.name(&format!("{action}/goal"));
             let words = || format!("goal `{id}` on {action}");
-            heard.claim(Claim::Publish(node, goal), Degree::Inferred, words);
+            heard.observation(
+                Observation::Publish(node, goal),
+                Confidence::Inferred,
+                words,
+            );
         }
     }
     Ok(())

@@ -2,8 +2,8 @@
 //! nanoseconds.
 
 use crate::base::role::start;
-use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, SourceId};
 
 /// The longest time from a start in a name to the recording, in nanoseconds; with a longer one the clock was not set.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
@@ -17,16 +17,16 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if known.gone.contains(&Some(node)) || start > last || first.since(start) > LONGEST_NS {
             continue;
         }
-        let proof = Proof {
+        let inference = Inference {
             what: ElementKey::Node(node),
             source,
-            degree: Degree::Stated,
+            confidence: Confidence::Stated,
             when: Validity::Begins {
                 signs: vec![start.max(first)],
                 ends: Vec::new(),
             },
         };
-        known.because(proof, Some(start), |known| {
+        known.because(inference, Some(start), |known| {
             format!("the name {} holds this start", known.text(node))
         });
     }

@@ -1,7 +1,7 @@
 //! Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes it.
 
-use crate::evidence::claim::SourceId;
-use crate::evidence::proof::Conclusions;
+use crate::evidence::inference::Conclusions;
+use crate::evidence::observation::SourceId;
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for topic in known.topics_of(|kind| matches!(kind, "bond/Status" | "bond/msg/Status")) {

@@ -1,7 +1,7 @@
 //! ROS 1 connection headers and MCAP channel metadata: the publisher of each message (`callerid`).
 
-use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
+use crate::evidence::observation::{Confidence, SourceId};
 
 /// Every stream proves its topic, and its publisher as far as its name is reliable.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -10,13 +10,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if stream.is_about() {
             continue;
         }
-        let proof = |what, when| Proof {
+        let inference = |what, when| Inference {
             what,
             source,
-            degree: Degree::Measured,
+            confidence: Confidence::Measured,
             when,
         };
-        known.prove(proof(
+        known.add(inference(
             ElementKey::Topic(stream.topic),
             Validity::Messages(at),
         ));
@@ -27,16 +27,16 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         match stream.trust {
             Reliability::Player if known.named_by_others(stream.topic, node) => {}
             Reliability::Whole | Reliability::Player => {
-                known.prove(proof(edge, Validity::Messages(at)));
+                known.add(inference(edge, Validity::Messages(at)));
             }
-            Reliability::Likely => known.prove(Proof {
-                degree: Degree::Inferred,
-                ..proof(edge, Validity::Messages(at))
+            Reliability::Likely => known.add(Inference {
+                confidence: Confidence::Inferred,
+                ..inference(edge, Validity::Messages(at))
             }),
-            Reliability::First => known.prove(Proof {
+            Reliability::First => known.add(Inference {
                 // The tool that wrote this header knows it of no other message.
-                degree: Degree::Stated,
-                ..proof(edge, Validity::First(at))
+                confidence: Confidence::Stated,
+                ..inference(edge, Validity::First(at))
             }),
             Reliability::Gone => {}
         }

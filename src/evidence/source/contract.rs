@@ -12,10 +12,10 @@ use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::csv;
 use crate::base::name::{last_part, namespace};
-use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 const TABLE: &str = include_str!("contracts.csv");
 
@@ -28,7 +28,11 @@ pub(crate) fn read(
     let file = record.file_name();
     if !record.logger.is_empty() && !file.is_empty() {
         let (logger, file) = (heard.name(&record.logger), heard.name(file));
-        heard.claim(Claim::LogsFrom(logger, file), Degree::Stated, String::new);
+        heard.observation(
+            Observation::LogsFrom(logger, file),
+            Confidence::Stated,
+            String::new,
+        );
     }
     Ok(())
 }
@@ -202,7 +206,7 @@ impl Owners {
 fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
     let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
     for fact in &known.facts.list {
-        if let Claim::LogsFrom(logger, file) = fact.claim
+        if let Observation::LogsFrom(logger, file) = fact.observation
             && let Some(node) = known.owner(&known.text(logger))
         {
             files.entry(node).or_default().insert(known.text(file));

@@ -3,10 +3,10 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{HEADER, HEADER2, MessageLayout};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
+use crate::evidence::observation::{Confidence, Observation, SourceId};
 use std::collections::BTreeSet;
 
 /// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
@@ -65,7 +65,11 @@ pub(crate) fn read(
                 let node = heard.name(&format!("/{node}"));
                 let topic = heard.stream.topic;
                 let words = || format!("status `{name}`");
-                heard.claim(Claim::Reports(node, topic), Degree::Inferred, words);
+                heard.observation(
+                    Observation::Reports(node, topic),
+                    Confidence::Inferred,
+                    words,
+                );
             }
         }
     }
@@ -89,20 +93,22 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);
         of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
     };
-    let claims = known.facts.list.iter().map(|fact| fact.claim);
-    let untold: BTreeSet<Claim> = claims
-        .filter(|claim| matches!(claim, Claim::Reports(_, topic) if !told(*topic)))
+    let observations = known.facts.list.iter().map(|fact| fact.observation);
+    let untold: BTreeSet<Observation> = observations
+        .filter(
+            |observation| matches!(observation, Observation::Reports(_, topic) if !told(*topic)),
+        )
         .collect();
-    for (fact, signs, ends) in known.claims(source) {
-        let Claim::Reports(node, topic) = fact.claim else {
+    for (fact, signs, ends) in known.observations(source) {
+        let Observation::Reports(node, topic) = fact.observation else {
             continue;
         };
-        if untold.contains(&fact.claim) {
+        if untold.contains(&fact.observation) {
             let node = known.meant(node);
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Publish(node, topic),
                 source,
-                degree: Degree::Inferred,
+                confidence: Confidence::Inferred,
                 when: Validity::Signs { signs, ends },
             });
         }

@@ -2,9 +2,9 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree, Statement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::observation::{Confidence, Observation, Statement};
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -29,13 +29,17 @@ pub(crate) fn read(
         let full = format!("{}/{name}", space.trim_end_matches('/'));
         let node = heard.name(&full);
         let said = Statement {
-            claim: Claim::Node(node),
-            degree: Degree::Stated,
+            observation: Observation::Node(node),
+            confidence: Confidence::Stated,
             snapshot: Some(group),
         };
         heard.say(said, || format!("{full} is a node of participant {id}"));
     }
-    heard.claim(Claim::Snapshot(group), Degree::Stated, String::new);
+    heard.observation(
+        Observation::Snapshot(group),
+        Confidence::Stated,
+        String::new,
+    );
     Ok(())
 }
 

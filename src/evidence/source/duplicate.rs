@@ -2,10 +2,10 @@
 //! the older one.
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -14,7 +14,7 @@ pub(crate) fn read(
     let record = LogRecord::read(payload)?;
     if let Some(node) = doubled(&record) {
         let node = heard.name(&node);
-        heard.claim(Claim::Duplicate(node), Degree::Stated, || {
+        heard.observation(Observation::Duplicate(node), Confidence::Stated, || {
             format!("{} logs: {}", record.logger, record.text)
         });
     }
@@ -45,7 +45,7 @@ fn doubled(record: &LogRecord<'_>) -> Option<String> {
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let all = known.facts.list.clone();
     for fact in all {
-        let Claim::Duplicate(name) = fact.claim else {
+        let Observation::Duplicate(name) = fact.observation else {
             continue;
         };
         if fact.source != source {

@@ -1,8 +1,8 @@
 //! `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` are a node's own. A
 //! caller of another name, unless the topic lies below it, runs that node as a nodelet.
 
-use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name, SourceId};
 
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
@@ -46,10 +46,10 @@ fn is_nodelet(caller: &str, node: &str) -> bool {
 fn own(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.topic == topic {
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Publish(node, topic),
                 source,
-                degree: Degree::Inferred,
+                confidence: Confidence::Inferred,
                 when: Validity::Messages(at),
             });
         }

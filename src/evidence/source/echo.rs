@@ -7,11 +7,11 @@ use std::ops::Range;
 use super::SourceContext;
 use crate::base::name::in_space;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Degree, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::observation::{Confidence, Name, SourceId};
 use crate::evidence::texts::{LoggedText, ShownValue};
 
 /// The fewest different values that are not chance; numbers are more often equal than words.
@@ -283,17 +283,17 @@ fn tell(
     if known.knows(what) || known.denies(what) {
         return;
     }
-    let proof = Proof {
+    let inference = Inference {
         what,
         source,
-        degree: Degree::Stated,
+        confidence: Confidence::Stated,
         when: Validity::Signs {
             signs: echo.texts.iter().map(|(time, _)| *time).collect(),
             ends: Vec::new(),
         },
     };
     let first = echo.texts.first().map(|(time, _)| *time);
-    known.because(proof, first, |_| {
+    known.because(inference, first, |_| {
         let (texts, values) = (echo.texts.len(), echo.values.len());
         format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
     });

@@ -2,7 +2,7 @@
 //! again and again, subscribes that input.
 //!
 //! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs are possible
-//! and nothing tells them apart, no claim is made, and none about a simulation, in which all that is sent in one step
+//! and nothing tells them apart, no observation is made, and none about a simulation, in which all that is sent in one step
 //! has one stamp.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,10 +11,10 @@ use super::SourceContext;
 use crate::bag::{Connection, Encoding};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, ClaimRecord, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::definition::outline;
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
@@ -164,12 +164,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 fn is_simulated(known: &Conclusions<'_>) -> bool {
     let is_clock = |topic: Name| known.kind(topic) == "rosgraph_msgs/Clock";
     let has_clock = known.streams.iter().any(|s| is_clock(s.topic));
-    let sets = |fact: &ClaimRecord| {
+    let sets = |fact: &ObservationRecord| {
         SOURCES
             .get(fact.source)
             .is_some_and(|s| s.word == "sim_time")
     };
-    let is_set = |fact: &&ClaimRecord| matches!(fact.claim, Claim::Subscribe(..)) && sets(fact);
+    let is_set = |fact: &&ObservationRecord| {
+        matches!(fact.observation, Observation::Subscribe(..)) && sets(fact)
+    };
     has_clock || known.facts.list.iter().any(|fact| is_set(&fact))
 }
 

@@ -2,9 +2,9 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::observation::{Confidence, Observation};
 
 /// `lifecycle_msgs/msg/TransitionEvent`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -40,11 +40,15 @@ pub(crate) fn read(
     let node = heard.name(name);
     let state = heard.name(to);
     let words = || format!("{name} goes from {from} to {to} ({transition})");
-    heard.claim(
-        Claim::Publish(node, heard.stream.topic),
-        Degree::Stated,
+    heard.observation(
+        Observation::Publish(node, heard.stream.topic),
+        Confidence::Stated,
         words,
     );
-    heard.claim(Claim::Lifecycle(node, state), Degree::Stated, words);
+    heard.observation(
+        Observation::Lifecycle(node, state),
+        Confidence::Stated,
+        words,
+    );
     Ok(())
 }

@@ -2,8 +2,8 @@
 //! subscriptions; and the recorder's `Subscribing to`, which dates the moment a topic appeared.
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -18,7 +18,7 @@ pub(crate) fn read(
         && let Some(topic) = text.strip_prefix("Subscribing to ")
     {
         let topic = heard.name(topic.trim());
-        heard.claim(Claim::Appears(topic), Degree::Stated, || {
+        heard.observation(Observation::Appears(topic), Confidence::Stated, || {
             format!("{name}: {text}")
         });
     }
@@ -27,17 +27,17 @@ pub(crate) fn read(
         let node = heard.name(link.node.unwrap_or(name));
         let topic = heard.name(link.topic);
         let words = || format!("{name} logs: {text}");
-        let claim = match link.how {
-            How::Begins => Claim::Joins(node, topic),
-            How::Lasts => Claim::Subscribe(node, topic),
-            How::Refused => Claim::Refused(node, topic),
+        let observation = match link.how {
+            How::Begins => Observation::Joins(node, topic),
+            How::Lasts => Observation::Subscribe(node, topic),
+            How::Refused => Observation::Refused(node, topic),
             How::Ends => {
                 // It was there until now.
-                heard.claim(Claim::Node(node), Degree::Stated, words);
-                Claim::Unsubscribe(node, topic)
+                heard.observation(Observation::Node(node), Confidence::Stated, words);
+                Observation::Unsubscribe(node, topic)
             }
         };
-        heard.claim(claim, Degree::Stated, words);
+        heard.observation(observation, Confidence::Stated, words);
     }
     Ok(())
 }

@@ -2,10 +2,10 @@
 //! quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind, Proof, Validity};
+use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -18,31 +18,31 @@ pub(crate) fn read(
     }
     if let Some((begins, topic)) = bridged(record.text) {
         let (node, of) = (heard.name(&record.logger), heard.name(topic));
-        let claim = if begins {
-            Claim::SaysSubscribe(node, of)
+        let observation = if begins {
+            Observation::SaysSubscribe(node, of)
         } else {
-            Claim::Unsubscribe(node, of)
+            Observation::Unsubscribe(node, of)
         };
-        heard.claim(claim, Degree::Stated, String::new);
+        heard.observation(observation, Confidence::Stated, String::new);
     } else if let Some((publishes, topic)) = named(record.text) {
         let (node, of) = (heard.name(&record.logger), heard.name(topic));
-        let claim = if publishes {
-            Claim::SaysPublish(node, of)
+        let observation = if publishes {
+            Observation::SaysPublish(node, of)
         } else {
-            Claim::SaysSubscribe(node, of)
+            Observation::SaysSubscribe(node, of)
         };
-        heard.claim(claim, Degree::Stated, String::new);
+        heard.observation(observation, Confidence::Stated, String::new);
         if record.text.contains("incompatible QoS") {
             let policy = record.text.split_once("incompatible policy: ");
             let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
             let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
             let policy = heard.name(&policy);
-            let claim = if publishes {
-                Claim::Starves(node, of, policy)
+            let observation = if publishes {
+                Observation::Starves(node, of, policy)
             } else {
-                Claim::Starved(node, of, policy)
+                Observation::Starved(node, of, policy)
             };
-            heard.claim(claim, Degree::Stated, || {
+            heard.observation(observation, Confidence::Stated, || {
                 format!("{} logs: {}", record.logger, record.text)
             });
         }
@@ -114,12 +114,12 @@ fn bridged(text: &str) -> Option<(bool, &str)> {
 
 /// Adds edges only for topics of the bag: a text may mean a device or a file.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for (fact, signs, ends) in known.claims(source) {
-        let (logger, topic, publishes, policy) = match fact.claim {
-            Claim::SaysPublish(logger, topic) => (logger, topic, true, None),
-            Claim::SaysSubscribe(logger, topic) => (logger, topic, false, None),
-            Claim::Starves(logger, topic, policy) => (logger, topic, true, Some(policy)),
-            Claim::Starved(logger, topic, policy) => (logger, topic, false, Some(policy)),
+    for (fact, signs, ends) in known.observations(source) {
+        let (logger, topic, publishes, policy) = match fact.observation {
+            Observation::SaysPublish(logger, topic) => (logger, topic, true, None),
+            Observation::SaysSubscribe(logger, topic) => (logger, topic, false, None),
+            Observation::Starves(logger, topic, policy) => (logger, topic, true, Some(policy)),
+            Observation::Starved(logger, topic, policy) => (logger, topic, false, Some(policy)),
             _ => continue,
         };
         let Some(node) = known.owner(&known.text(logger)) else {
@@ -145,10 +145,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         let first = signs.first().copied();
-        let proof = Proof {
+        let inference = Inference {
             what,
             source,
-            degree: Degree::Stated,
+            confidence: Confidence::Stated,
             when: Validity::Signs { signs, ends },
         };
         let verb = if publishes {
@@ -156,7 +156,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         } else {
             "subscribes to"
         };
-        known.because(proof, first, |known| {
+        known.because(inference, first, |known| {
             format!("{} logs that it {verb} {full}", known.text(logger))
         });
     }

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 /// `rosbag2_interfaces/msg/MessagesLostEvent`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -40,7 +40,7 @@ pub(crate) fn read(
     for (topic, in_transport, in_recorder) in all {
         let lost = in_transport.saturating_add(in_recorder);
         let (of, many) = (heard.name(topic), heard.name(&lost.to_string()));
-        heard.claim(Claim::Lost(of, many), Degree::Stated, || {
+        heard.observation(Observation::Lost(of, many), Confidence::Stated, || {
             format!("{recorder} lost {in_transport} messages of {topic} in transport and {in_recorder} itself")
         });
     }
@@ -51,7 +51,7 @@ pub(crate) fn read(
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let mut lost: BTreeMap<Name, Vec<(Stamp, u64)>> = BTreeMap::new();
     for fact in known.facts.list.clone() {
-        if let Claim::Lost(topic, many) = fact.claim
+        if let Observation::Lost(topic, many) = fact.observation
             && known.is_recorded(topic)
             && let Ok(many @ 1..) = known.text(many).parse::<u64>()
         {

@@ -3,10 +3,10 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::time::Span;
-use crate::evidence::claim::{Claim, Degree, Measurement, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::observation::{Confidence, Measurement, Observation, SourceId};
 
 /// `statistics_msgs/msg/MetricsMessage`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -47,8 +47,8 @@ pub(crate) fn read(
     payload.finish()?;
     if !node.is_empty() {
         let name = heard.name(&format!("/{}", node.trim_start_matches('/')));
-        let claim = Claim::Reports(name, heard.stream.topic);
-        heard.claim(claim, Degree::Stated, || {
+        let observation = Observation::Reports(name, heard.stream.topic);
+        heard.observation(observation, Confidence::Stated, || {
             format!("{node} tells of its {metric}")
         });
         let nanos = |number: f64| {
@@ -87,13 +87,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         one.subscriber = one.subscriber.map(|node| known.meant(node));
     }
     known.facts.measured = measured;
-    for (fact, signs, ends) in known.claims(source) {
-        if let Claim::Reports(node, topic) = fact.claim {
+    for (fact, signs, ends) in known.observations(source) {
+        if let Observation::Reports(node, topic) = fact.observation {
             let node = known.meant(node);
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Publish(node, topic),
                 source,
-                degree: fact.degree,
+                confidence: fact.confidence,
                 when: Validity::Signs { signs, ends },
             });
         }

@@ -1,8 +1,8 @@
 //! The publisher of a topic whose messages name none: where only one node is known to publish it, the messages are from
 //! that node.
 
-use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, SourceId};
 
 /// Topics that any node may publish, so that one known publisher does not imply that it is the only one.
 const SHARED: [&str; 8] = [
@@ -24,10 +24,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let mut publishers = known.publishers(stream.topic);
         if let (Some(only), None) = (publishers.next(), publishers.next()) {
             drop(publishers);
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Publish(only, stream.topic),
                 source,
-                degree: Degree::Inferred,
+                confidence: Confidence::Inferred,
                 when: Validity::Messages(at),
             });
         }

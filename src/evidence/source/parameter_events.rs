@@ -1,9 +1,9 @@
 //! Parameter events of ROS 2: a node is alive.
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::parameters::ParameterEvent;
+use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -13,19 +13,21 @@ pub(crate) fn read(
     let name = event.node;
     if event.is_start && !name.is_empty() {
         let node = heard.name(name);
-        heard.claim(Claim::Begins(node), Degree::Stated, || {
+        heard.observation(Observation::Begins(node), Confidence::Stated, || {
             format!("{name} declares `use_sim_time`, as it starts")
         });
     }
     if !name.is_empty() {
         let node = heard.name(name);
-        heard.claim(Claim::Node(node), Degree::Stated, || {
+        heard.observation(Observation::Node(node), Confidence::Stated, || {
             format!("{name} tells of its parameters")
         });
         let topic = heard.stream.topic;
-        heard.claim(Claim::Publish(node, topic), Degree::Stated, || {
-            format!("{name} tells of its parameters")
-        });
+        heard.observation(
+            Observation::Publish(node, topic),
+            Confidence::Stated,
+            || format!("{name} tells of its parameters"),
+        );
     }
     Ok(())
 }

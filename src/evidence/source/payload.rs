@@ -14,8 +14,8 @@ use foldhash::{HashMap, HashSet};
 use super::SourceContext;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::observation::{Name, SourceId};
 use crate::evidence::spread::Spread;
 
 /// The fewest equal messages that are not chance.

@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::Conclusions;
+use crate::evidence::inference::Conclusions;
+use crate::evidence::observation::{Name, SourceId};
 
 /// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
 const TAKEN: [&str; 16] = [

@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use super::SourceContext;
 use crate::base::yaml;
-use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 /// The quality of service that one publisher offers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,22 +61,24 @@ pub(crate) fn announced(heard: &mut SourceContext<'_>) {
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
         let (topic, quality) = (heard.stream.topic, heard.name(&words));
-        heard.claim(Claim::Quality(topic, quality), Degree::Declared, || {
-            format!("offered as {words}")
-        });
+        heard.observation(
+            Observation::Quality(topic, quality),
+            Confidence::Declared,
+            || format!("offered as {words}"),
+        );
     }
 }
 
 /// Declares every topic with an offer, even without messages.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.facts.list.clone() {
-        if let Claim::Quality(topic, _) = fact.claim
+        if let Observation::Quality(topic, _) = fact.observation
             && fact.source == source
         {
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Topic(topic),
                 source,
-                degree: Degree::Declared,
+                confidence: Confidence::Declared,
                 when: Validity::Whole,
             });
         }

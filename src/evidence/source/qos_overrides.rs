@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::parameters::ParameterEvent;
+use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -16,12 +16,12 @@ pub(crate) fn read(
     let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end(p.name)).collect();
     for (topic, publishes) in ends {
         let (node, of) = (heard.name(event.node), heard.name(topic));
-        let (word, claim) = if publishes {
-            ("publisher", Claim::Publish(node, of))
+        let (word, observation) = if publishes {
+            ("publisher", Observation::Publish(node, of))
         } else {
-            ("subscription", Claim::Subscribe(node, of))
+            ("subscription", Observation::Subscribe(node, of))
         };
-        heard.claim(claim, Degree::Stated, || {
+        heard.observation(observation, Confidence::Stated, || {
             format!("{} declares qos_overrides.{topic}.{word}", event.node)
         });
     }

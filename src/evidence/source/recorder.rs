@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use super::SourceContext;
 use crate::base::name::is_recorder;
-use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 /// The ends of the recorder's source paths: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
@@ -21,7 +21,7 @@ pub(crate) fn read(
     let file = record.file.replace('\\', "/");
     if FILES.iter().any(|end| file.ends_with(end)) {
         let node = heard.name(&record.logger);
-        heard.claim(Claim::Node(node), Degree::Stated, || {
+        heard.observation(Observation::Node(node), Confidence::Stated, || {
             format!("{} records: {}", record.logger, record.text)
         });
     }
@@ -31,18 +31,18 @@ pub(crate) fn read(
 /// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be distinguished.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = known.facts.list.iter().filter(|fact| fact.source == source);
-    let told = told.filter_map(|fact| match fact.claim {
-        Claim::Node(node) => Some(node),
+    let told = told.filter_map(|fact| match fact.observation {
+        Observation::Node(node) => Some(node),
         _ => None,
     });
     let nodes = known.nodes().iter().copied();
     let named = nodes.filter(|node| is_recorder(&known.text(*node)));
     let recorders: BTreeSet<Name> = told.chain(named).collect();
     for recorder in &recorders {
-        known.prove(Proof {
+        known.add(Inference {
             what: ElementKey::Node(*recorder),
             source,
-            degree: Degree::Stated,
+            confidence: Confidence::Stated,
             when: Validity::Unending,
         });
     }
@@ -53,10 +53,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let topics: BTreeSet<Name> = robots.map(|s| s.topic).collect();
     for recorder in recorders {
         for topic in &topics {
-            known.prove(Proof {
+            known.add(Inference {
                 what: ElementKey::Subscribe(*topic, recorder),
                 source,
-                degree: Degree::Stated,
+                confidence: Confidence::Stated,
                 when: Validity::Like(ElementKey::Topic(*topic)),
             });
         }

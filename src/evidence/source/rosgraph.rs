@@ -10,11 +10,11 @@ use std::collections::BTreeSet;
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::name::UNKNOWN_NODE;
-use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId, Statement};
 
 /// `rosgraph_msgs/msg/Graph`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -192,13 +192,13 @@ struct SnapshotEnd<'a> {
     qos: Option<&'a MessageValue>,
 }
 
-/// Adds the claims of nodes in one snapshot; `of` distinguishes snapshots of single nodes.
+/// Adds the observations of nodes in one snapshot; `of` distinguishes snapshots of single nodes.
 fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
     let topic = heard.stream.connection.topic.shared();
     let group = heard.name(format!("snapshot {topic} {of}").trim_end());
-    let now = |claim| Statement {
-        claim,
-        degree: Degree::Stated,
+    let now = |observation| Statement {
+        observation,
+        confidence: Confidence::Stated,
         snapshot: Some(group),
     };
     let (mut offered, mut asked, mut seen) = (Vec::new(), Vec::new(), BTreeSet::new());
@@ -210,39 +210,43 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         if name == UNKNOWN_NODE {
             for (_, topic, kind, _) in ends(node) {
                 let (of, kind) = (heard.name(&topic), heard.name(kind));
-                heard.say(now(Claim::Topic(of)), || format!("{topic} is in the graph"));
-                heard.say(now(Claim::Type(of, kind)), String::new);
+                heard.say(now(Observation::Topic(of)), || {
+                    format!("{topic} is in the graph")
+                });
+                heard.say(now(Observation::Type(of, kind)), String::new);
             }
             continue;
         }
         let id = heard.name(name);
-        heard.say(now(Claim::Node(id)), || {
+        heard.say(now(Observation::Node(id)), || {
             format!("{name} is in the graph{}", parameters(node))
         });
         if !seen.insert(name) {
             let twice = || format!("{name} is twice in the graph");
-            heard.claim(Claim::Duplicate(id), Degree::Stated, twice);
+            heard.observation(Observation::Duplicate(id), Confidence::Stated, twice);
         }
         for (is_sent, topic, kind, qos) in ends(node) {
             let (of, kind) = (heard.name(&topic), heard.name(kind));
-            let (claim, verb) = if is_sent {
-                (Claim::Publish(id, of), "publishes")
+            let (observation, verb) = if is_sent {
+                (Observation::Publish(id, of), "publishes")
             } else {
-                (Claim::Subscribe(id, of), "subscribes to")
+                (Observation::Subscribe(id, of), "subscribes to")
             };
             let quality = qos.and_then(quality);
-            heard.say(now(claim), || {
+            heard.say(now(observation), || {
                 let quality = quality
                     .as_ref()
                     .map_or_else(String::new, |q| format!(" ({q})"));
                 format!("{name} {verb} {topic}{quality}")
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
-                let claim = Claim::Quality(of, heard.name(&quality));
-                heard.claim(claim, Degree::Stated, || format!("offered as {quality}"));
+                let observation = Observation::Quality(of, heard.name(&quality));
+                heard.observation(observation, Confidence::Stated, || {
+                    format!("offered as {quality}")
+                });
             }
             if !heard.facts.text(kind).is_empty() {
-                heard.say(now(Claim::Type(of, kind)), String::new);
+                heard.say(now(Observation::Type(of, kind)), String::new);
             }
             let all = if is_sent { &mut offered } else { &mut asked };
             all.push(SnapshotEnd {
@@ -259,13 +263,17 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             && policies.all(|p| p.is_some())
         {
             let (topic, policy) = (heard.name(&end.topic), heard.name(policy));
-            let claim = Claim::Starved(end.node, topic, policy);
-            heard.claim(claim, Degree::Stated, || {
+            let observation = Observation::Starved(end.node, topic, policy);
+            heard.observation(observation, Confidence::Stated, || {
                 "no publisher offers what it asks for".to_owned()
             });
         }
     }
-    heard.claim(Claim::Snapshot(group), Degree::Stated, String::new);
+    heard.observation(
+        Observation::Snapshot(group),
+        Confidence::Stated,
+        String::new,
+    );
 }
 
 /// An end in a message: whether it is sent, the topic, its type and its quality of service.
@@ -408,13 +416,13 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
 /// Adds the subscribers that get nothing, and the names that are used twice.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.facts.list.clone() {
-        let (what, kind) = match fact.claim {
+        let (what, kind) = match fact.observation {
             _ if fact.source != source => continue,
-            Claim::Starved(node, topic, policy) => (
+            Observation::Starved(node, topic, policy) => (
                 ElementKey::Subscribe(topic, node),
                 IncidentKind::Starved(known.text(policy)),
             ),
-            Claim::Duplicate(node) => (ElementKey::Node(node), IncidentKind::Duplicate),
+            Observation::Duplicate(node) => (ElementKey::Node(node), IncidentKind::Duplicate),
             _ => continue,
         };
         // Each snapshot repeats it.

@@ -9,9 +9,11 @@ use super::SourceContext;
 use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
+use crate::evidence::observation::{
+    Confidence, Name, Observation, Observations, SourceId, Statement,
+};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -35,21 +37,25 @@ pub(crate) fn read(
         return Ok(());
     }
     let node = heard.name(name);
-    heard.claim(Claim::Node(node), Degree::Stated, || {
+    heard.observation(Observation::Node(node), Confidence::Stated, || {
         format!("{name} logs: {message}")
     });
     let log = heard.stream.topic;
     if heard.stream.connection.topic.as_str() == "/rosout" {
         if number <= FIRST_RECORD {
-            heard.claim(Claim::Begins(node), Degree::Stated, || {
+            heard.observation(Observation::Begins(node), Confidence::Stated, || {
                 format!("{name} logs its first record: {message}")
             });
         }
-        heard.claim(Claim::Publish(node, log), Degree::Stated, || {
+        heard.observation(Observation::Publish(node, log), Confidence::Stated, || {
             format!("{name} logs: {message}")
         });
         if let Some(publisher) = heard.stream.publisher.filter(|p| *p != node) {
-            heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
+            heard.observation(
+                Observation::Carries(publisher, node),
+                Confidence::Stated,
+                String::new,
+            );
         }
     }
     if is_rospy(file) {
@@ -60,13 +66,13 @@ pub(crate) fn read(
 }
 
 /// Takes the lists of nodes of roscpp for what they are: lists of publications.
-pub(crate) fn settle(facts: &mut Claims) {
+pub(crate) fn settle(facts: &mut Observations) {
     let rospy = std::mem::take(&mut facts.rospy);
     for fact in &mut facts.list {
-        if let Claim::Lists(node, topic) = fact.claim
+        if let Observation::Lists(node, topic) = fact.observation
             && !rospy.contains(&node)
         {
-            fact.claim = Claim::Publish(node, topic);
+            fact.observation = Observation::Publish(node, topic);
         }
     }
 }
@@ -92,22 +98,22 @@ fn list(heard: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[
         let topic = heard.name(topic);
         heard.say(
             Statement {
-                claim: Claim::Lists(node, topic),
-                degree: Degree::Stated,
+                observation: Observation::Lists(node, topic),
+                confidence: Confidence::Stated,
                 snapshot: Some(list),
             },
             words,
         );
     }
-    heard.claim(Claim::Snapshot(list), Degree::Stated, String::new);
+    heard.observation(Observation::Snapshot(list), Confidence::Stated, String::new);
 }
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
 /// subscription. If no publisher is known, a recorder of all topics shows whether there is one.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let advertised = advertised(known);
-    for (fact, signs, ends) in known.claims(source) {
-        let Claim::Lists(node, topic) = fact.claim else {
+    for (fact, signs, ends) in known.observations(source) {
+        let Observation::Lists(node, topic) = fact.observation else {
             continue;
         };
         let own = known.publishers(topic).any(|p| p == node) || has_twin(known, node, topic);
@@ -125,14 +131,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             (false, true) => ElementKey::Subscribe(topic, node),
             (false, false) => continue,
         };
-        known.prove(Proof {
+        known.add(Inference {
             what,
             source,
             // If headers do not name all publishers, a node that names a topic may be one of them.
-            degree: if told {
-                Degree::Stated
+            confidence: if told {
+                Confidence::Stated
             } else {
-                Degree::Inferred
+                Confidence::Inferred
             },
             when: Validity::Signs { signs, ends },
         });
@@ -169,8 +175,8 @@ fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool 
     let names = |twin| {
         let facts = known.facts.list.iter();
         facts
-            .map(|f| f.claim)
-            .any(|c| c == Claim::Lists(node, twin))
+            .map(|f| f.observation)
+            .any(|c| c == Observation::Lists(node, twin))
     };
     !told && !twin.is_some_and(names)
 }
@@ -181,7 +187,7 @@ fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
     let mut seen: Option<(Stamp, Stamp)> = None;
     for fact in known.facts.list.clone() {
-        if let Claim::Appears(topic) = fact.claim {
+        if let Observation::Appears(topic) = fact.observation {
             topics.insert(topic);
             for time in known.times(&fact) {
                 let (first, last) = seen.unwrap_or((time, time));

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -26,7 +26,7 @@ pub(crate) fn read(
     let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
     let node = heard.name(&text);
     let topic = heard.stream.topic;
-    heard.claim(Claim::Logger(node, topic), Degree::Stated, || {
+    heard.observation(Observation::Logger(node, topic), Confidence::Stated, || {
         format!("logger {name}: {message}")
     });
     Ok(())
@@ -43,11 +43,11 @@ const PARTS: [&str; 5] = [
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let claims = known.claims(source);
-    let loggers = claims
+    let observations = known.observations(source);
+    let loggers = observations
         .iter()
-        .filter_map(|(fact, signs, _)| match fact.claim {
-            Claim::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
+        .filter_map(|(fact, signs, _)| match fact.observation {
+            Observation::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
             _ => None,
         });
     let mut loggers: Vec<_> = loggers.collect();
@@ -57,10 +57,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
         let what = ElementKey::Publish(known.facts.name(node), topic);
-        known.prove(Proof {
+        known.add(Inference {
             what,
             source,
-            degree: Degree::Stated,
+            confidence: Confidence::Stated,
             when: Validity::Signs {
                 signs,
                 ends: Vec::new(),

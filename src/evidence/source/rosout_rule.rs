@@ -3,8 +3,8 @@
 
 use crate::bag::Encoding;
 use crate::base::name::in_space;
-use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
+use crate::evidence::observation::{Confidence, Name, SourceId};
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let ros1 = known
@@ -31,21 +31,21 @@ fn add(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
     let [log, all] =
         ["/rosout", "/rosout_agg"].map(|name| known.facts.name(&in_space(space, name)));
-    let rule = |what, when| Proof {
+    let rule = |what, when| Inference {
         what,
         source,
-        degree: Degree::Inferred,
+        confidence: Confidence::Inferred,
         when,
     };
     for node in nodes {
         if node != log {
-            known.prove(rule(
+            known.add(rule(
                 ElementKey::Publish(node, log),
                 Validity::Like(ElementKey::Node(node)),
             ));
         }
     }
-    known.prove(rule(ElementKey::Node(log), Validity::Always));
-    known.prove(rule(ElementKey::Publish(log, all), Validity::Always));
-    known.prove(rule(ElementKey::Subscribe(log, log), Validity::Always));
+    known.add(rule(ElementKey::Node(log), Validity::Always));
+    known.add(rule(ElementKey::Publish(log, all), Validity::Always));
+    known.add(rule(ElementKey::Subscribe(log, log), Validity::Always));
 }

@@ -1,8 +1,8 @@
 //! The choice that a mux reports on `<mux>/selected`: it subscribes to that topic, and passes it on from then on.
 
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
+use crate::evidence::observation::{Name, SourceId};
 
 /// The name of the topic below that of the mux.
 const SELECTED: &str = "/selected";

@@ -4,9 +4,9 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::name::SERVICE;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::observation::{Confidence, Observation};
 
 /// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -44,13 +44,17 @@ pub(crate) fn read(
         let kind = heard.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
         let called = heard.name(service);
         let end = match word {
-            "request sent" | "reply received" => Claim::Publish(node, called),
-            _ => Claim::Subscribe(node, called),
+            "request sent" | "reply received" => Observation::Publish(node, called),
+            _ => Observation::Subscribe(node, called),
         };
-        heard.claim(end, Degree::Measured, || format!("{service}: {word}"));
-        heard.claim(Claim::Type(called, kind), Degree::Measured, String::new);
+        heard.observation(end, Confidence::Measured, || format!("{service}: {word}"));
+        heard.observation(
+            Observation::Type(called, kind),
+            Confidence::Measured,
+            String::new,
+        );
     }
     let words = || format!("{service}: {word}, client {client}");
-    heard.claim(Claim::Topic(of), Degree::Measured, words);
+    heard.observation(Observation::Topic(of), Confidence::Measured, words);
     Ok(())
 }

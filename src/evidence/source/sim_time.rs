@@ -1,9 +1,9 @@
 //! `use_sim_time` in parameter events of ROS 2: a node that runs by simulated time subscribes to `/clock`.
 
 use super::SourceContext;
-use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::parameters::ParameterEvent;
+use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
@@ -15,12 +15,12 @@ pub(crate) fn read(
         return Ok(());
     };
     let (node, clock) = (heard.name(event.node), heard.name("/clock"));
-    let claim = if simulated {
-        Claim::Subscribe(node, clock)
+    let observation = if simulated {
+        Observation::Subscribe(node, clock)
     } else {
-        Claim::Unsubscribe(node, clock)
+        Observation::Unsubscribe(node, clock)
     };
-    heard.claim(claim, Degree::Inferred, || {
+    heard.observation(observation, Confidence::Inferred, || {
         let then = if simulated {
             ""
         } else {

@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::inference::{Conclusions, ElementKey};
+use crate::evidence::observation::{Name, SourceId};
 
 /// The fewest topics of their namespace that twins publish: one alone may be chance.
 const FEWEST: usize = 2;

@@ -3,9 +3,9 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::time::Span;
-use crate::evidence::claim::{Claim, Degree, Measurement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::observation::{Confidence, Measurement, Observation};
 
 /// `rosgraph_msgs/TopicStatistics`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -55,11 +55,15 @@ pub(crate) fn read(
     });
     if !publisher.is_empty() {
         let node = heard.name(publisher);
-        heard.claim(Claim::Publish(node, of), Degree::Measured, words);
+        heard.observation(Observation::Publish(node, of), Confidence::Measured, words);
     }
     if !subscriber.is_empty() {
         let node = heard.name(subscriber);
-        heard.claim(Claim::Subscribe(node, of), Degree::Measured, words);
+        heard.observation(
+            Observation::Subscribe(node, of),
+            Confidence::Measured,
+            words,
+        );
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! A listener of `/tf` is a listener of `/tf_static`, and the other way round: tf2 always subscribes both.
 
-use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, ElementKey};
+use crate::evidence::inference::{Conclusions, ElementKey};
+use crate::evidence::observation::{Name, SourceId};
 
 const PAIR: [&str; 2] = ["tf", "tf_static"];
 

@@ -4,9 +4,9 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::{Claim, Degree, Measurement};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
+use crate::evidence::observation::{Confidence, Measurement, Observation};
 
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -47,9 +47,9 @@ pub(crate) fn read(
     payload.finish()?;
     for (kind, node, topic, count, mean) in all {
         let (name, of) = (heard.name(node), heard.name(topic));
-        let (verb, claim) = match kind {
-            PUBLISHED_PERIOD => ("publishes", Claim::Publish(name, of)),
-            _ => ("receives", Claim::Subscribe(name, of)),
+        let (verb, observation) = match kind {
+            PUBLISHED_PERIOD => ("publishes", Observation::Publish(name, of)),
+            _ => ("receives", Observation::Subscribe(name, of)),
         };
         if kind == AGE && count > 0 {
             heard.measure(Measurement {
@@ -66,12 +66,12 @@ pub(crate) fn read(
             });
         }
         // A statistic over no messages only proves that the endpoint exists.
-        let degree = if count > 0 {
-            Degree::Measured
+        let confidence = if count > 0 {
+            Confidence::Measured
         } else {
-            Degree::Stated
+            Confidence::Stated
         };
-        heard.claim(claim, degree, || {
+        heard.observation(observation, confidence, || {
             format!("{node} {verb} {topic}: {count} messages counted")
         });
     }

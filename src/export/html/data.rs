@@ -19,9 +19,9 @@ use crate::draw::picture::chips;
 use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
+use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
-use crate::mission::ledger::Kind;
-use crate::mission::{EntryId, Mission};
+use crate::mission::{EventId, Mission};
 use crate::view::runs::ElementRuns;
 use crate::view::{Arrow, ArrowKind, Frame, Item};
 
@@ -52,7 +52,7 @@ struct PageData<'a> {
     /// The lifelines, from top to bottom.
     rows: Vec<RowData>,
     /// Hand-overs: the time, the old row, the new row, and the event's index in the log.
-    hands: Vec<(f64, usize, usize, EntryId)>,
+    hands: Vec<(f64, usize, usize, EventId)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
     /// The titles of the two windows of a comparison; absent otherwise.
@@ -96,14 +96,14 @@ struct ToldData(
     usize,
     usize,
     [String; 3],
-    Vec<(f64, u8, i64, String, EntryId)>,
+    Vec<(f64, u8, i64, String, EventId)>,
 );
 
 /// A lifeline: its element (-1 for a namespace's title), its name, 1 below such a title, its lifetimes as `[start, end,
 /// 1 by inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as
 /// their times, signs and places in the log.
 #[derive(Serialize)]
-struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EntryId)>);
+struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 
 /// The most headlines of one window that are listed.
 const MOST_TOLD: usize = 200;
@@ -137,7 +137,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         hands: lives.map_or_else(Vec::new, |lives| {
             let hands = lives.handovers.iter();
             hands
-                .map(|h| (clock.secs(h.at), h.from, h.to, h.entry))
+                .map(|h| (clock.secs(h.at), h.from, h.to, h.event))
                 .collect()
         }),
         sizes: [
@@ -238,7 +238,7 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
     let mission = page.sequence.mission;
     let frames = page.whole.view.frames.iter().enumerate();
     let frames = frames.filter(|(_, frame)| frame.is_changed());
-    let parts = mission.ledger.all_parts();
+    let parts = mission.log.all_parts();
     let told = |(at, frame): (usize, &Frame)| {
         let mut chips = chips(&frame.counts).map(|(text, _)| text);
         let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
@@ -250,7 +250,7 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
                 let (node, topic) = mission.elements.names(last.what);
                 let name = visible(node.or(topic).unwrap_or_default());
                 let text = format!("{name} is back after {}", words::duration(away));
-                Some((clock.secs(end), 2, place(&last.what), text, last.entry))
+                Some((clock.secs(end), 2, place(&last.what), text, last.event))
             })
             .collect();
         if frame.headlines.is_empty() {
@@ -261,11 +261,11 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
             .iter()
             .take(MOST_TOLD)
             .filter_map(|headline| {
-                let entry = mission.ledger.entries.get(headline.entry as usize)?;
+                let event = mission.log.events.get(headline.event as usize)?;
                 let what = place(&headline.what);
-                let sentence = sentence(mission, &parts, headline.entry, entry);
-                let time = clock.secs(entry.time);
-                Some((time, sign(entry.kind), what, sentence, headline.entry))
+                let sentence = sentence(mission, &parts, headline.event, event);
+                let time = clock.secs(event.time);
+                Some((time, sign(event.kind), what, sentence, headline.event))
             })
             .chain(returns);
         ToldData(at, frame.counts.total(), chips, lines.collect())
@@ -282,12 +282,12 @@ fn sign(kind: Kind) -> u8 {
 }
 
 fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
-    let phases = mission.ledger.phases.iter();
+    let phases = mission.log.phases.iter();
     let all = phases.map(|p| {
         let name = visible(&p.name).into_owned();
         (clock.secs(p.span.start), clock.secs(p.span.end), name)
     });
-    if mission.ledger.phases.len() > 1 {
+    if mission.log.phases.len() > 1 {
         all.collect()
     } else {
         Vec::new()
@@ -311,7 +311,7 @@ fn rows(lives_of: &LifeLines, places: &BTreeMap<Element, u32>, clock: PageClock)
                 Sign::End => 1,
                 Sign::Dot => 2,
             };
-            (clock.secs(mark.at), sign, mark.entry)
+            (clock.secs(mark.at), sign, mark.event)
         });
         let bars = line.bars.iter().flat_map(|bar| {
             let ninths = libm::round(bar.share * 9.0).max(1.0);

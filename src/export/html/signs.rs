@@ -123,7 +123,7 @@ fn picture(sign: &LegendSign) -> String {
             group("topic latched", &(BOX.to_owned() + bar))
         }
         LegendSign::Box(state) => group(&format!("topic {}", state.word()), BOX),
-        LegendSign::Line(degree) => group(&format!("edge active {}", degree.word()), LINE),
+        LegendSign::Line(confidence) => group(&format!("edge active {}", confidence.word()), LINE),
         // Pages draw every topic as a box.
         LegendSign::Row => String::new(),
         LegendSign::Service => group("topic", "<path d=\"M3 10l6 -6h18l6 6l-6 6h-18z\"/>"),

@@ -43,13 +43,13 @@ pub(super) fn rows(view: &View) -> String {
     {
         let millis = frame.span.start.since(start) / 1_000_000;
         let secs = millis as f64 / 1e3;
-        let entries: Vec<String> = frame
+        let events: Vec<String> = frame
             .headlines
             .iter()
-            .map(|h| h.entry.to_string())
+            .map(|h| h.event.to_string())
             .collect();
         xml.open("tr");
-        xml.attribute("data-entries", entries.join(" "));
+        xml.attribute("data-entries", events.join(" "));
         xml.open("th").open("a");
         xml.attribute("href", format_args!("#t={secs}"));
         if view.compares {

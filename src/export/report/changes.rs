@@ -5,8 +5,8 @@ use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, tables};
 use crate::base::words;
 use crate::graph::{Element, Elements};
 use crate::mission::Mission;
+use crate::mission::event_log::Kind;
 use crate::mission::events::sentence_with;
-use crate::mission::ledger::Kind;
 use crate::view::{Frame, Headline, View};
 
 /// The most names listed per kind.
@@ -16,7 +16,7 @@ const MOST_LISTED: usize = 12;
 
 /// The phases, collapsed; nothing if there is only one.
 pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
-    let phases = &mission.ledger.phases;
+    let phases = &mission.log.phases;
     if phases.len() < 2 {
         return String::new();
     }
@@ -76,8 +76,8 @@ fn changes_of(mission: &Mission, frame: &Frame) -> String {
     }
     let rest: Vec<&Headline> = frame.headlines.iter().filter(|h| !is_together(h)).collect();
     for headline in rest.iter().take(MOST_LISTED) {
-        let entry = mission.ledger.entries.get(headline.entry as usize);
-        parts.extend(entry.map(|entry| plain(&sentence_with(mission, &[], entry))));
+        let event = mission.log.events.get(headline.event as usize);
+        parts.extend(event.map(|event| plain(&sentence_with(mission, &[], event))));
     }
     if rest.len() > MOST_LISTED {
         parts.push(format!("and {} more", rest.len() - MOST_LISTED));

@@ -171,7 +171,7 @@ pub(super) fn evidence(mission: &Mission) -> String {
         ("publication", info.publishes_by_degree),
         ("subscription", info.subscribes_by_degree),
     ];
-    let parts = parts.map(|(word, degrees)| how_many(word, degrees));
+    let parts = parts.map(|(word, confidences)| how_many(word, confidences));
     let with = info.topics.iter().filter(|t| t.count > 0).count();
     let mut out = format!(
         "Known are {}. Of {} with messages, {} have a known publisher and {} a known subscriber.\n\n",

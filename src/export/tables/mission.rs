@@ -6,7 +6,7 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
 use crate::graph::{Element, NodeId, Topic};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, described};
+use crate::mission::event_log::{Detail, Event, described};
 
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
@@ -51,12 +51,12 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "ledger",
         batch: || Batch::with(LEDGER),
-        fill: |all, _, row| (0..all.ledger.entries.len()).for_each(|id| put(all, LEDGER, &id, row)),
+        fill: |all, _, row| (0..all.log.events.len()).for_each(|id| put(all, LEDGER, &id, row)),
     },
     Table {
         word: "phases",
         batch: || Batch::with(PHASES),
-        fill: |all, _, row| (0..all.ledger.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
+        fill: |all, _, row| (0..all.log.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
     },
     Table {
         word: "bags",
@@ -107,7 +107,7 @@ element_columns! {
     TYPES "types" Text |all, one| words(topic_of(all, one).iter().flat_map(|topic| &topic.types).map(|kind| &**kind));
     QOS "qos" Text |all, one| text(topic_of(all, one).and_then(|topic| topic.qos.as_deref()));
     STATE "state" Text |_, one| TableCell::text(one.state.word());
-    DEGREE "degree" Text |_, one| TableCell::text(one.degree.word());
+    DEGREE "degree" Text |_, one| TableCell::text(one.confidence.word());
     EVIDENCE "evidence" Text |all, one| words(all.elements.evidence(one.what).words());
     LIFECYCLE "lifecycle" Text |_, one| text(one.lifecycle.as_deref());
     N "n" I64 |_, one| count(one.count);
@@ -177,34 +177,34 @@ const CHANGES: &[Column<WindowChange>] = columns! {
 
 const LEDGER: &[Column<usize>] = columns! {
     "entry" I64 |_, id| TableCell::count(*id);
-    "kind" Text |all, id| TableCell::text(entry(all, *id).kind.word());
-    "what" Text |all, id| what(entry(all, *id).what);
-    "node" Text |all, id| node(all, entry(all, *id).what);
-    "topic" Text |all, id| topic(all, entry(all, *id).what);
-    "time_ns" Time |all, id| TableCell::Time(entry(all, *id).time);
-    "earliest_ns" Time |all, id| TableCell::Time(entry(all, *id).earliest);
-    "latest_ns" Time |all, id| TableCell::Time(entry(all, *id).latest);
-    "until_ns" Time |all, id| time(entry(all, *id).until);
-    "from_hz" F64 |all, id| float(rates(&entry(all, *id).detail).0);
-    "to_hz" F64 |all, id| float(rates(&entry(all, *id).detail).1);
-    "from_value" Text |all, id| values(all, &entry(all, *id).detail).0;
-    "to_value" Text |all, id| values(all, &entry(all, *id).detail).1;
-    "degree" Text |all, id| TableCell::text(entry(all, *id).degree.word());
-    "evidence" Text |all, id| words(entry(all, *id).evidence.words());
-    "part_of" I64 |all, id| count(entry(all, *id).part_of.map(u64::from));
-    "is_quiet" Flag |all, id| TableCell::Flag(entry(all, *id).quiet);
-    "weight" I64 |all, id| TableCell::count(entry(all, *id).weight);
+    "kind" Text |all, id| TableCell::text(event(all, *id).kind.word());
+    "what" Text |all, id| what(event(all, *id).what);
+    "node" Text |all, id| node(all, event(all, *id).what);
+    "topic" Text |all, id| topic(all, event(all, *id).what);
+    "time_ns" Time |all, id| TableCell::Time(event(all, *id).time);
+    "earliest_ns" Time |all, id| TableCell::Time(event(all, *id).earliest);
+    "latest_ns" Time |all, id| TableCell::Time(event(all, *id).latest);
+    "until_ns" Time |all, id| time(event(all, *id).until);
+    "from_hz" F64 |all, id| float(rates(&event(all, *id).detail).0);
+    "to_hz" F64 |all, id| float(rates(&event(all, *id).detail).1);
+    "from_value" Text |all, id| values(all, &event(all, *id).detail).0;
+    "to_value" Text |all, id| values(all, &event(all, *id).detail).1;
+    "degree" Text |all, id| TableCell::text(event(all, *id).confidence.word());
+    "evidence" Text |all, id| words(event(all, *id).evidence.words());
+    "part_of" I64 |all, id| count(event(all, *id).part_of.map(u64::from));
+    "is_quiet" Flag |all, id| TableCell::Flag(event(all, *id).quiet);
+    "weight" I64 |all, id| TableCell::count(event(all, *id).weight);
 };
 
 const PHASES: &[Column<usize>] = columns! {
     "phase" I64 |_, at| TableCell::count(*at);
-    "start_ns" Time |all, at| start(all.ledger.phases[*at].span);
-    "end_ns" Time |all, at| end(all.ledger.phases[*at].span);
-    "length_ns" I64 |all, at| length(all.ledger.phases[*at].span);
-    "phase_name" Text |all, at| TableCell::text(&*all.ledger.phases[*at].name);
-    "nodes_added" I64 |all, at| TableCell::count(all.ledger.phases[*at].nodes_added);
-    "nodes_removed" I64 |all, at| TableCell::count(all.ledger.phases[*at].nodes_removed);
-    "same_as" I64 |all, at| count(all.ledger.phases[*at].same_as.map(u64::from));
+    "start_ns" Time |all, at| start(all.log.phases[*at].span);
+    "end_ns" Time |all, at| end(all.log.phases[*at].span);
+    "length_ns" I64 |all, at| length(all.log.phases[*at].span);
+    "phase_name" Text |all, at| TableCell::text(&*all.log.phases[*at].name);
+    "nodes_added" I64 |all, at| TableCell::count(all.log.phases[*at].nodes_added);
+    "nodes_removed" I64 |all, at| TableCell::count(all.log.phases[*at].nodes_removed);
+    "same_as" I64 |all, at| count(all.log.phases[*at].same_as.map(u64::from));
 };
 
 const BAGS: &[Column<usize>] = columns! {
@@ -217,8 +217,8 @@ const BAGS: &[Column<usize>] = columns! {
     "file_bytes" I64 |all, at| TableCell::count(all.bags[*at].file_bytes);
 };
 
-fn entry(mission: &Mission, id: usize) -> &Entry {
-    &mission.ledger.entries[id]
+fn event(mission: &Mission, id: usize) -> &Event {
+    &mission.log.events[id]
 }
 
 fn rates(detail: &Detail) -> (Option<f64>, Option<f64>) {

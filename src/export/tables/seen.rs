@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::diff::Change;
 use crate::graph::{self, EdgeState, Element, Measures, NodeLoad, State};
 use crate::mission::{Mission, Window};
@@ -17,7 +17,7 @@ pub(super) struct Seen {
     pub(super) win: usize,
     pub(super) span: Span,
     pub(super) state: State,
-    pub(super) degree: Degree,
+    pub(super) confidence: Confidence,
     pub(super) lifecycle: Option<Arc<str>>,
     pub(super) count: Option<u64>,
     pub(super) bytes: Option<u64>,
@@ -31,13 +31,13 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    fn new(what: Element, window: &Window, state: State, degree: Degree) -> Self {
+    fn new(what: Element, window: &Window, state: State, confidence: Confidence) -> Self {
         Self {
             what,
             win: window.index,
             span: window.span,
             state,
-            degree,
+            confidence,
             lifecycle: None,
             count: None,
             bytes: None,
@@ -56,7 +56,7 @@ impl Seen {
             bytes: state.bytes,
             hz: state.hz,
             measures: state.measures,
-            ..Self::new(what, window, state.state, state.degree)
+            ..Self::new(what, window, state.state, state.confidence)
         }
     }
 }
@@ -74,7 +74,12 @@ pub(super) fn nodes(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
                 lifecycle: state.lifecycle.clone(),
                 hz: state.hz,
                 load: Some(load),
-                ..Seen::new(Element::Node(state.id), window, state.state, state.degree)
+                ..Seen::new(
+                    Element::Node(state.id),
+                    window,
+                    state.state,
+                    state.confidence,
+                )
             });
         }
     }
@@ -95,7 +100,12 @@ pub(super) fn topics(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
                 gap: state.max_gap_s,
                 measures: state.measures,
                 skew: skews.get(state.id as usize).copied().flatten(),
-                ..Seen::new(Element::Topic(state.id), window, state.state, state.degree)
+                ..Seen::new(
+                    Element::Topic(state.id),
+                    window,
+                    state.state,
+                    state.confidence,
+                )
             });
         }
     }
@@ -116,7 +126,7 @@ pub(super) fn edges(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
     }
 }
 
-/// Consecutive windows in which an element has one state, without a rate change in the ledger.
+/// Consecutive windows in which an element has one state, without a rate change in the event log.
 struct StateRun {
     first: usize,
     last: usize,
@@ -126,7 +136,7 @@ struct StateRun {
 
 impl StateRun {
     fn goes_on(&self, at: usize, row: &graph::Row) -> bool {
-        let look = |row: &graph::Row| (row.state, row.degree, row.lifecycle);
+        let look = |row: &graph::Row| (row.state, row.confidence, row.lifecycle);
         self.last + 1 == at && look(&self.row) == look(row)
     }
 
@@ -139,7 +149,7 @@ impl StateRun {
             count: add(own.count, row.count),
             bytes: add(own.bytes, row.bytes),
             drops: add(own.drops, row.drops),
-            ..graph::Row::new(own.state, own.degree)
+            ..graph::Row::new(own.state, own.confidence)
         };
     }
 
@@ -157,7 +167,7 @@ impl StateRun {
             win: self.first,
             span,
             state: self.row.state,
-            degree: self.row.degree,
+            confidence: self.row.confidence,
             lifecycle: mission.graphs.lifecycle_word(&self.row),
             count,
             bytes: self.row.bytes.filter(|_| count.is_some()),

@@ -6,13 +6,13 @@ use super::{length, list, mapping, scalar, two_digits};
 use crate::base::rhythm::{CLOSING_NS, FEWEST, GAP_NS};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::Range;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 /// The fraction by which a rate may differ between runs.
 const SHARE: f64 = 0.1;
@@ -128,7 +128,7 @@ fn node(seen: &[NodeInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let last = seen.first().and_then(state);
     let restarts = seen
         .iter()
-        .map(|s| s.facts.entries(s.nodes, Kind::Restarted).len());
+        .map(|s| s.facts.events(s.nodes, Kind::Restarted).len());
     let lifecycle = last.filter(|last| seen.iter().all(|s| state(s).as_ref() == Some(last)));
     let is_logged = seen.iter().all(|s| s.facts.is_logged_only(s.nodes));
     Line::of([
@@ -378,7 +378,7 @@ impl TopicInRun<'_> {
         let known = self.facts.publishers(self.id);
         let sure = known
             .iter()
-            .filter(|(.., degree)| *degree <= Degree::Stated);
+            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
         let names = sure
             .map(|(node, ..)| *node)
             .filter(|node| !self.facts.is_tool(&[*node]));
@@ -392,7 +392,7 @@ impl TopicInRun<'_> {
         let known = self.facts.subscribers(self.id);
         let sure = known
             .iter()
-            .filter(|(.., degree)| *degree <= Degree::Stated);
+            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
         let names = sure
             .map(|(node, ..)| *node)
             .filter(|node| !self.facts.is_tool(&[*node]));

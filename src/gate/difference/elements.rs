@@ -6,11 +6,11 @@ use super::{Difference, Where};
 use crate::base::rhythm::{CLOSING_NS, FEWEST};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 /// An end is certain if the silence after it is this many times its uncertainty.
 const DOUBTS: i64 = 8;
@@ -91,8 +91,7 @@ fn node(
     (b, second): (&Facts<'_>, &[NodeId]),
     all: &mut Vec<Difference>,
 ) {
-    let restarts =
-        |facts: &Facts<'_>, nodes: &[NodeId]| facts.entries(nodes, Kind::Restarted).len();
+    let restarts = |facts: &Facts<'_>, nodes: &[NodeId]| facts.events(nodes, Kind::Restarted).len();
     let (one, other) = (restarts(a, first), restarts(b, second));
     if one != other {
         all.push(Difference::changed(
@@ -160,10 +159,10 @@ fn topic(
         all.push(Difference::changed("qos", name, &*qos, &*other));
     }
     rates(name, (a, first), (b, second), rate_change, all);
-    let sure = |edges: Vec<(NodeId, u32, Degree)>, facts: &Facts<'_>| -> BTreeSet<String> {
+    let sure = |edges: Vec<(NodeId, u32, Confidence)>, facts: &Facts<'_>| -> BTreeSet<String> {
         let sure = edges
             .into_iter()
-            .filter(|(.., degree)| *degree <= Degree::Stated);
+            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
         let roles = sure.filter(|(node, ..)| !facts.is_tool(&[*node]));
         roles
             .map(|(node, ..)| facts.role(node).to_owned())

@@ -7,7 +7,7 @@ use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::Stamp;
 use crate::gate::facts::Facts;
 use crate::graph::Element;
-use crate::mission::ledger::{Entry, Kind};
+use crate::mission::event_log::{Event, Kind};
 
 /// The difference in nanoseconds up to which times of two runs count as equal: nodes of one launch file start in any
 /// order, a second apart.
@@ -15,11 +15,11 @@ const APART_NS: i64 = 2_000_000_000;
 /// The part of the time since the start by which two runs may drift: a fiftieth.
 const PACE: i64 = 50;
 
-/// The key of an entry: its kind, the name it is about, and its number among the entries of both, counted from 1.
+/// The key of an event: its kind, the name it is about, and its number among the events of both, counted from 1.
 type Key = (Kind, String, usize);
 
-/// An entry with names instead of ids.
-struct NamedEntry {
+/// An event with names instead of ids.
+struct NamedEvent {
     key: Key,
     time: Stamp,
     /// The uncertainty of its time, in nanoseconds.
@@ -28,10 +28,10 @@ struct NamedEntry {
 
 /// All differences in events.
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
-    let (first, second) = (named_entries(a), named_entries(b));
+    let (first, second) = (named_events(a), named_events(b));
     let mut all = only(&first, &second, a, Where::First);
     all.extend(only(&second, &first, b, Where::Second));
-    let places: BTreeMap<&Key, &NamedEntry> = second.iter().map(|t| (&t.key, t)).collect();
+    let places: BTreeMap<&Key, &NamedEvent> = second.iter().map(|t| (&t.key, t)).collect();
     let mut shift = 0;
     for one in &first {
         if let Some(other) = places.get(&one.key) {
@@ -42,28 +42,28 @@ pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
 }
 
 /// The headlines that two runs can have in common.
-fn named_entries(facts: &Facts<'_>) -> Vec<NamedEntry> {
+fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
     let mission = facts.mission;
     let mut many: BTreeMap<(Kind, String), usize> = BTreeMap::new();
     let mut all = Vec::new();
-    for (_, entry) in mission.ledger.headlines(mission.span) {
-        let Some(name) = about(facts, entry) else {
+    for (_, event) in mission.log.headlines(mission.span) {
+        let Some(name) = about(facts, event) else {
             continue;
         };
-        let count = many.entry((entry.kind, name.clone())).or_default();
+        let count = many.entry((event.kind, name.clone())).or_default();
         *count += 1;
-        all.push(NamedEntry {
-            key: (entry.kind, name, *count),
-            time: entry.time,
-            doubt: entry.latest.since(entry.earliest),
+        all.push(NamedEvent {
+            key: (event.kind, name, *count),
+            time: event.time,
+            doubt: event.latest.since(event.earliest),
         });
     }
     all
 }
 
-/// The node or topic that an entry is about; rates, and connections, are compared elsewhere.
-fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
-    match (entry.kind, entry.what) {
+/// The node or topic that an event is about; rates, and connections, are compared elsewhere.
+fn about(facts: &Facts<'_>, event: &Event) -> Option<String> {
+    match (event.kind, event.what) {
         // The number of restarts is compared, not their times.
         (Kind::Rate | Kind::Type | Kind::Qos | Kind::Restarted, _) => None,
         (_, Element::Node(id)) => Some(facts.role(id).to_owned()),
@@ -74,8 +74,8 @@ fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
 
 /// The events in only one mission about elements of both. Starts and stops are reported for the elements.
 fn only(
-    own: &[NamedEntry],
-    other: &[NamedEntry],
+    own: &[NamedEvent],
+    other: &[NamedEvent],
     facts: &Facts<'_>,
     side: Where,
 ) -> Vec<Difference> {
@@ -105,11 +105,11 @@ fn name((kind, name, count): &Key) -> String {
     }
 }
 
-/// The difference for an entry at another time in the other mission, if any. If it has the same `shift` as the previous
-/// entry, everything is delayed, which was reported for the first one.
+/// The difference for an event at another time in the other mission, if any. If it has the same `shift` as the previous
+/// event, everything is delayed, which was reported for the first one.
 fn moved(
-    (a, one): (&Facts<'_>, &NamedEntry),
-    (b, other): (&Facts<'_>, &NamedEntry),
+    (a, one): (&Facts<'_>, &NamedEvent),
+    (b, other): (&Facts<'_>, &NamedEvent),
     shift: &mut i64,
 ) -> Option<Difference> {
     let (first, second) = (a.mission.offset(one.time), b.mission.offset(other.time));

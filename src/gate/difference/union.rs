@@ -1,16 +1,16 @@
-//! Two missions as one that can be drawn: the elements of both by role, and a ledger of the differences.
+//! Two missions as one that can be drawn: the elements of both by role, and a log of the differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::base::words;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph, Node, NodeState, Topic, TopicState};
-use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger, sorted};
+use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
 
 use super::{Difference, Where};
@@ -30,10 +30,10 @@ const SECOND: i64 = 1_000_000_000;
 /// The elements of one mission, by role and topic.
 #[derive(Default)]
 struct MissionSide {
-    nodes: BTreeMap<String, (Degree, Evidence)>,
+    nodes: BTreeMap<String, (Confidence, Evidence)>,
     topics: BTreeMap<String, TopicSeen>,
-    publishes: BTreeMap<(String, String), (Degree, Evidence)>,
-    subscribes: BTreeMap<(String, String), (Degree, Evidence)>,
+    publishes: BTreeMap<(String, String), (Confidence, Evidence)>,
+    subscribes: BTreeMap<(String, String), (Confidence, Evidence)>,
 }
 
 #[derive(Clone)]
@@ -53,12 +53,12 @@ impl MissionSide {
             let evidence = nodes.iter().fold(Evidence::NONE, |all, id| {
                 all.and(elements.nodes[*id as usize].evidence)
             });
-            let degree = if facts.is_sure(nodes) {
-                Degree::Stated
+            let confidence = if facts.is_sure(nodes) {
+                Confidence::Stated
             } else {
-                Degree::Inferred
+                Confidence::Inferred
             };
-            seen.nodes.insert(role.to_owned(), (degree, evidence));
+            seen.nodes.insert(role.to_owned(), (confidence, evidence));
         }
         for id in facts.topics(&Pattern::new("**")) {
             let own = &elements.topics[id as usize];
@@ -72,15 +72,15 @@ impl MissionSide {
                 hz: (nanos > 0).then(|| count as f64 / (nanos as f64 / 1e9)),
             };
             let name = facts.topic(id).to_owned();
-            for (node, edge, degree) in facts.publishers(id) {
+            for (node, edge, confidence) in facts.publishers(id) {
                 let evidence = elements.publishes[edge as usize].evidence;
                 let key = (facts.role(node).to_owned(), name.clone());
-                seen.publishes.insert(key, (degree, evidence));
+                seen.publishes.insert(key, (confidence, evidence));
             }
-            for (node, edge, degree) in facts.subscribers(id) {
+            for (node, edge, confidence) in facts.subscribers(id) {
                 let evidence = elements.subscribes[edge as usize].evidence;
                 let key = (name.clone(), facts.role(node).to_owned());
-                seen.subscribes.insert(key, (degree, evidence));
+                seen.subscribes.insert(key, (confidence, evidence));
             }
             seen.topics.insert(name, topic);
         }
@@ -110,7 +110,7 @@ pub(crate) fn union(
         partial: false,
         messages: seen.topics.values().map(|t| t.count).sum(),
         changes: Vec::new(),
-        entries: Vec::new(),
+        events: Vec::new(),
     };
     let shown = match side {
         Side::Each => vec![(span(0), &a), (span(SECOND), &b)],
@@ -128,14 +128,14 @@ pub(crate) fn union(
         windows.first().map_or(at, |w| w.span.start),
         Stamp(2 * SECOND),
     );
-    let entries = UnionLedger {
+    let events = UnionLog {
         a: &a,
         b: &b,
         elements: &elements,
         differing,
         turned: turned(differing),
         at,
-        entries: Vec::new(),
+        events: Vec::new(),
     };
     let period = Period::from_nanos(SECOND).unwrap_or(first.period);
     Mission {
@@ -144,10 +144,10 @@ pub(crate) fn union(
         messages: windows.iter().map(|w| w.messages).sum(),
         period,
         step: period,
-        ledger: Ledger {
-            entries: sorted(entries.all(), &elements).0,
+        log: EventLog {
+            events: sorted(events.all(), &elements).0,
             compares: true,
-            ..Ledger::default()
+            ..EventLog::default()
         },
         elements,
         windows,
@@ -211,8 +211,8 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
 
 /// The keys of both maps with their combined evidence.
 fn both<'a, K: Ord>(
-    a: &'a BTreeMap<K, (Degree, Evidence)>,
-    b: &'a BTreeMap<K, (Degree, Evidence)>,
+    a: &'a BTreeMap<K, (Confidence, Evidence)>,
+    b: &'a BTreeMap<K, (Confidence, Evidence)>,
 ) -> BTreeMap<&'a K, Evidence> {
     let mut all: BTreeMap<&K, Evidence> = BTreeMap::new();
     for (key, (_, evidence)) in a.iter().chain(b) {
@@ -225,19 +225,19 @@ fn both<'a, K: Ord>(
 fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     let node = |id: u32| elements.nodes[id as usize].name.to_string();
     let topic = |id: u32| elements.topics[id as usize].name.to_string();
-    let edge = |id: u32, known: Option<&(Degree, Evidence)>| {
-        let degree = known?.0;
+    let edge = |id: u32, known: Option<&(Confidence, Evidence)>| {
+        let confidence = known?.0;
         Some(EdgeState {
             id,
-            degree,
+            confidence,
             ..EdgeState::default()
         })
     };
     let nodes = (0..).zip(&elements.nodes).filter_map(|(id, own)| {
-        let (degree, _) = seen.nodes.get(own.name.as_str())?;
+        let (confidence, _) = seen.nodes.get(own.name.as_str())?;
         Some(NodeState {
             id,
-            degree: *degree,
+            confidence: *confidence,
             ..NodeState::default()
         })
     });
@@ -264,15 +264,15 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     }
 }
 
-/// The ledger under construction.
-struct UnionLedger<'a> {
+/// The log under construction.
+struct UnionLog<'a> {
     a: &'a MissionSide,
     b: &'a MissionSide,
     elements: &'a Elements,
     differing: &'a [Difference],
     turned: Turned<'a>,
     at: Stamp,
-    entries: Vec<Entry>,
+    events: Vec<Event>,
 }
 
 /// Whether an element appeared (true) or vanished (false), by kind and name.
@@ -288,9 +288,9 @@ fn turned(differing: &[Difference]) -> Turned<'_> {
         .collect()
 }
 
-impl UnionLedger<'_> {
-    fn all(mut self) -> Vec<Entry> {
-        let mut wholes: BTreeMap<u32, EntryId> = BTreeMap::new();
+impl UnionLog<'_> {
+    fn all(mut self) -> Vec<Event> {
+        let mut wholes: BTreeMap<u32, EventId> = BTreeMap::new();
         for (id, node) in (0..).zip(&self.elements.nodes) {
             let turned = self.turned("node", node.name.as_str());
             if let Some(kind) = turned.map(|came| if came { Kind::Started } else { Kind::Stopped })
@@ -311,7 +311,7 @@ impl UnionLedger<'_> {
         for difference in self.differing {
             self.change(difference);
         }
-        self.entries
+        self.events
     }
 
     /// Whether an element appeared (true) or vanished, according to a difference.
@@ -319,8 +319,8 @@ impl UnionLedger<'_> {
         self.turned.get(&(kind, name)).copied()
     }
 
-    /// Adds the entries of edges, which appear and vanish with their nodes or alone.
-    fn edges(&mut self, wholes: &BTreeMap<u32, EntryId>) {
+    /// Adds the events of edges, which appear and vanish with their nodes or alone.
+    fn edges(&mut self, wholes: &BTreeMap<u32, EventId>) {
         let elements = self.elements;
         for (what, edge) in elements.edges() {
             let node = elements.nodes[edge.node as usize].name.as_str();
@@ -331,7 +331,7 @@ impl UnionLedger<'_> {
             };
             if let Some(whole) = wholes.get(&edge.node).copied() {
                 let came = self
-                    .entries
+                    .events
                     .get(whole as usize)
                     .is_some_and(|e| e.kind == Kind::Started);
                 self.add(appeared(came), what, Detail::None, Some(whole));
@@ -341,7 +341,7 @@ impl UnionLedger<'_> {
         }
     }
 
-    /// Adds the entry of an element with different values.
+    /// Adds the event of an element with different values.
     fn change(&mut self, difference: &Difference) {
         if difference.side != Where::Both {
             return;
@@ -384,9 +384,9 @@ impl UnionLedger<'_> {
         kind: Kind,
         what: Element,
         detail: Detail,
-        part_of: Option<EntryId>,
-    ) -> EntryId {
-        self.entries.push(Entry {
+        part_of: Option<EventId>,
+    ) -> EventId {
+        self.events.push(Event {
             kind,
             what,
             time: self.at,
@@ -394,17 +394,17 @@ impl UnionLedger<'_> {
             latest: self.at,
             until: None,
             detail,
-            degree: Degree::Measured,
+            confidence: Confidence::Measured,
             evidence: self.elements.evidence(what),
             part_of,
             quiet: false,
             weight: 1,
         });
-        EntryId::try_from(self.entries.len() - 1).unwrap_or(EntryId::MAX)
+        EventId::try_from(self.events.len() - 1).unwrap_or(EventId::MAX)
     }
 }
 
-/// The kind of entry for an edge or topic that appeared or vanished.
+/// The kind of event for an edge or topic that appeared or vanished.
 fn appeared(came: bool) -> Kind {
     if came { Kind::Appeared } else { Kind::Vanished }
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::fields::{Document, Fields};
 use super::{
-    AllowedFinding, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, REMARKS, Rule,
-    SCHEMA, TopicFacts, Unlisted, While, YamlPlace,
+    AllowedFinding, Demand, EventKind, Expectation, ExpectedEvent, Named, NodeFacts, Policy,
+    REMARKS, Rule, SCHEMA, TopicFacts, Unlisted, While, YamlPlace,
 };
 use crate::base::error::Result;
 use crate::base::time::{Moment, Period, Stamp};
@@ -296,7 +296,7 @@ fn whilst(fields: &Fields<'_>) -> Result<Option<While>> {
     }
 }
 
-fn event(rule: &Fields<'_>, key: &str) -> Result<Event> {
+fn event(rule: &Fields<'_>, key: &str) -> Result<ExpectedEvent> {
     let hint = "write `when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`";
     let part = rule.need(key, hint)?;
     let document = rule.document;
@@ -316,7 +316,7 @@ fn event(rule: &Fields<'_>, key: &str) -> Result<Event> {
         let reason = format!("`{}` has no `from` and no `to`", kind.word());
         return Err(document.bad(end.at, reason, "only `handed_over` and `lifecycle` have"));
     }
-    Ok(Event {
+    Ok(ExpectedEvent {
         kind: *kind,
         name: name.clone(),
         from: ends.0.map(|from| from.value),

@@ -1,4 +1,4 @@
-//! The causes of findings in the ledger.
+//! The causes of findings in the event log.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,10 @@ use super::Facts;
 use crate::base::time::Span;
 use crate::gate::finding::Cause;
 use crate::graph::{Element, NodeId, TopicId};
-use crate::mission::ledger::Kind;
+use crate::mission::event_log::Kind;
 
 impl Facts<'_> {
-    /// The cause in the ledger for the change of a topic around a time: an event of its publishers, or of the nodes
+    /// The cause in the event log for the change of a topic around a time: an event of its publishers, or of the nodes
     /// that feed them.
     pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
         let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.0).collect();
@@ -31,16 +31,16 @@ impl Facts<'_> {
     /// The first event of one of these nodes in a time range.
     pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
         let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
-        let entries = self.mission.ledger.inside(around).map(|(_, entry)| entry);
-        let mut entries = entries.filter(|e| wanted.contains(&e.kind));
-        let entry = entries.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
-        self.mission.elements.ends(entry.what).0.map(|node| Cause {
-            time: Some(entry.time),
+        let events = self.mission.log.inside(around).map(|(_, event)| event);
+        let mut events = events.filter(|e| wanted.contains(&e.kind));
+        let event = events.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
+        self.mission.elements.ends(event.what).0.map(|node| Cause {
+            time: Some(event.time),
             text: format!(
                 "{} {} at {}",
                 self.role(node),
-                entry.kind.word(),
-                self.clock(entry.time)
+                event.kind.word(),
+                self.clock(event.time)
             ),
         })
     }

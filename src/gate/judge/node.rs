@@ -10,7 +10,7 @@ use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::During;
 use crate::graph::NodeId;
-use crate::mission::ledger;
+use crate::mission::event_log;
 
 /// The roles that a name matches.
 type Roles<'a> = [(&'a str, &'a [NodeId])];
@@ -265,21 +265,21 @@ impl Judge<'_> {
             return Vec::new();
         };
         let found = roles.iter().filter_map(|(role, nodes)| {
-            let entries = self.facts.entries(nodes, ledger::Kind::Restarted);
-            if range.value.holds(entries.len() as f64) {
+            let events = self.facts.events(nodes, event_log::Kind::Restarted);
+            if range.value.holds(events.len() as f64) {
                 return None;
             }
-            let many = words::count(entries.len(), "time");
+            let many = words::count(events.len(), "time");
             let says = format!("{role} restarted {many}, expected {}", range.value);
             let mut finding = Finding::new(FindingKind::NodeRestarted, role, at, says)
                 .saw(&many, words::count_range(range.value.from, range.value.to));
-            for entry in entries.iter().take(6) {
-                let until = entry.until.unwrap_or(entry.time);
-                let away = words::duration(until.since(entry.time).max(0));
-                let text = format!("at {}, away for {away}", self.facts.clock(entry.time));
+            for event in events.iter().take(6) {
+                let until = event.until.unwrap_or(event.time);
+                let away = words::duration(until.since(event.time).max(0));
+                let text = format!("at {}, away for {away}", self.facts.clock(event.time));
                 finding = finding.detail(text);
             }
-            if let Some(first) = entries.first() {
+            if let Some(first) = events.first() {
                 finding.cause = Some(Cause {
                     time: Some(first.time),
                     text: format!("{role} restarted at {}", self.facts.clock(first.time)),

@@ -6,8 +6,8 @@ use crate::gate::expectation::{Demand, REMARKS};
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::pattern::{NamePatterns, Pattern};
 use crate::graph::NodeId;
+use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
-use crate::mission::ledger::Kind;
 
 impl Judge<'_> {
     /// Checks the elements that are not in the file.
@@ -34,18 +34,18 @@ impl Judge<'_> {
     /// The findings of one kind of remark in the event log.
     fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
         let mission = self.facts.mission;
-        let parts = mission.ledger.all_parts();
-        let own = (0..).zip(&mission.ledger.entries);
-        let own = own.filter(|(_, entry)| entry.kind == kind && !entry.quiet);
-        let found = own.map(|(id, entry)| {
-            let (node, topic) = mission.elements.names(entry.what);
-            let says = sentence(mission, &parts, id, entry);
+        let parts = mission.log.all_parts();
+        let own = (0..).zip(&mission.log.events);
+        let own = own.filter(|(_, event)| event.kind == kind && !event.quiet);
+        let found = own.map(|(id, event)| {
+            let (node, topic) = mission.elements.names(event.what);
+            let says = sentence(mission, &parts, id, event);
             let name = topic.or(node).unwrap_or_default();
             let mut found = Finding::new(finding, name, self.expectation.policy.at, says);
             found.severity = severity;
             found.at(Span::new(
-                entry.time,
-                entry.until.unwrap_or(entry.time).plus(1),
+                event.time,
+                event.until.unwrap_or(event.time).plus(1),
             ))
         });
         found.collect()

@@ -4,19 +4,19 @@ use super::{Judge, absence};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{
-    At, Demand, Event, EventKind, NodeFacts, Rule, TopicFacts, YamlPlace,
+    At, Demand, EventKind, ExpectedEvent, NodeFacts, Rule, TopicFacts, YamlPlace,
 };
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::{During, Range};
 use crate::graph::history::Bound;
+use crate::mission::event_log::Event;
 use crate::mission::events::sentence;
-use crate::mission::ledger::Entry;
 
 /// The time in nanoseconds by which a reaction may precede its cause: the last sign of a node that ended is a period
 /// before its end.
 const BEFORE_NS: i64 = 1_000_000_000;
-/// The number of entries that are written out.
+/// The number of events that are written out.
 const MOST_LISTED: usize = 6;
 
 impl Judge<'_> {
@@ -158,17 +158,23 @@ impl Judge<'_> {
             .at(Span::new(began.time, earlier.time))
     }
 
-    fn reaction(&self, rule: &Rule, when: &Event, expect: &Event, within: i64) -> Vec<Finding> {
-        let answers = self.entries(expect);
+    fn reaction(
+        &self,
+        rule: &Rule,
+        when: &ExpectedEvent,
+        expect: &ExpectedEvent,
+        within: i64,
+    ) -> Vec<Finding> {
+        let answers = self.events(expect);
         let mut found = Vec::new();
-        for cause in self.entries(when) {
+        for cause in self.events(when) {
             let from = cause.earliest.plus(-BEFORE_NS);
             let to = cause.latest.plus(within);
             if answers.iter().any(|e| from <= e.time && e.time <= to) {
                 continue;
             }
             // A hand-over is complete when the new sender publishes, even if its start is uncertain.
-            let may = |e: &&&Entry| {
+            let may = |e: &&&Event| {
                 expect.kind != EventKind::HandedOver && e.earliest <= to && from <= e.latest
             };
             let doubt = if answers.iter().any(|e| may(&e)) {
@@ -186,8 +192,8 @@ impl Judge<'_> {
     fn no_answer(
         &self,
         at: YamlPlace,
-        (when, cause): (&Event, &Entry),
-        expect: &Event,
+        (when, cause): (&ExpectedEvent, &Event),
+        expect: &ExpectedEvent,
         within: i64,
         doubt: Option<&str>,
     ) -> Finding {
@@ -211,7 +217,7 @@ impl Judge<'_> {
             .saw("nothing", expected)
             .at(Span::new(cause.time, cause.latest.plus(within)));
         let after = self
-            .entries(expect)
+            .events(expect)
             .into_iter()
             .find(|e| e.time > cause.time);
         if let Some(after) = after {
@@ -228,27 +234,27 @@ impl Judge<'_> {
     fn changes(&self, at: YamlPlace, during: Option<During>, many: Range) -> Vec<Finding> {
         let whole = self.facts.mission.span;
         let span = during.map_or(whole, |d| d.on(whole));
-        let headlines = self.facts.mission.ledger.headlines(span);
-        let entries: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
-        if many.holds(entries.len() as f64) {
+        let headlines = self.facts.mission.log.headlines(span);
+        let events: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
+        if many.holds(events.len() as f64) {
             return Vec::new();
         }
-        let seen = words::count(entries.len(), "reconfiguration");
+        let seen = words::count(events.len(), "reconfiguration");
         let says = format!(
             "{seen} from {} to {}, expected {many}",
             self.facts.clock(span.start),
             self.facts.clock(span.end)
         );
         let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
-            .saw(entries.len(), words::count_range(many.from, many.to))
+            .saw(events.len(), words::count_range(many.from, many.to))
             .at(span);
-        let parts = self.facts.mission.ledger.all_parts();
-        for (id, entry) in entries.iter().take(MOST_LISTED) {
-            let text = sentence(self.facts.mission, &parts, *id, entry);
-            finding = finding.detail(format!("{}  {text}", self.facts.clock(entry.time)));
+        let parts = self.facts.mission.log.all_parts();
+        for (id, event) in events.iter().take(MOST_LISTED) {
+            let text = sentence(self.facts.mission, &parts, *id, event);
+            finding = finding.detail(format!("{}  {text}", self.facts.clock(event.time)));
         }
-        if entries.len() > MOST_LISTED {
-            finding = finding.detail(format!("and {} more", entries.len() - MOST_LISTED));
+        if events.len() > MOST_LISTED {
+            finding = finding.detail(format!("and {} more", events.len() - MOST_LISTED));
         }
         vec![finding]
     }
@@ -260,7 +266,7 @@ fn order_of(names: &[At<Pattern>]) -> String {
 }
 
 /// The predicate for an event that happened: `was removed`.
-fn past(event: &Event) -> String {
+fn past(event: &ExpectedEvent) -> String {
     match event.kind {
         EventKind::Added => "appeared".to_owned(),
         EventKind::Removed => "was removed".to_owned(),
@@ -273,7 +279,7 @@ fn past(event: &Event) -> String {
 }
 
 /// The text for an expected event: `/cmd_vel handed over to /teleop`.
-fn expected_text(event: &Event) -> String {
+fn expected_text(event: &ExpectedEvent) -> String {
     let name = &event.name;
     match (event.kind, &event.to) {
         (EventKind::HandedOver, Some(to)) => format!("{name} handed over to {to}"),

@@ -3,7 +3,7 @@
 use super::node::limited;
 use super::{Judge, absence};
 use crate::base::words;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
 use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::measure::MEASURES;
@@ -210,9 +210,9 @@ impl Judge<'_> {
         let Some(severity) = self.expectation.policy.publishers.severity() else {
             return found;
         };
-        for (node, edge, degree) in known
+        for (node, edge, confidence) in known
             .iter()
-            .filter(|(.., degree)| *degree <= Degree::Stated)
+            .filter(|(.., confidence)| *confidence <= Confidence::Stated)
         {
             let fits = by.value.iter().any(|p| self.facts.fits(&p.value, *node));
             if fits || self.facts.is_tool(&[*node]) {
@@ -229,7 +229,7 @@ impl Judge<'_> {
                     n => format!(", {}", words::count(n, "message")),
                 };
                 let stretch = self.facts.stretch(span);
-                let detail = format!("{stretch}{many}; {}", degree.word());
+                let detail = format!("{stretch}{many}; {}", confidence.word());
                 finding = finding.at(span).detail(detail);
             }
             found.push(finding);

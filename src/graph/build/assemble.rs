@@ -10,10 +10,10 @@ use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
-use crate::evidence::claim::Name;
+use crate::evidence::Confidence;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
+use crate::evidence::observation::Name;
 use crate::graph::{
     Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Element, Graphs, GraphsWriter, Measures,
     NodeState, Number, Row, State, TopicState, per_second,
@@ -144,7 +144,7 @@ impl GraphAssembly<'_> {
             let state = TopicState {
                 id,
                 state: record.state(*window, sum.is_some()),
-                degree: degree_in(
+                confidence: degree_in(
                     record,
                     self.history.elements.topics[id as usize].first,
                     *window,
@@ -159,7 +159,7 @@ impl GraphAssembly<'_> {
                     ..self.measures.of(Element::Topic(id), at)
                 },
             };
-            states.push(at, Row::new(state.state, state.degree));
+            states.push(at, Row::new(state.state, state.confidence));
             self.graphs.topic(at, &state);
         }
         self.topics.insert(id, states.finish());
@@ -178,7 +178,7 @@ impl GraphAssembly<'_> {
                 let state = NodeState {
                     id: *id,
                     state: record.state(*window, false),
-                    degree: degree_in(
+                    confidence: degree_in(
                         record,
                         self.history.elements.nodes[*id as usize].first,
                         *window,
@@ -293,22 +293,22 @@ fn counted(count: u64, is_sole: bool, sum: &Sums, of: impl Fn(&Vec<u64>) -> u64)
         count: Some(count),
         bytes: sum.stream_bytes.as_ref().map(of),
         jitter: Number::of(sum.jitter_s.filter(|_| is_sole)),
-        ..Row::new(State::Active, Degree::Measured)
+        ..Row::new(State::Active, Confidence::Measured)
     }
 }
 
 /// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
-fn degree_in(record: &Record, first: Option<Stamp>, window: Span) -> Degree {
+fn degree_in(record: &Record, first: Option<Stamp>, window: Span) -> Confidence {
     if first.is_some_and(|first| window.end <= first) {
-        record.degree.max(Degree::Inferred)
+        record.confidence.max(Confidence::Inferred)
     } else {
-        record.degree
+        record.confidence
     }
 }
 
 fn edge_state(
     id: EdgeId,
-    degree: Degree,
+    confidence: Confidence,
     state: State,
     window: Span,
     count: Option<u64>,
@@ -316,7 +316,7 @@ fn edge_state(
     EdgeState {
         id,
         state,
-        degree,
+        confidence,
         count,
         hz: count.and_then(|n| per_second(n, window)),
         bytes: None,

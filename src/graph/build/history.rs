@@ -14,11 +14,11 @@ use super::tracks::{Tracks, tracks};
 use crate::base::error::Result;
 use crate::base::role::role;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{ElementKey, IncidentKind};
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::inference::{ElementKey, IncidentKind};
+use crate::evidence::observation::Name;
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
 use crate::graph::{Edge, Element, Elements, Node, NodeId, PerElement, State, Topic, TopicId};
 
@@ -58,8 +58,8 @@ pub(crate) struct Incident {
 /// The record of one element over the mission.
 #[derive(Clone, Debug)]
 pub(crate) struct Record {
-    /// The strongest degree of evidence for it.
-    pub(crate) degree: Degree,
+    /// The strongest confidence of evidence for it.
+    pub(crate) confidence: Confidence,
     /// Its lives, in order, none overlapping.
     pub(crate) lives: Vec<Life>,
     /// The state that it always has while it lives: declared or latched.
@@ -82,7 +82,7 @@ impl Record {
             () => None,
         };
         Self {
-            degree: track.degree,
+            confidence: track.confidence,
             lives: known(track, mission),
             fixed,
             needs_messages: track.senders.0 == 0,
@@ -132,7 +132,12 @@ fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> i
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
     let mut tracks = tracks(recorded, findings, traffic, &restarts)?;
     fall_silent(&mut tracks, traffic, findings);
-    settle(&mut tracks, &findings.proofs, &restarts, findings.mission);
+    settle(
+        &mut tracks,
+        &findings.inferences,
+        &restarts,
+        findings.mission,
+    );
     let mut pauses = pauses(traffic, &restarts, &findings.streams);
     pauses.extend(unseen(recorded, &findings.streams)?);
     Ok(assembled(tracks, traffic, findings, (pauses, doubled)))

@@ -6,7 +6,7 @@ use crate::base::rhythm::{
     SHUTDOWN_NS, UNUSUAL,
 };
 use crate::base::time::Stamp;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Stretch};
 
 /// The extent of a life.
@@ -86,8 +86,8 @@ impl Pulse {
 #[derive(Clone, Debug)]
 pub(crate) struct Liveness {
     pub(crate) evidence: Evidence,
-    /// The strongest degree of evidence for it.
-    pub(crate) degree: Degree,
+    /// The strongest confidence of evidence for it.
+    pub(crate) confidence: Confidence,
     /// Signs that bound lives: sorted later.
     pub(crate) signs: Vec<Stamp>,
     /// Signs that bound nothing: of a topic those of its edges, which have their own lives.
@@ -123,7 +123,7 @@ impl Default for Liveness {
     fn default() -> Self {
         Self {
             evidence: Evidence::NONE,
-            degree: Degree::Declared,
+            confidence: Confidence::Declared,
             signs: Vec::new(),
             seen: Vec::new(),
             stated: Vec::new(),
@@ -165,7 +165,7 @@ impl Liveness {
     /// Adds the proofs of another element that prove this one too: an edge proves its node and its topic.
     pub(crate) fn learn(&mut self, other: &Self) {
         self.evidence = self.evidence.and(other.evidence);
-        self.degree = self.degree.min(other.degree);
+        self.confidence = self.confidence.min(other.confidence);
         self.signs.extend(&other.signs);
         self.begins.extend(&other.begins);
         self.heard = self.heard.max(other.heard);
@@ -239,7 +239,7 @@ impl Liveness {
     /// Adds the proofs of an edge to its topic. The senders are counted on the topic itself.
     pub(crate) fn know(&mut self, edge: &Self) {
         self.evidence = self.evidence.and(edge.evidence);
-        self.degree = self.degree.min(edge.degree);
+        self.confidence = self.confidence.min(edge.confidence);
         if edge.is_whole() {
             self.extent = self.extent.max(Extent::Whole);
         }
@@ -346,7 +346,7 @@ impl Liveness {
 
     /// Whether it is known from a header or a file only.
     pub(crate) fn is_declared(&self) -> bool {
-        self.signs.is_empty() && self.is_whole() && self.degree == Degree::Declared
+        self.signs.is_empty() && self.is_whole() && self.confidence == Confidence::Declared
     }
 
     /// Whether it exists for the whole mission.

@@ -8,9 +8,9 @@ use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::name::is_quiet;
 use crate::base::time::Span;
-use crate::evidence::claim::{Measurement, age_of};
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
+use crate::evidence::observation::{Measurement, age_of};
 use crate::graph::{Element, Measures, NodeId, TopicId};
 
 /// Sums of one element in one window. A report belongs to windows by the share of its interval in each.

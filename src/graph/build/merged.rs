@@ -8,9 +8,9 @@ use super::liveness::{Liveness, Pulse};
 use super::senders::{Sender, Traffic};
 use crate::base::role::{role, start};
 use crate::base::time::Stamp;
-use crate::evidence::claim::Name;
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{ElementKey, Reliability};
+use crate::evidence::inference::{ElementKey, Reliability};
+use crate::evidence::observation::Name;
 use crate::graph::history::{Stretch, begins_steadily};
 
 /// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on proves

@@ -8,9 +8,9 @@ use super::senders::{Sender, Traffic};
 use crate::base::name::HEARTBEAT;
 use crate::base::rhythm::{FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::Name;
 use crate::evidence::collector::Recorded;
-use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::inference::{Reliability, Stream};
+use crate::evidence::observation::Name;
 use crate::graph::history::Stretch;
 
 /// The first and the last moment of the recording that each bag is a part of, by bag. A bag is a part of another's

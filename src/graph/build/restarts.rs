@@ -8,11 +8,11 @@ use super::senders::{Sender, Traffic};
 use crate::base::error::Result;
 use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
-use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
+use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
-use crate::evidence::proof::{ElementKey, Proof, Reliability, Validity};
+use crate::evidence::observation::Name;
 use crate::graph::history::Stretch;
 
 /// A restart of a node: its last sign before, its first one after.
@@ -145,7 +145,7 @@ pub(crate) fn restarts(
             alike.entry(fall.header()).or_default().push((node, fall));
         }
     }
-    let said = said(&findings.proofs);
+    let said = said(&findings.inferences);
     let mut all = Restarts::new();
     for (node, own) in &nodes {
         let is_copy = |fall: &&Fall| {
@@ -169,8 +169,8 @@ pub(crate) fn restarts(
         let streams = own.iter().flat_map(|own| &own.streams);
         let times = streams.map(|at| recorded.messages.times(recorded.streams[*at].times));
         let mut signs = times.collect::<io::Result<Vec<_>>>()?.concat();
-        let proofs = said.get(node).into_iter().flatten();
-        signs.extend(proofs.copied().flat_map(signs_of));
+        let inferences = said.get(node).into_iter().flatten();
+        signs.extend(inferences.copied().flat_map(signs_of));
         signs.sort_unstable();
         let gaps = breaks.iter();
         let gaps = gaps.filter_map(|(from, to)| widest_gap(&signs, *from, *to));
@@ -261,22 +261,22 @@ fn falls_of(
 }
 
 /// All statements about each node.
-fn said(proofs: &[Proof]) -> BTreeMap<Name, Vec<&Proof>> {
-    let mut of: BTreeMap<Name, Vec<&Proof>> = BTreeMap::new();
-    for proof in proofs {
+fn said(inferences: &[Inference]) -> BTreeMap<Name, Vec<&Inference>> {
+    let mut of: BTreeMap<Name, Vec<&Inference>> = BTreeMap::new();
+    for inference in inferences {
         if let ElementKey::Node(node)
         | ElementKey::Publish(node, _)
-        | ElementKey::Subscribe(_, node) = proof.what
+        | ElementKey::Subscribe(_, node) = inference.what
         {
-            of.entry(node).or_default().push(proof);
+            of.entry(node).or_default().push(inference);
         }
     }
     of
 }
 
 /// The times of a statement.
-fn signs_of(proof: &Proof) -> &[Stamp] {
-    match &proof.when {
+fn signs_of(inference: &Inference) -> &[Stamp] {
+    match &inference.when {
         Validity::Signs { signs, .. }
         | Validity::Begins { signs, .. }
         | Validity::Moments(signs) => signs,

@@ -7,10 +7,10 @@ use super::recordings::recordings;
 use super::tempo::stretches;
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::inference::{Reliability, Stream};
+use crate::evidence::observation::Name;
 use crate::graph::history::{LongestPauses, Stretch};
 
 /// The senders of each topic.

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::liveness::{Lifetime, Liveness};
 use super::restarts::Restarts;
 use crate::base::time::Stamp;
-use crate::evidence::Degree;
-use crate::evidence::claim::Name;
-use crate::evidence::proof::{ElementKey, Proof, Validity};
+use crate::evidence::Confidence;
+use crate::evidence::inference::{ElementKey, Inference, Validity};
+use crate::evidence::observation::Name;
 
 /// No edge has a smaller key: nodes and topics come before.
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
@@ -15,16 +15,16 @@ const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 /// Computes all lives; `mission` is its first and its last moment.
 pub(crate) fn settle(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
-    proofs: &[Proof],
+    inferences: &[Inference],
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     // What lives as long as its node tells its topic of itself, and nothing of the node.
-    let followers: BTreeSet<ElementKey> = proofs
+    let followers: BTreeSet<ElementKey> = inferences
         .iter()
-        .filter(|proof| matches!(proof.when, Validity::Like(ElementKey::Node(_))))
-        .map(|proof| proof.what)
+        .filter(|inference| matches!(inference.when, Validity::Like(ElementKey::Node(_))))
+        .map(|inference| inference.what)
         .collect();
     let mut edges = tracks.split_off(&FIRST_EDGE);
     for (what, track) in &edges {
@@ -32,7 +32,10 @@ pub(crate) fn settle(
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         let learner = tracks.entry(ElementKey::Node(node)).or_default();
-        if followers.contains(what) && track.signs.is_empty() && track.degree > Degree::Stated {
+        if followers.contains(what)
+            && track.signs.is_empty()
+            && track.confidence > Confidence::Stated
+        {
             learner.evidence = learner.evidence.and(track.evidence);
         } else {
             learner.learn(track);
@@ -69,7 +72,7 @@ pub(crate) fn settle(
         of_topics.entry(topic).or_default().extend(&track.lives);
     }
     tracks.append(&mut edges);
-    for (what, lives) in live_like(tracks, proofs, false) {
+    for (what, lives) in live_like(tracks, inferences, false) {
         if !matches!(what, ElementKey::Node(_)) {
             of_topics.entry(ends(what).1).or_default().extend(lives);
         }
@@ -81,25 +84,25 @@ pub(crate) fn settle(
             track.live_with(edges);
         }
     }
-    live_like(tracks, proofs, true);
+    live_like(tracks, inferences, true);
 }
 
 /// Gives elements the lives of others, which are topics or not; returns those that got them.
 fn live_like(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
-    proofs: &[Proof],
+    inferences: &[Inference],
     topics: bool,
 ) -> Vec<(ElementKey, Vec<Lifetime>)> {
     let mut done = Vec::new();
-    for proof in proofs {
-        if let Validity::Like(other) = proof.when
+    for inference in inferences {
+        if let Validity::Like(other) = inference.when
             && matches!(other, ElementKey::Topic(_)) == topics
             && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
-            && let Some(track) = tracks.get_mut(&proof.what)
+            && let Some(track) = tracks.get_mut(&inference.what)
             && track.signs.is_empty()
         {
             track.lives.clone_from(&lives);
-            done.push((proof.what, lives));
+            done.push((inference.what, lives));
         }
     }
     done

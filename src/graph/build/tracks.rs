@@ -8,11 +8,11 @@ use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
 use crate::base::rhythm::broken_after;
 use crate::base::time::Stamp;
-use crate::evidence::claim::Name;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{ElementKey, Proof, Validity};
-use crate::evidence::{Degree, Evidence, SOURCES};
+use crate::evidence::inference::{ElementKey, Inference, Validity};
+use crate::evidence::observation::Name;
+use crate::evidence::{Confidence, Evidence, SOURCES};
 use crate::graph::history::begins_steadily;
 
 /// The track of every element.
@@ -26,10 +26,10 @@ pub(crate) fn tracks(
     restarts: &Restarts,
 ) -> io::Result<Tracks> {
     let mut tracks = Tracks::new();
-    let sent = sent(&findings.proofs);
+    let sent = sent(&findings.inferences);
     let starved = starved(findings, traffic);
-    for proof in &findings.proofs {
-        let node = match proof.what {
+    for inference in &findings.inferences {
+        let node = match inference.what {
             ElementKey::Node(node)
             | ElementKey::Publish(node, _)
             | ElementKey::Subscribe(_, node) => Some(node),
@@ -38,11 +38,13 @@ pub(crate) fn tracks(
         let own = node.and_then(|node| restarts.get(&node));
         let own = own.map_or(&[][..], Vec::as_slice);
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();
-        let track = tracks.entry(proof.what).or_default();
-        track.lasts |= lasts(&proof.when);
-        track.evidence = track.evidence.and(Evidence::row(proof.source));
-        track.degree = track.degree.min(degree(proof, findings, traffic));
-        match &proof.when {
+        let track = tracks.entry(inference.what).or_default();
+        track.lasts |= lasts(&inference.when);
+        track.evidence = track.evidence.and(Evidence::row(inference.source));
+        track.confidence = track
+            .confidence
+            .min(confidence(inference, findings, traffic));
+        match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
                 let Some(senders) = traffic.get(&stream.topic) else {
@@ -74,12 +76,12 @@ pub(crate) fn tracks(
                 let ends = together(ends, &deaths);
                 track.sign_all(signs, &ends);
                 if SOURCES
-                    .get(proof.source)
+                    .get(inference.source)
                     .is_some_and(|s| s.word == "statistics")
                 {
                     track.counted.extend(signs.first());
                 }
-                if SOURCES.get(proof.source).is_some_and(|s| s.own) {
+                if SOURCES.get(inference.source).is_some_and(|s| s.own) {
                     track.heard = track.heard.max(signs.last().copied());
                     track.speaks = true;
                 }
@@ -120,10 +122,13 @@ fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
         stream.map(|s| &s.connection.type_name)
     };
     let is_starved = |(node, topic): &&(Name, Name)| {
-        let inputs = findings.proofs.iter().filter_map(|proof| match proof.what {
-            ElementKey::Subscribe(input, of) if of == *node && input != *topic => Some(input),
-            _ => None,
-        });
+        let inputs = findings
+            .inferences
+            .iter()
+            .filter_map(|inference| match inference.what {
+                ElementKey::Subscribe(input, of) if of == *node && input != *topic => Some(input),
+                _ => None,
+            });
         let inputs: BTreeSet<Name> = inputs
             .filter(|input| kind(*input) == kind(*topic))
             .collect();
@@ -137,11 +142,11 @@ fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
     findings.copies.iter().filter(is_starved).copied().collect()
 }
 
-/// The degree of a proof: a connection without a message, or with none in the time that is read, is only declared by
+/// The confidence of a proof: a connection without a message, or with none in the time that is read, is only declared by
 /// its header.
-fn degree(proof: &Proof, findings: &Findings, traffic: &Traffic) -> Degree {
-    let Validity::Messages(at) = proof.when else {
-        return proof.degree;
+fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> Confidence {
+    let Validity::Messages(at) = inference.when else {
+        return inference.confidence;
     };
     let senders = traffic.get(&findings.streams[at].topic);
     let spoke = senders.and_then(|senders| {
@@ -149,15 +154,15 @@ fn degree(proof: &Proof, findings: &Findings, traffic: &Traffic) -> Degree {
         senders.traces[place]
     });
     match spoke {
-        Some(_) => proof.degree,
-        None => proof.degree.max(Degree::Declared),
+        Some(_) => inference.confidence,
+        None => inference.confidence.max(Confidence::Declared),
     }
 }
 
 /// The streams with a known publisher, whose messages prove a publication.
-fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
-    let sent = proofs.iter().filter_map(|proof| match proof {
-        Proof {
+fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
+    let sent = inferences.iter().filter_map(|inference| match inference {
+        Inference {
             what: ElementKey::Publish(..),
             when: Validity::Messages(at),
             ..

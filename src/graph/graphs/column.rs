@@ -2,7 +2,7 @@
 //! the differences from the window before.
 
 use super::row::{Number, Row};
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::State;
 
 /// The rows of one element over all windows.
@@ -35,7 +35,7 @@ struct Memory {
 impl Default for Memory {
     fn default() -> Self {
         Self {
-            row: Row::new(State::Active, Degree::Measured),
+            row: Row::new(State::Active, Confidence::Measured),
             halves: [0; 5],
         }
     }
@@ -83,7 +83,7 @@ impl ColumnWriter {
 
     fn row(&mut self, row: &Row) {
         let old = self.memory.row;
-        let look = |row: &Row| (row.state, row.degree, row.lifecycle);
+        let look = |row: &Row| (row.state, row.confidence, row.lifecycle);
         let measures = |row: &Row| (row.drops, row.jitter, row.age);
         let parts = [
             (LOOK, look(row) != look(&old)),
@@ -99,7 +99,7 @@ impl ColumnWriter {
         let bytes = &mut self.bytes;
         bytes.push(tag);
         if tag & LOOK != 0 {
-            bytes.push(row.state as u8 | (row.degree as u8) << 4);
+            bytes.push(row.state as u8 | (row.confidence as u8) << 4);
             put(bytes, u64::from(row.lifecycle));
         }
         if tag & COUNT != 0 {
@@ -205,9 +205,12 @@ impl ColumnCursor<'_> {
         let (bytes, Memory { row, halves }) = (&mut self.bytes, &mut self.memory);
         if tag & LOOK != 0 {
             let look = take_byte(bytes);
-            let (state, degree) = (usize::from(look & 15), usize::from(look >> 4));
+            let (state, confidence) = (usize::from(look & 15), usize::from(look >> 4));
             row.state = State::ALL.get(state).copied().unwrap_or(row.state);
-            row.degree = Degree::ALL.get(degree).copied().unwrap_or(row.degree);
+            row.confidence = Confidence::ALL
+                .get(confidence)
+                .copied()
+                .unwrap_or(row.confidence);
             row.lifecycle = u32::try_from(take(bytes)).unwrap_or(0);
         }
         if tag & COUNT != 0 {

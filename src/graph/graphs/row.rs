@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::base::time::Span;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::{EdgeState, Measures, NodeState, State, TopicState, per_second};
 
 /// A number, as an integer where possible.
@@ -53,7 +53,7 @@ const EXACT: f64 = 9e15;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Row {
     pub(crate) state: State,
-    pub(crate) degree: Degree,
+    pub(crate) confidence: Confidence,
     /// The place of its lifecycle state, counted from 1; 0 for none.
     pub(crate) lifecycle: u32,
     /// The number of messages; of a node those that its rate is computed from.
@@ -69,10 +69,10 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(crate) fn new(state: State, degree: Degree) -> Self {
+    pub(crate) fn new(state: State, confidence: Confidence) -> Self {
         Self {
             state,
-            degree,
+            confidence,
             lifecycle: 0,
             count: None,
             bytes: None,
@@ -132,7 +132,7 @@ impl Row {
         let row = Self {
             lifecycle,
             count,
-            ..Self::new(state.state, state.degree)
+            ..Self::new(state.state, state.confidence)
         };
         row.with_rate(state.hz, span)
     }
@@ -143,7 +143,7 @@ impl Row {
             bytes: state.bytes,
             median: Number::of(state.median_period_s),
             gap: Number::of(state.max_gap_s),
-            ..Self::new(state.state, state.degree)
+            ..Self::new(state.state, state.confidence)
         };
         row.with_measures(&state.measures).with_rate(state.hz, span)
     }
@@ -152,7 +152,7 @@ impl Row {
         let row = Self {
             count: state.count,
             bytes: state.bytes,
-            ..Self::new(state.state, state.degree)
+            ..Self::new(state.state, state.confidence)
         };
         row.with_measures(&state.measures).with_rate(state.hz, span)
     }
@@ -162,7 +162,7 @@ impl Row {
         NodeState {
             id,
             state: self.state,
-            degree: self.degree,
+            confidence: self.confidence,
             hz: self.hz(span),
             lifecycle: lifecycle.and_then(|at| lifecycles.get(at)).map(Arc::clone),
         }
@@ -172,7 +172,7 @@ impl Row {
         TopicState {
             id,
             state: self.state,
-            degree: self.degree,
+            confidence: self.confidence,
             count: self.count.unwrap_or(0),
             bytes: self.bytes,
             hz: self.hz(span),
@@ -186,7 +186,7 @@ impl Row {
         EdgeState {
             id,
             state: self.state,
-            degree: self.degree,
+            confidence: self.confidence,
             count: self.count,
             hz: self.hz(span),
             bytes: self.bytes,

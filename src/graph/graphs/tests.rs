@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::base::time::Stamp;
-use crate::evidence::Degree;
+use crate::evidence::Confidence;
 use crate::graph::{Measures, State};
 
 fn number() -> impl Strategy<Value = Option<f64>> {
@@ -27,8 +27,9 @@ fn count() -> impl Strategy<Value = Option<u64>> {
     ]
 }
 
-fn look() -> impl Strategy<Value = (State, Degree)> {
-    (0..4_usize, 0..4_usize).prop_map(|(state, degree)| (State::ALL[state], Degree::ALL[degree]))
+fn look() -> impl Strategy<Value = (State, Confidence)> {
+    (0..4_usize, 0..4_usize)
+        .prop_map(|(state, confidence)| (State::ALL[state], Confidence::ALL[confidence]))
 }
 
 fn measures() -> impl Strategy<Value = Measures> {
@@ -50,11 +51,11 @@ fn topic() -> impl Strategy<Value = TopicState> {
         measures(),
     )
         .prop_map(
-            |((state, degree), count, bytes, hz, median_period_s, max_gap_s, measures)| {
+            |((state, confidence), count, bytes, hz, median_period_s, max_gap_s, measures)| {
                 TopicState {
                     id: 0,
                     state,
-                    degree,
+                    confidence,
                     count: count.unwrap_or(0),
                     bytes,
                     hz,
@@ -72,10 +73,10 @@ fn node() -> impl Strategy<Value = NodeState> {
         Just(Some(Arc::from("active"))),
         Just(Some(Arc::from("x")))
     ];
-    (look(), number(), lifecycle).prop_map(|((state, degree), hz, lifecycle)| NodeState {
+    (look(), number(), lifecycle).prop_map(|((state, confidence), hz, lifecycle)| NodeState {
         id: 0,
         state,
-        degree,
+        confidence,
         hz,
         lifecycle,
     })
@@ -83,10 +84,10 @@ fn node() -> impl Strategy<Value = NodeState> {
 
 fn edge() -> impl Strategy<Value = EdgeState> {
     (look(), count(), number(), count(), measures()).prop_map(
-        |((state, degree), count, hz, bytes, measures)| EdgeState {
+        |((state, confidence), count, hz, bytes, measures)| EdgeState {
             id: 0,
             state,
-            degree,
+            confidence,
             count,
             hz,
             bytes,
@@ -165,7 +166,7 @@ fn constant_states_take_no_memory() {
     let topic = TopicState {
         id: 0,
         state: State::Active,
-        degree: Degree::Measured,
+        confidence: Confidence::Measured,
         count: 10,
         bytes: None,
         hz: Some(10.0),
@@ -186,7 +187,7 @@ fn memory_is_proportional_to_the_states_of_elements() {
     let node = |id| NodeState {
         id,
         state: State::Active,
-        degree: Degree::Stated,
+        confidence: Confidence::Stated,
         hz: None,
         lifecycle: None,
     };

@@ -1,4 +1,4 @@
-//! An entry as one sentence: the change, the element, and the parts that appeared or vanished with it.
+//! An event as one sentence: the change, the element, and the parts that appeared or vanished with it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,36 +7,36 @@ use crate::base::words::{self, visible};
 use crate::graph::history::begins_steadily as begins_steadily_in;
 use crate::graph::{Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::{
-    Detail, Entry, EntryId, Interruption, InterruptionKind, Kind, Parts, Switch,
+use crate::mission::event_log::{
+    Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Switch,
 };
 
 /// The most topics that are listed; the rest is counted.
 const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`. `parts`: of all
-/// entries.
-pub(crate) fn sentence(mission: &Mission, parts: &Parts, id: EntryId, entry: &Entry) -> String {
+/// events.
+pub(crate) fn sentence(mission: &Mission, parts: &Parts, id: EventId, event: &Event) -> String {
     let own = parts.get(&id).map_or(&[][..], Vec::as_slice);
-    sentence_with(mission, own, entry)
+    sentence_with(mission, own, event)
 }
 
-/// The sentence for these parts of the entry.
-pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
-    let name = name(&mission.elements, entry);
-    format!("{name} {}", predicate(mission, parts, entry))
+/// The sentence for these parts of the event.
+pub(crate) fn sentence_with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
+    let name = name(&mission.elements, event);
+    format!("{name} {}", predicate(mission, parts, event))
 }
 
 /// The sentence without the name of the element: `30 → 5 Hz`, `restarted, away for 6.8 s`.
-pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
+pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
-    let lasted = entry
+    let lasted = event
         .until
-        .map(|until| words::duration(until.since(entry.time).max(0)));
-    match (&entry.detail, entry.kind) {
+        .map(|until| words::duration(until.since(event.time).max(0)));
+    match (&event.detail, event.kind) {
         (Detail::Rates { from_hz, to_hz }, _) => {
             let change = words::rate_change(*from_hz, *to_hz);
-            format!("{change}{}", too(mission, parts, entry))
+            format!("{change}{}", too(mission, parts, event))
         }
         (Detail::Senders { from, to }, _) => {
             let names = |nodes: &[u32]| {
@@ -45,7 +45,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
             // Who sends and is not one of them is the mux between them.
-            let mux = match entry.what {
+            let mux = match event.what {
                 Element::Topic(topic) => mux(elements, topic, from.iter().chain(to)),
                 _ => Vec::new(),
             };
@@ -65,7 +65,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
             let lost = words::count(usize::try_from(*many).unwrap_or(usize::MAX), "message");
             format!("{lost} lost by the recorder{over}")
         }
-        (Detail::Values { to, .. }, Kind::Starved) => starved(entry.what, to),
+        (Detail::Values { to, .. }, Kind::Starved) => starved(event.what, to),
         (Detail::None, Kind::Duplicate) => "is the name of two nodes".to_owned(),
         (Detail::Values { from, to }, kind) => {
             let or = |text: &str| {
@@ -77,35 +77,35 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> 
                 }
             };
             let change = format!("{} → {}", or(from), or(to));
-            if mission.ledger.compares {
+            if mission.log.compares {
                 change
             } else {
                 format!("{}: {change}", kind.word())
             }
         }
         (Detail::None, Kind::Restarted) => match lasted {
-            Some(lasted) => format!("restarted, away for {lasted}{}", too(mission, parts, entry)),
+            Some(lasted) => format!("restarted, away for {lasted}{}", too(mission, parts, event)),
             None => "restarted".to_owned(),
         },
         (Detail::None, Kind::Silent) => {
             let lasted = lasted.map_or_else(|| "to the end".to_owned(), |t| format!("for {t}"));
-            format!("silent {lasted}{}", too(mission, parts, entry))
+            format!("silent {lasted}{}", too(mission, parts, event))
         }
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
-            let word = mission.ledger.word(kind);
-            let (with, too) = (with(mission, parts, entry), too(mission, parts, entry));
+            let word = mission.log.word(kind);
+            let (with, too) = (with(mission, parts, event), too(mission, parts, event));
             format!("{word}{with}{too}")
         }
         (Detail::None, kind) => {
             let is_first = kind == Kind::Appeared
-                && !mission.ledger.compares
-                && !begins_steadily(mission, entry.what);
+                && !mission.log.compares
+                && !begins_steadily(mission, event.what);
             let word = if is_first {
                 "first message"
             } else {
-                mission.ledger.word(kind)
+                mission.log.word(kind)
             };
-            format!("{word}{}", too(mission, parts, entry))
+            format!("{word}{}", too(mission, parts, event))
         }
     }
 }
@@ -132,15 +132,15 @@ fn begins_steadily(mission: &Mission, what: Element) -> bool {
     matches!(what, Element::Subscribe(_)) || own.any(|s| begins_steadily_in(&s.stretches))
 }
 
-/// The other elements of an entry, and those that are silent since then: `; also /odom`.
-fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
+/// The other elements of an event, and those that are silent since then: `; also /odom`.
+fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
-    let own = elements.ends(entry.what);
-    let is_node = matches!(entry.what, Element::Node(_));
+    let own = elements.ends(event.what);
+    let is_node = matches!(event.what, Element::Node(_));
     let (mut alike, mut silent) = (Vec::new(), Vec::new());
     for part in parts
         .iter()
-        .filter_map(|id| mission.ledger.entries.get(*id as usize))
+        .filter_map(|id| mission.log.events.get(*id as usize))
     {
         let (node, topic) = elements.ends(part.what);
         // The topics of a node that stopped or is silent are implied.
@@ -148,7 +148,7 @@ fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
             own.0
                 .is_some_and(|node| elements.publication(node, topic).is_some())
         };
-        let is_own = part.what == entry.what || own.1.is_some() && topic == own.1;
+        let is_own = part.what == event.what || own.1.is_some() && topic == own.1;
         if is_own || is_node && topic.is_some_and(sent) {
             continue;
         }
@@ -158,7 +158,7 @@ fn too(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
             None => name(elements, part),
         };
         match part.kind {
-            kind if kind == entry.kind && kind != Kind::Restarted => alike.push(name),
+            kind if kind == event.kind && kind != Kind::Restarted => alike.push(name),
             Kind::Silent => silent.push(name),
             _ => {}
         }
@@ -199,11 +199,11 @@ pub(crate) fn switched(one: &Switch) -> String {
     format!("mode switch: {stopped} stopped, {} started", one.started)
 }
 
-/// The name of the element of an entry: its role if a role restarted.
-fn name(elements: &Elements, entry: &Entry) -> String {
-    let (node, topic) = elements.names(entry.what);
-    match (entry.what, node.map(visible), topic.map(visible)) {
-        (Element::Node(id), ..) if entry.kind == Kind::Restarted => {
+/// The name of the element of an event: its role if a role restarted.
+fn name(elements: &Elements, event: &Event) -> String {
+    let (node, topic) = elements.names(event.what);
+    match (event.what, node.map(visible), topic.map(visible)) {
+        (Element::Node(id), ..) if event.kind == Kind::Restarted => {
             visible(&elements.nodes[id as usize].role).into_owned()
         }
         (Element::Subscribe(_), Some(node), Some(topic)) => format!("{topic} → {node}"),
@@ -212,13 +212,13 @@ fn name(elements: &Elements, entry: &Entry) -> String {
     }
 }
 
-/// The topics that a node publishes and subscribes, by the parts of its entry: `: publishes plan; subscribes map`.
-fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
+/// The topics that a node publishes and subscribes, by the parts of its event: `: publishes plan; subscribes map`.
+fn with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
     let (mut sends, mut takes) = (BTreeSet::new(), BTreeSet::new());
-    let entries = &mission.ledger.entries;
-    let node = elements.ends(entry.what).0;
-    let parts = parts.iter().filter_map(|id| entries.get(*id as usize));
+    let events = &mission.log.events;
+    let node = elements.ends(event.what).0;
+    let parts = parts.iter().filter_map(|id| events.get(*id as usize));
     // Others may depend on it, such as its subscribers.
     for part in parts.filter(|part| elements.ends(part.what).0 == node) {
         match part.what {

@@ -20,7 +20,7 @@ pub struct FigureInfo {
 
 /// The figures that fit, best first: lifelines if elements start or stop, else the map if edges are known.
 pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
-    let many = mission.ledger.phases.len();
+    let many = mission.log.phases.len();
     let fitting = [lives(mission), map(mission), steps(many)];
     let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();
     if many <= 1 {

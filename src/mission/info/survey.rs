@@ -1,4 +1,4 @@
-//! One row per bag of a folder: format, span, topics, nodes, edges by degree, evidence.
+//! One row per bag of a folder: format, span, topics, nodes, edges by confidence, evidence.
 
 use serde::Serialize;
 

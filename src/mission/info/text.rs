@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{DegreeCounts, Info, NodeInfo, TopicInfo};
+use super::{ConfidenceCounts, Info, NodeInfo, TopicInfo};
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
@@ -125,13 +125,13 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(out)
 }
 
-/// A count with its degrees, such as `34 nodes (31 measured, 3 stated)`.
-pub(crate) fn how_many(what: &str, degrees: DegreeCounts) -> String {
+/// A count with its confidences, such as `34 nodes (31 measured, 3 stated)`.
+pub(crate) fn how_many(what: &str, confidences: ConfidenceCounts) -> String {
     let parts = [
-        (degrees.measured, "measured"),
-        (degrees.stated, "stated"),
-        (degrees.inferred, "inferred"),
-        (degrees.declared, "declared"),
+        (confidences.measured, "measured"),
+        (confidences.stated, "stated"),
+        (confidences.inferred, "inferred"),
+        (confidences.declared, "declared"),
     ];
     let parts: Vec<String> = parts
         .iter()
@@ -143,7 +143,7 @@ pub(crate) fn how_many(what: &str, degrees: DegreeCounts) -> String {
     } else {
         format!(" ({})", parts.join(", "))
     };
-    words::count(degrees.total(), what) + &inner
+    words::count(confidences.total(), what) + &inner
 }
 
 const fn column(head: &'static str, is_right: bool, least: usize, gives: (u8, u8)) -> Column {
@@ -196,7 +196,7 @@ fn nodes(info: &Info, width: Option<usize>) -> String {
         let (sends, receives) = load(node, info.duration_s);
         vec![
             Cell::Text(visible(node.name.as_str()).into_owned()),
-            Cell::Text(node.degree.to_owned()),
+            Cell::Text(node.confidence.to_owned()),
             Cell::Text(alive(node, info.start_ns)),
             Cell::Text(sends),
             Cell::Text(receives),

@@ -38,7 +38,7 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
             out,
             "{first:>12}  {:<18} {:<9} {}{again}",
             piece.source,
-            piece.degree.word(),
+            piece.confidence.word(),
             visible(&piece.text)
         );
     }
@@ -59,7 +59,7 @@ fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
     let mut all: Vec<Repeated<'_>> = Vec::new();
     let mut places = BTreeMap::new();
     for piece in pieces {
-        let key = (piece.source, piece.degree, piece.text.as_str());
+        let key = (piece.source, piece.confidence, piece.text.as_str());
         let place = *places.entry(key).or_insert(all.len());
         match all.get_mut(place) {
             Some(said) => {
@@ -171,14 +171,14 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::Degree;
+    use crate::evidence::Confidence;
 
     #[test]
     fn repeated_evidence_is_listed_once() {
         let piece = |time, text: &str| EvidenceLine {
             time: Some(Stamp(time)),
             source: "rosout",
-            degree: Degree::Stated,
+            confidence: Confidence::Stated,
             text: text.to_owned(),
         };
         let pieces = [piece(1, "hello"), piece(2, "more"), piece(3, "hello")];

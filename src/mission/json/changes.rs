@@ -3,16 +3,16 @@
 use serde::Serialize;
 
 use super::elements::Text;
-use super::entries::ElementName;
+use super::events::ElementName;
 use crate::base::time::Stamp;
 use crate::graph::diff::Change;
 use crate::graph::{Element, Elements, NodeId};
-use crate::mission::EntryId;
+use crate::mission::EventId;
 
 #[derive(Serialize)]
 pub(crate) struct ChangeRow<'a> {
     kind: &'static str,
-    entry: EntryId,
+    event: EventId,
     #[serde(flatten)]
     named: ElementName<'a>,
     #[serde(flatten)]
@@ -40,7 +40,7 @@ enum ChangeValues<'a> {
 }
 
 impl<'a> ChangeRow<'a> {
-    pub(crate) fn new(change: &'a Change, entry: EntryId, elements: &'a Elements) -> Self {
+    pub(crate) fn new(change: &'a Change, event: EventId, elements: &'a Elements) -> Self {
         let name = |id: &NodeId| elements.nodes[*id as usize].name.as_str();
         let time = |time: Option<Stamp>| ChangeValues::Time {
             time_ns: time.map(|at| at.0),
@@ -70,7 +70,7 @@ impl<'a> ChangeRow<'a> {
         };
         Self {
             kind: change.word(),
-            entry,
+            event,
             named: ElementName::new(what, elements),
             rest,
         }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::runs::JsonColumns;
 use super::sending::SendingJson;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
     Edge, EdgeState, Elements, Measures, Node, NodeState, State, Topic, TopicState,
 };
@@ -152,7 +152,7 @@ impl<'a> NodeJson<'a> {
             name: node.name.as_str().into(),
             role: Some((&*node.role).into()),
             state: seen.map(|s| s.state.word().into()),
-            degree: seen.map(|s| s.degree.word().into()),
+            degree: seen.map(|s| s.confidence.word().into()),
             evidence: words(node.evidence),
             life: LifeJson::new(node.first, node.last, lives(seen.is_some(), &node.runs)),
             numbers: seen.map(|s| NodeNumbers {
@@ -169,7 +169,7 @@ impl<'a> NodeJson<'a> {
         NodeState {
             id,
             state: state_of(self.state.as_deref()),
-            degree: degree_of(self.degree.as_deref()),
+            confidence: confidence_of(self.degree.as_deref()),
             hz: numbers.and_then(|n| n.hz),
             lifecycle: lifecycle.map(Into::into),
         }
@@ -183,7 +183,7 @@ impl<'a> TopicJson<'a> {
             name: topic.name.as_str().into(),
             types: topic.types.iter().map(|t| Text::from(&**t)).collect(),
             state: seen.map(|s| s.state.word().into()),
-            degree: seen.map(|s| s.degree.word().into()),
+            degree: seen.map(|s| s.confidence.word().into()),
             evidence: words(topic.evidence),
             numbers: seen.map(|s| TopicNumbers {
                 count: Some(s.count),
@@ -208,7 +208,7 @@ impl<'a> TopicJson<'a> {
         TopicState {
             id,
             state: state_of(self.state.as_deref()),
-            degree: degree_of(self.degree.as_deref()),
+            confidence: confidence_of(self.degree.as_deref()),
             count: numbers.count.unwrap_or(0),
             bytes: numbers.bytes,
             hz: numbers.hz,
@@ -227,7 +227,7 @@ impl<'a> PublishJson<'a> {
             topic: elements.topics[edge.topic as usize].name.as_str().into(),
             edge: EdgeJson {
                 state: seen.map(|s| s.state.word().into()),
-                degree: seen.map(|s| s.degree.word().into()),
+                degree: seen.map(|s| s.confidence.word().into()),
                 evidence: words(edge.evidence),
                 numbers: seen.map(|s| EdgeNumbers {
                     count: s.count,
@@ -256,7 +256,7 @@ impl EdgeJson<'_> {
         EdgeState {
             id,
             state: state_of(self.state.as_deref()),
-            degree: degree_of(self.degree.as_deref()),
+            confidence: confidence_of(self.degree.as_deref()),
             count: numbers.count,
             hz: numbers.hz,
             bytes: numbers.bytes,
@@ -306,6 +306,7 @@ pub(crate) fn state_of(word: Option<&str>) -> State {
 }
 
 /// The degree of this name; stated if unknown or missing.
-pub(crate) fn degree_of(word: Option<&str>) -> Degree {
-    word.and_then(Degree::from_word).unwrap_or(Degree::Stated)
+pub(crate) fn confidence_of(word: Option<&str>) -> Confidence {
+    word.and_then(Confidence::from_word)
+        .unwrap_or(Confidence::Stated)
 }

@@ -6,7 +6,7 @@ pub(crate) use super::elements::{
     EdgeJson, EdgeNumbers, ElementJson, LifeJson, NodeJson, NodeNumbers, PublishJson,
     SubscribeJson, Text, TopicJson, TopicNumbers,
 };
-use super::entries::{EntryJson, InterruptionRow, PhaseRow};
+use super::events::{EventJson, InterruptionRow, PhaseRow};
 use super::sending::OldSendingJson;
 use crate::mission::Places;
 
@@ -34,9 +34,9 @@ pub(crate) struct Raw {
     pub(crate) subscribes: Vec<PublishJson<'static>>,
     pub(crate) sending: Option<OldSendingJson<'static>>,
     pub(crate) form: Option<String>,
-    pub(crate) events: Option<Vec<EntryJson<'static>>>,
+    pub(crate) events: Option<Vec<EventJson<'static>>>,
     /// The events up to schema 2.
-    pub(crate) ledger: Option<Vec<EntryJson<'static>>>,
+    pub(crate) ledger: Option<Vec<EventJson<'static>>>,
     #[serde(default)]
     pub(crate) interruptions: Vec<InterruptionRow>,
     #[serde(default)]

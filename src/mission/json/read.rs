@@ -35,20 +35,20 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     }
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
     let events = raw.events.take().or(raw.ledger.take());
-    let phases = super::entries::phases(std::mem::take(&mut raw.phases));
-    let interruptions = super::entries::interruptions(&raw.interruptions);
+    let phases = super::events::phases(std::mem::take(&mut raw.phases));
+    let interruptions = super::events::interruptions(&raw.interruptions);
     let mut mission = build(raw, &spans).map_err(|reason| bad(0, reason))?;
     if let Some(rows) = events {
-        let entries = super::entries::read(&rows, &mission.elements);
+        let events = super::events::read(&rows, &mission.elements);
         let nothing = || {
             bad(
                 0,
                 "an event refers to an element that is in no window".to_owned(),
             )
         };
-        mission.ledger.entries = entries.ok_or_else(nothing)?;
-        mission.ledger.phases = phases;
-        mission.ledger.interruptions = interruptions;
+        mission.log.events = events.ok_or_else(nothing)?;
+        mission.log.phases = phases;
+        mission.log.interruptions = interruptions;
         mission.explain();
     }
     Ok(mission)
@@ -131,7 +131,7 @@ fn build(mut raw: Raw, spans: &[Span]) -> Result<Mission, String> {
                 partial: window.partial.unwrap_or(span.nanos() < period.nanos()),
                 messages: window.messages.unwrap_or_else(counts),
                 changes: Vec::new(),
-                entries: Vec::new(),
+                events: Vec::new(),
             }
         })
         .collect();
@@ -157,7 +157,7 @@ fn build(mut raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         sending: sending(raw.sending, &raw.topics, &raw.publishes, &elements)?,
         elements,
         windows,
-        ledger: crate::mission::Ledger::default(),
+        log: crate::mission::EventLog::default(),
         undrawn: Vec::new(),
         layout: raw.layout,
         notices: notices(raw.notices),

@@ -22,8 +22,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{Text, degree_of, state_of};
-use crate::evidence::Degree;
+use super::elements::{Text, confidence_of, state_of};
+use crate::evidence::Confidence;
 use crate::graph::{Element, Graphs, GraphsWriter, Number, Row, State};
 use columns::{JsonColumn, JsonRate};
 
@@ -65,7 +65,7 @@ impl<'a> JsonColumns<'a> {
                 _ => all.windows.push((at, at)),
             }
             all.state.push(row.state.word().into());
-            all.degree.push(row.degree.word().into());
+            all.degree.push(row.confidence.word().into());
             match what {
                 Element::Node(_) => all.sent.push(row.count),
                 _ => all.count.push(row.count),
@@ -91,7 +91,7 @@ impl<'a> JsonColumns<'a> {
         let lifecycles: Vec<u32> = self.lifecycle.values(number).take(many).collect();
         let mut lifecycles = lifecycles.into_iter();
         let mut states = self.state.values(|word| state_of(Some(word)));
-        let mut degrees = self.degree.values(|word| degree_of(Some(word)));
+        let mut degrees = self.degree.values(|word| confidence_of(Some(word)));
         let mut sent = self.sent.values(|count| *count);
         let mut counts = self.count.values(|count| *count);
         let mut bytes = self.bytes.values(|bytes| *bytes);
@@ -105,7 +105,7 @@ impl<'a> JsonColumns<'a> {
         for (from, to) in &self.windows {
             for at in (*from).max(next)..(*to).saturating_add(1).min(many) {
                 let state = states.next().unwrap_or(State::Active);
-                let degree = degrees.next().unwrap_or(Degree::Stated);
+                let degree = degrees.next().unwrap_or(Confidence::Stated);
                 let row = Row {
                     lifecycle: lifecycles.next().unwrap_or(0),
                     count: sent.next().flatten().or(counts.next().flatten()),

@@ -7,7 +7,7 @@ use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
 use super::changes::ChangeRow;
 use super::elements::{ElementJson, Text, pairs};
-use super::entries::{InterruptionRow, PhaseRow, entries};
+use super::events::{InterruptionRow, PhaseRow, events};
 use super::lines::LineFormatter;
 use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, TopicJson};
 use super::runs::JsonColumns;
@@ -105,13 +105,13 @@ impl Serialize for Json<'_> {
         map.serialize_entry("step_ns", &mission.step.nanos())?;
         // Under its old key, too, for one release.
         for key in ["events", "ledger"] {
-            map.serialize_entry(key, &List(entries(&mission.ledger, &mission.elements)))?;
+            map.serialize_entry(key, &List(events(&mission.log, &mission.elements)))?;
         }
-        if !mission.ledger.interruptions.is_empty() {
-            let all = mission.ledger.interruptions.iter();
+        if !mission.log.interruptions.is_empty() {
+            let all = mission.log.interruptions.iter();
             map.serialize_entry("interruptions", &List(all.map(InterruptionRow::from)))?;
         }
-        let phases = mission.ledger.phases.iter().map(PhaseRow::from);
+        let phases = mission.log.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
         let all = &mission.elements;
         let window = |(window, graph)| WindowOf {
@@ -196,8 +196,8 @@ impl<'a> Serialize for WindowOf<'a> {
             let subscribes = graph.subscribes.iter().map(edge(&all.subscribes));
             map.serialize_entry("subscribes", &List(subscribes.map(SubscribeJson::from)))?;
         }
-        let changes = window.changes.iter().zip(&window.entries);
-        let changes = changes.map(|(change, entry)| ChangeRow::new(change, *entry, all));
+        let changes = window.changes.iter().zip(&window.events);
+        let changes = changes.map(|(change, event)| ChangeRow::new(change, *event, all));
         map.serialize_entry("changes", &List(changes))?;
         map.end()
     }

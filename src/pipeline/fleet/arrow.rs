@@ -31,7 +31,7 @@ pub fn bags_batch(bags: &[FleetBag]) -> Result<RecordBatch> {
     to_arrow(&bags_table(bags))
 }
 
-/// Every table of a mission by name: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
+/// Every table of a mission by name: `edges`, `topics`, `nodes`, `changes`, `log`, `phases`, `bags`.
 ///
 /// # Errors
 /// As [`counts_batch`].

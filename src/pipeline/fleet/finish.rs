@@ -243,7 +243,7 @@ fn window(
         };
         Some(state.word().into())
     };
-    let (degree, evidence) = (|| Some("measured".into()), || vec!["connection".into()]);
+    let (confidence, evidence) = (|| Some("measured".into()), || vec!["connection".into()]);
     let sent = |sum: Option<&CountSum>| sum.map_or(0, |sum| sum.n);
     let topics = lives.topics.iter().filter(|(_, life)| life.holds(at));
     let topics = topics.map(|(name, life)| {
@@ -252,7 +252,7 @@ fn window(
             name: name.to_string().into(),
             types: types(lives, name),
             state: state(sum),
-            degree: degree(),
+            degree: confidence(),
             evidence: evidence(),
             numbers: Some(TopicNumbers {
                 count: Some(sent(sum)),
@@ -273,7 +273,7 @@ fn window(
             topic: key.0.to_string().into(),
             edge: EdgeJson {
                 state: state(sum),
-                degree: degree(),
+                degree: confidence(),
                 evidence: evidence(),
                 numbers: Some(EdgeNumbers {
                     count: Some(sent(sum)),
@@ -296,7 +296,7 @@ fn window(
             name: name.to_string().into(),
             role: Some(role::role(name).to_owned().into()),
             state: state(Some(&sum)),
-            degree: degree(),
+            degree: confidence(),
             evidence: evidence(),
             life: life.json(),
             numbers: Some(NodeNumbers {

@@ -96,7 +96,7 @@ fn named(path: &Path) -> Option<PathBuf> {
         };
         let told = part.as_os_str().to_string_lossy();
         let names = std::fs::read_dir(folder).ok()?.flatten();
-        let names = names.map(|entry| entry.file_name());
+        let names = names.map(|event| event.file_name());
         let mut names = names.filter(|name| name.to_string_lossy() == told);
         let name = names.next().filter(|_| names.next().is_none())?;
         real.push(name);

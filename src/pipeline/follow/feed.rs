@@ -9,8 +9,8 @@ use crate::base::time::Stamp;
 use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
 use crate::mission::Mission;
+use crate::mission::event_log::{Detail, Event, InterruptionKind, Kind};
 use crate::mission::events::{LogFormat, LogRow, headlines, quoted, texts};
-use crate::mission::ledger::{Detail, Entry, InterruptionKind, Kind};
 
 worded! {
     /// The certainty of a line.
@@ -44,7 +44,7 @@ impl Certainty {
 /// another number of switched nodes, is another event.
 #[derive(PartialEq)]
 enum Key {
-    Entry {
+    Event {
         kind: Kind,
         names: (Option<String>, Option<String>),
         state: Option<Detail>,
@@ -136,14 +136,14 @@ impl Feed {
 /// The key of a row, its time, and whether it is certain; `None` for a phase and for a part, which are not printed.
 fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Stamp, Certainty)> {
     Some(match row {
-        LogRow::Entry(_, entry) => {
-            let (node, topic) = mission.elements.names(entry.what);
-            let key = Key::Entry {
-                kind: entry.kind,
+        LogRow::Event(_, event) => {
+            let (node, topic) = mission.elements.names(event.what);
+            let key = Key::Event {
+                kind: event.kind,
                 names: (node.map(str::to_owned), topic.map(str::to_owned)),
-                state: (entry.kind == Kind::Lifecycle).then(|| entry.detail.clone()),
+                state: (event.kind == Kind::Lifecycle).then(|| event.detail.clone()),
             };
-            (key, entry.time, certainty(entry, now))
+            (key, event.time, certainty(event, now))
         }
         LogRow::Interruption(one) => (Key::Interruption(one.kind), one.time, Certainty::Sure),
         LogRow::Switch(one) => {
@@ -165,10 +165,10 @@ fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Sta
 }
 
 /// Whether an event is certain: an ended element may return, and a rate must last for a while.
-fn certainty(entry: &Entry, now: Stamp) -> Certainty {
-    let is_open = matches!(entry.kind, Kind::Stopped | Kind::Vanished | Kind::Rate);
-    let is_away = entry.kind == Kind::Silent && entry.until.is_none();
-    let is_fresh = now.since(entry.time.max(entry.latest)) < SURE_NS;
+fn certainty(event: &Event, now: Stamp) -> Certainty {
+    let is_open = matches!(event.kind, Kind::Stopped | Kind::Vanished | Kind::Rate);
+    let is_away = event.kind == Kind::Silent && event.until.is_none();
+    let is_fresh = now.since(event.time.max(event.latest)) < SURE_NS;
     if is_away || is_open && is_fresh {
         Certainty::SoFar
     } else {

@@ -210,7 +210,7 @@ impl<'u, 's> Union<'u, 's> {
             let mut look = self.look(*at, fates[*at]?);
             let turned = self.boxes[*at].1.iter();
             let events = turned.flat_map(|m| began.get(m).into_iter().chain(ended.get(m)));
-            look.entries = events.flatten().copied().collect();
+            look.events = events.flatten().copied().collect();
             Some(look)
         });
         let looks: Vec<PanelBox> = looks.collect();

@@ -7,8 +7,8 @@ use super::StepSource;
 use crate::base::time::Span;
 use crate::draw::figure::marks::Sign;
 use crate::graph::Element;
-use crate::mission::EntryId;
-use crate::mission::ledger::Detail;
+use crate::mission::EventId;
+use crate::mission::event_log::Detail;
 
 impl StepSource<'_> {
     /// The weight of a boundary, larger for one that changes more.
@@ -27,7 +27,7 @@ impl StepSource<'_> {
     }
 
     /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
-    pub(super) fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EntryId>> {
+    pub(super) fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EventId>> {
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let (old, new) = match sign {
             Sign::Start => (before, after),
@@ -37,10 +37,10 @@ impl StepSource<'_> {
             self.sheet.source.phases[k - 1].span.start,
             self.sheet.source.phases[k].span.end,
         );
-        let events = |track: usize| -> Vec<EntryId> {
+        let events = |track: usize| -> Vec<EventId> {
             let own = self.marks.signs.iter().filter(|s| s.track == track);
             let own = own.filter(|s| s.sign == sign && around.contains(s.at));
-            own.map(|s| s.entry).collect()
+            own.map(|s| s.event).collect()
         };
         let tracks = new.difference(old).filter_map(|name| self.track(name));
         let tracks = tracks.map(|track| (track, events(track)));
@@ -48,7 +48,7 @@ impl StepSource<'_> {
     }
 
     /// The hand-overs of the log in the step into phase `k`: topic, before, after.
-    pub(super) fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EntryId)> {
+    pub(super) fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EventId)> {
         let source = self.sheet.source;
         let role = |nodes: &[u32]| {
             let node = source
@@ -58,7 +58,7 @@ impl StepSource<'_> {
                 .get(*nodes.first()? as usize)?;
             Some(Arc::clone(&node.role))
         };
-        let headlines = source.mission.ledger.headlines(self.time(k));
+        let headlines = source.mission.log.headlines(self.time(k));
         let handed = headlines.filter_map(|(id, event)| match (&event.detail, event.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
                 let shown = source.shows(topic) && !source.is_hub(topic);
@@ -71,7 +71,7 @@ impl StepSource<'_> {
     }
 
     /// The events in the step into phase `k` on the rows of a box.
-    pub(super) fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EntryId> {
+    pub(super) fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EventId> {
         let time = self.time(k);
         let letters = self.marks.letters.iter().map(|l| &l.mark);
         let marks = self.marks.signs.iter().chain(letters);
@@ -79,6 +79,6 @@ impl StepSource<'_> {
         let hands = self.marks.handovers.iter().filter(|h| {
             time.contains(h.at) && (members.contains(&h.from) || members.contains(&h.to))
         });
-        own.map(|m| m.entry).chain(hands.map(|h| h.entry)).collect()
+        own.map(|m| m.event).chain(hands.map(|h| h.event)).collect()
     }
 }

@@ -34,7 +34,7 @@ fn base(style: &Style) -> String {
     out
 }
 
-/// The rules for what classes change of that: rate, degree, state and mark; a later rule counts more. Only these class
+/// The rules for what classes change of that: rate, confidence, state and mark; a later rule counts more. Only these class
 /// words have rules.
 fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // What is silent has no rate worth a place.

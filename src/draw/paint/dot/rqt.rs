@@ -126,8 +126,8 @@ impl RqtWriter<'_> {
 
     /// Our own attributes, which loaders pass over.
     fn extras(&self, out: &mut String, shown: &Shown, members: &[Element]) {
-        let (state, degree) = (shown.state.word(), shown.degree.word());
-        let _ = write!(out, ", state={state}, degree={degree}");
+        let (state, confidence) = (shown.state.word(), shown.confidence.word());
+        let _ = write!(out, ", state={state}, degree={confidence}");
         let evidence = self.drawing.evidence(members);
         if !evidence.is_empty() {
             let _ = write!(out, ", evidence={}", quoted(&evidence));

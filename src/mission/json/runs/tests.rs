@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
 use crate::graph::{Edge, Elements, Graph, Node, Topic};
-use crate::mission::{Json, JsonForm, Ledger, Mission, Sending, Window, read_json};
+use crate::mission::{EventLog, Json, JsonForm, Mission, Sending, Window, read_json};
 
 fn elements() -> Elements {
     let node = |name: &str| Node {
@@ -59,7 +59,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
         partial: false,
         messages: 7,
         changes: Vec::new(),
-        entries: Vec::new(),
+        events: Vec::new(),
     };
     let list = windows.iter().enumerate().map(window).collect();
     Mission {
@@ -71,7 +71,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
         elements: elements(),
         windows: list,
         graphs: windows.into_iter().collect(),
-        ledger: Ledger::default(),
+        log: EventLog::default(),
         sending: Sending::default(),
         undrawn: Vec::new(),
         layout: None,

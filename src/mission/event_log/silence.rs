@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, LedgerInput};
-use super::{EntryId, Kind};
+use super::make::{Drafts, LogInput};
+use super::{EventId, Kind};
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender};
@@ -13,13 +13,13 @@ use crate::graph::{Element, NodeId, Record, TopicId};
 type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     let gone = Gone::new(drafts);
-    let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
+    let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EventId)>> = BTreeMap::new();
     for (node, senders) in by(context, |v| v.node.filter(|_| !v.is_latched)) {
         let what = Element::Node(node);
         for silence in silences(context, what) {
-            let id = drafts.add(entry(context, what, *silence, &senders));
+            let id = drafts.add(event(context, what, *silence, &senders));
             of_nodes.entry(node).or_default().push((*silence, id));
         }
     }
@@ -28,34 +28,34 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             continue;
         }
         for silence in silences(context, Element::Topic(topic)) {
-            let mut entry = entry(context, Element::Topic(topic), *silence, &senders);
+            let mut event = event(context, Element::Topic(topic), *silence, &senders);
             let nodes = senders.iter().filter_map(|v| of_nodes.get(&v.node?));
             let whole = nodes.flatten().find(|(of, _)| meet(*of, *silence));
             let whole = whole.map(|(_, id)| *id);
-            entry.part_of = whole.or_else(|| gone.at(&senders, silence.0));
-            drafts.add(entry);
+            event.part_of = whole.or_else(|| gone.at(&senders, silence.0));
+            drafts.add(event);
         }
     }
 }
 
-/// The ends of nodes with their times, and the entries about them.
-struct Gone(BTreeMap<NodeId, Vec<(Stamp, EntryId)>>);
+/// The ends of nodes with their times, and the events about them.
+struct Gone(BTreeMap<NodeId, Vec<(Stamp, EventId)>>);
 
 impl Gone {
     fn new(drafts: &Drafts) -> Self {
-        let mut gone: BTreeMap<NodeId, Vec<(Stamp, EntryId)>> = BTreeMap::new();
-        for (id, entry) in (0..).zip(&drafts.list) {
-            let whole = entry.part_of.unwrap_or(id);
-            if let (Element::Node(node), Kind::Stopped | Kind::Restarted) = (entry.what, entry.kind)
+        let mut gone: BTreeMap<NodeId, Vec<(Stamp, EventId)>> = BTreeMap::new();
+        for (id, event) in (0..).zip(&drafts.list) {
+            let whole = event.part_of.unwrap_or(id);
+            if let (Element::Node(node), Kind::Stopped | Kind::Restarted) = (event.what, event.kind)
             {
-                gone.entry(node).or_default().push((entry.time, whole));
+                gone.entry(node).or_default().push((event.time, whole));
             }
         }
         Self(gone)
     }
 
-    /// The entry about the end of one of these senders at that time.
-    fn at(&self, senders: &[&Sender], time: Stamp) -> Option<EntryId> {
+    /// The event about the end of one of these senders at that time.
+    fn at(&self, senders: &[&Sender], time: Stamp) -> Option<EventId> {
         let of = senders.iter().filter_map(|v| self.0.get(&v.node?));
         of.flatten()
             .find(|(end, _)| end.since(time).abs() <= TOGETHER_NS)
@@ -65,7 +65,7 @@ impl Gone {
 
 /// The senders of each node, or of each topic.
 fn by<'a>(
-    context: &LedgerInput<'a>,
+    context: &LogInput<'a>,
     key: impl Fn(&Sender) -> Option<u32>,
 ) -> BTreeMap<TopicId, Vec<&'a Sender>> {
     let mut of: BTreeMap<u32, Vec<&Sender>> = BTreeMap::new();
@@ -78,7 +78,7 @@ fn by<'a>(
 }
 
 /// The silences of an element.
-fn silences<'a>(context: &LedgerInput<'a>, what: Element) -> &'a [Silence] {
+fn silences<'a>(context: &LogInput<'a>, what: Element) -> &'a [Silence] {
     context
         .history
         .records
@@ -86,18 +86,18 @@ fn silences<'a>(context: &LedgerInput<'a>, what: Element) -> &'a [Silence] {
         .map_or(&[], Record::silences)
 }
 
-fn entry(
-    context: &LedgerInput<'_>,
+fn event(
+    context: &LogInput<'_>,
     what: Element,
     (from, to): Silence,
     senders: &[&Sender],
-) -> super::Entry {
+) -> super::Event {
     let last = senders
         .iter()
         .flat_map(|v| &v.stretches)
         .filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
-    let mut entry = context.entry(
+    let mut event = context.event(
         Kind::Silent,
         what,
         Bound {
@@ -106,8 +106,8 @@ fn entry(
             latest: from.plus(period),
         },
     );
-    entry.until = to;
-    entry
+    event.until = to;
+    event
 }
 
 /// Whether two silences overlap.

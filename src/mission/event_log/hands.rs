@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::make::{Drafts, LedgerInput};
+use super::make::{Drafts, LogInput};
 use super::{Detail, Kind};
 use crate::base::rhythm::{
     BACK_NS, BREAK, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, SHUTDOWN_NS, TAKEN_NS,
@@ -37,7 +37,7 @@ impl RoleSending {
 }
 
 /// Adds all hand-overs.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     let stretches = context
         .history
         .sending
@@ -66,7 +66,7 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// The intervals of sending of each role, sorted by first message.
-fn sendings(context: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
+fn sendings(context: &LogInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
     for sender in senders {
         let Some(node) = sender.node else { continue };
@@ -137,7 +137,7 @@ fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> 
 }
 
 fn hand(
-    context: &LedgerInput<'_>,
+    context: &LogInput<'_>,
     drafts: &mut Drafts,
     topic: TopicId,
     old: &RoleSending,
@@ -148,12 +148,12 @@ fn hand(
         earliest: old.last.min(new.first),
         latest: old.last.max(new.first),
     };
-    let mut entry = context.entry(Kind::HandedOver, Element::Topic(topic), at);
-    entry.detail = Detail::Senders {
+    let mut event = context.event(Kind::HandedOver, Element::Topic(topic), at);
+    event.detail = Detail::Senders {
         from: vec![old.node],
         to: vec![new.node],
     };
-    drafts.add(entry);
+    drafts.add(event);
 }
 
 /// The rate of a sender in an interval.
@@ -165,7 +165,7 @@ struct Pace {
 }
 
 /// Adds the times at which another sender begins to provide most messages of a topic while both continue.
-fn shares(context: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: &[&Sender]) {
+fn shares(context: &LogInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: &[&Sender]) {
     let paces: Vec<Pace> = senders
         .iter()
         .filter_map(|v| Some((v.node?, v)))
@@ -204,12 +204,12 @@ fn shares(context: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, sender
                 earliest: *until,
                 latest: pair[0],
             };
-            let mut entry = context.entry(Kind::HandedOver, Element::Topic(topic), at);
-            entry.detail = Detail::Senders {
+            let mut event = context.event(Kind::HandedOver, Element::Topic(topic), at);
+            event.detail = Detail::Senders {
                 from: vec![*old],
                 to: vec![main.node],
             };
-            drafts.add(entry);
+            drafts.add(event);
         }
         before = Some((main.node, nodes, pair[1]));
     }

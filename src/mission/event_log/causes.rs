@@ -1,16 +1,16 @@
 //! One headline per cause: consequences of another event, repeated appearances, and simultaneous events of many
-//! elements become parts of one entry.
+//! elements become parts of one event.
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, LedgerInput};
-use super::{Detail, Entry, EntryId, Kind};
+use super::make::{Drafts, LogInput};
+use super::{Detail, Event, EventId, Kind};
 use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
 use crate::base::time::Stamp;
 use crate::graph::{Element, NodeId, TopicId};
 
-/// Makes entries with a known cause parts of it.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// Makes events with a known cause parts of it.
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     hand_overs(context, drafts);
     subscribers(context, drafts);
     follow_inputs(context, drafts);
@@ -20,21 +20,21 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// The ids of the headlines of some kinds, sorted by time.
-fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EntryId> {
+fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EventId> {
     let all = (0..).zip(&drafts.list);
     let wanted = all.filter(|(_, e)| e.is_headline() && kinds.contains(&e.kind));
-    let mut places: Vec<EntryId> = wanted.map(|(id, _)| id).collect();
+    let mut places: Vec<EventId> = wanted.map(|(id, _)| id).collect();
     places.sort_by_key(|id| (drafts.get(*id).time, *id));
     places
 }
 
-/// The ids of entries about nodes or topics, by what `key` finds in them.
+/// The ids of events about nodes or topics, by what `key` finds in them.
 fn by<K: Ord>(
     drafts: &Drafts,
-    ids: impl IntoIterator<Item = EntryId>,
-    key: impl Fn(&Entry) -> Option<K>,
-) -> BTreeMap<K, Vec<EntryId>> {
-    let mut of: BTreeMap<K, Vec<EntryId>> = BTreeMap::new();
+    ids: impl IntoIterator<Item = EventId>,
+    key: impl Fn(&Event) -> Option<K>,
+) -> BTreeMap<K, Vec<EventId>> {
+    let mut of: BTreeMap<K, Vec<EventId>> = BTreeMap::new();
     for id in ids {
         if let Some(key) = key(drafts.get(id)) {
             of.entry(key).or_default().push(id);
@@ -44,20 +44,20 @@ fn by<K: Ord>(
 }
 
 /// The node and the kind of a turn: a start or a stop.
-fn turn(entry: &Entry) -> Option<(NodeId, Kind)> {
-    match (entry.what, entry.kind) {
-        (Element::Node(node), Kind::Started | Kind::Stopped) => Some((node, entry.kind)),
+fn turn(event: &Event) -> Option<(NodeId, Kind)> {
+    match (event.what, event.kind) {
+        (Element::Node(node), Kind::Started | Kind::Stopped) => Some((node, event.kind)),
         _ => None,
     }
 }
 
 /// A node known only from the messages of one topic that hands it over or takes it over need not have stopped or
 /// started.
-fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
     let turns = by(drafts, turns, turn);
-    let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |entry| {
-        let (node, topic) = context.elements.ends(entry.what);
+    let steps = by(drafts, headlines(drafts, &[Kind::Rate]), |event| {
+        let (node, topic) = context.elements.ends(event.what);
         topic.filter(|_| node.is_some())
     });
     let mut sent: BTreeMap<NodeId, Vec<TopicId>> = BTreeMap::new();
@@ -71,8 +71,8 @@ fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
         words.all(|word| word == "connection") && sent.all(|other| *other == topic)
     };
     for hand in headlines(drafts, &[Kind::HandedOver]) {
-        let entry = drafts.get(hand).clone();
-        let (Detail::Senders { from, to }, Element::Topic(topic)) = (&entry.detail, entry.what)
+        let event = drafts.get(hand).clone();
+        let (Detail::Senders { from, to }, Element::Topic(topic)) = (&event.detail, event.what)
         else {
             continue;
         };
@@ -81,13 +81,13 @@ fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             let node = context.elements.ends(other.what).0;
             // A mux has the rate of the sender whose turn it is.
             let is_mux = node.is_some_and(|node| !from.contains(&node) && !to.contains(&node));
-            if is_mux && is_within(other.time, entry.time, TOGETHER_NS) {
+            if is_mux && is_within(other.time, event.time, TOGETHER_NS) {
                 drafts.fold(*step, hand);
             }
         }
         let ends = [
-            (from, Kind::Stopped, entry.earliest),
-            (to, Kind::Started, entry.time),
+            (from, Kind::Stopped, event.earliest),
+            (to, Kind::Started, event.time),
         ];
         for (nodes, kind, at) in ends {
             for node in nodes.iter().filter(|node| is_only_sender(**node, topic)) {
@@ -102,26 +102,26 @@ fn hand_overs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// Subscriptions that appear or vanish with the topic's publisher are consequences.
-fn subscribers(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
     let all = (0..).zip(&drafts.list).map(|(id, _)| id);
     let turns = by(drafts, all, turn);
     let wiring = Wiring::of(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
-        let entry = drafts.get(id);
+        let event = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
-            (entry.what, context.elements.ends(entry.what))
+            (event.what, context.elements.ends(event.what))
         else {
             continue;
         };
         let senders = wiring.publishers.get(&topic).into_iter().flatten();
-        let kind = match entry.kind {
+        let kind = match event.kind {
             Kind::Appeared => Kind::Started,
             _ => Kind::Stopped,
         };
         let of = senders.filter_map(|node| turns.get(&(*node, kind)));
-        let is_then = |turn: &EntryId| {
+        let is_then = |turn: &EventId| {
             let turn = drafts.get(*turn);
-            is_within(turn.time, entry.time, TOGETHER_NS)
+            is_within(turn.time, event.time, TOGETHER_NS)
         };
         let cause = of.flatten().copied().find(is_then);
         if let Some(cause) = cause {
@@ -137,7 +137,7 @@ struct Wiring {
 }
 
 impl Wiring {
-    fn of(context: &LedgerInput<'_>) -> Self {
+    fn of(context: &LogInput<'_>) -> Self {
         let (mut publishers, mut inputs) = (BTreeMap::new(), BTreeMap::new());
         let is_meant = |node: NodeId, topic| {
             !context.is_by_the_way(topic) && !context.is_quiet(Element::Node(node))
@@ -157,8 +157,8 @@ impl Wiring {
         Self { publishers, inputs }
     }
 
-    /// The publishers of an entry's element.
-    fn senders(&self, context: &LedgerInput<'_>, what: Element) -> Vec<NodeId> {
+    /// The publishers of an event's element.
+    fn senders(&self, context: &LogInput<'_>, what: Element) -> Vec<NodeId> {
         match (context.elements.ends(what), what) {
             ((_, Some(topic)), Element::Topic(_)) => {
                 self.publishers.get(&topic).cloned().unwrap_or_default()
@@ -169,29 +169,29 @@ impl Wiring {
 }
 
 /// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too.
-fn follow_inputs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
     let wiring = Wiring::of(context);
-    let mut pauses: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
-    let mut steps: BTreeMap<TopicId, Vec<EntryId>> = BTreeMap::new();
-    for (id, entry) in (0..).zip(&drafts.list) {
-        match (entry.kind, context.elements.ends(entry.what).1) {
+    let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
+    let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
+    for (id, event) in (0..).zip(&drafts.list) {
+        match (event.kind, context.elements.ends(event.what).1) {
             (Kind::Silent | Kind::Stopped | Kind::Restarted, _) => {
-                pauses.entry(entry.what).or_default().push(id);
+                pauses.entry(event.what).or_default().push(id);
             }
             (Kind::Rate, Some(topic)) => steps.entry(topic).or_default().push(id),
             _ => {}
         }
     }
     for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
-        let entry = drafts.get(id);
-        let own = wiring.senders(context, entry.what);
+        let event = drafts.get(id);
+        let own = wiring.senders(context, event.what);
         let inputs = own.iter().filter_map(|node| wiring.inputs.get(node));
         let cause = inputs.flatten().find_map(|input| {
-            if entry.kind == Kind::Rate {
+            if event.kind == Kind::Rate {
                 let of = steps.get(input).into_iter().flatten();
                 return of
                     .copied()
-                    .find(|step| is_same_step(entry, drafts.get(*step), CROWD_NS));
+                    .find(|step| is_same_step(event, drafts.get(*step), CROWD_NS));
             }
             let senders = wiring.publishers.get(input).into_iter().flatten();
             let whose = senders.map(|node| Element::Node(*node));
@@ -200,7 +200,7 @@ fn follow_inputs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
                 .filter_map(|what| pauses.get(&what));
             of.flatten()
                 .copied()
-                .find(|pause| follows(entry, drafts.get(*pause)))
+                .find(|pause| follows(event, drafts.get(*pause)))
         });
         if let Some(cause) = cause {
             drafts.fold(id, cause);
@@ -209,7 +209,7 @@ fn follow_inputs(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// Whether a silence begins within a pause of its input.
-fn follows(silence: &Entry, pause: &Entry) -> bool {
+fn follows(silence: &Event, pause: &Event) -> bool {
     let until = match pause.kind {
         Kind::Stopped => pause.time.plus(TOGETHER_NS),
         _ => pause.until.unwrap_or(Stamp::MAX),
@@ -218,8 +218,8 @@ fn follows(silence: &Entry, pause: &Entry) -> bool {
 }
 
 /// Whether two rate changes are about equal, and less than `apart` nanoseconds apart.
-fn is_same_step(one: &Entry, other: &Entry, apart: i64) -> bool {
-    let ratio = |entry: &Entry| match entry.detail {
+fn is_same_step(one: &Event, other: &Event, apart: i64) -> bool {
+    let ratio = |event: &Event| match event.detail {
         Detail::Rates { from_hz, to_hz } => to_hz / from_hz,
         _ => f64::NAN,
     };
@@ -229,14 +229,14 @@ fn is_same_step(one: &Entry, other: &Entry, apart: i64) -> bool {
     one.what != other.what && is_near && (1.0 / SAME_STEP..=SAME_STEP).contains(&between)
 }
 
-/// An edge or topic that appears and vanishes repeatedly is one entry.
-fn flaps(context: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let mut of: BTreeMap<Element, Vec<EntryId>> = BTreeMap::new();
+/// An edge or topic that appears and vanishes repeatedly is one event.
+fn flaps(context: &LogInput<'_>, drafts: &mut Drafts) {
+    let mut of: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         of.entry(drafts.get(id).what).or_default().push(id);
     }
     for (what, turns) in of {
-        let is_begin = |id: &&EntryId| drafts.get(**id).kind == Kind::Appeared;
+        let is_begin = |id: &&EventId| drafts.get(**id).kind == Kind::Appeared;
         let many = turns.iter().filter(is_begin).count();
         let [first, .., last] = turns[..] else {
             continue;
@@ -245,20 +245,20 @@ fn flaps(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             continue;
         }
         let until = drafts.get(last).time;
-        let entry = &mut drafts.list[first as usize];
-        entry.detail = Detail::Count(many as u64);
-        entry.until = Some(until);
+        let event = &mut drafts.list[first as usize];
+        event.detail = Detail::Count(many as u64);
+        event.until = Some(until);
         for turn in &turns[1..] {
             drafts.fold(*turn, first);
         }
     }
 }
 
-/// Simultaneous events of many elements are one entry: connections of one node or topics of unknown publishers that
+/// Simultaneous events of many elements are one event: connections of one node or topics of unknown publishers that
 /// appear or vanish, silences that begin and end together, equal rate changes.
-fn crowds(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn crowds(context: &LogInput<'_>, drafts: &mut Drafts) {
     for kind in [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate] {
-        let mut of: BTreeMap<Option<NodeId>, Vec<EntryId>> = BTreeMap::new();
+        let mut of: BTreeMap<Option<NodeId>, Vec<EventId>> = BTreeMap::new();
         for id in headlines(drafts, &[kind]) {
             let node = context.elements.ends(drafts.get(id).what).0;
             // The silences of several nodes have one cause, and so have equal rate changes.
@@ -274,7 +274,7 @@ fn crowds(context: &LedgerInput<'_>, drafts: &mut Drafts) {
                 let rest = places[at + 1..].iter().copied();
                 let soon =
                     rest.take_while(|id| is_within(drafts.get(*id).time, one.time, CLOSE_NS));
-                let alike: Vec<EntryId> =
+                let alike: Vec<EventId> =
                     soon.filter(|id| is_alike(&one, drafts.get(*id))).collect();
                 for id in alike {
                     drafts.fold(id, *first);
@@ -285,7 +285,7 @@ fn crowds(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// Whether two headlines of a kind are about the same moment, and the same change.
-fn is_alike(first: &Entry, other: &Entry) -> bool {
+fn is_alike(first: &Event, other: &Event) -> bool {
     let ends = match (first.until, other.until) {
         (Some(a), Some(b)) => is_within(a, b, CROWD_NS),
         (a, b) => a.is_none() && b.is_none(),
@@ -304,13 +304,13 @@ fn is_within(a: Stamp, b: Stamp, apart: i64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::{Degree, Evidence};
+    use crate::evidence::{Confidence, Evidence};
 
     const SECOND: i64 = 1_000_000_000;
 
-    fn entry(kind: Kind, topic: TopicId, from: i64, until: Option<i64>) -> Entry {
+    fn event(kind: Kind, topic: TopicId, from: i64, until: Option<i64>) -> Event {
         let time = Stamp(from * SECOND);
-        Entry {
+        Event {
             kind,
             what: Element::Topic(topic),
             time,
@@ -318,7 +318,7 @@ mod tests {
             latest: time,
             until: until.map(|at| Stamp(at * SECOND)),
             detail: Detail::None,
-            degree: Degree::Measured,
+            confidence: Confidence::Measured,
             evidence: Evidence::NONE,
             part_of: None,
             quiet: false,
@@ -326,17 +326,17 @@ mod tests {
         }
     }
 
-    fn step(topic: TopicId, at: i64, from_hz: f64, to_hz: f64) -> Entry {
-        Entry {
+    fn step(topic: TopicId, at: i64, from_hz: f64, to_hz: f64) -> Event {
+        Event {
             detail: Detail::Rates { from_hz, to_hz },
-            ..entry(Kind::Rate, topic, at, None)
+            ..event(Kind::Rate, topic, at, None)
         }
     }
 
     #[test]
     fn a_silence_follows_an_input_only_within_its_pause() {
-        let pause = entry(Kind::Silent, 1, 10, Some(15));
-        let silence = |from| entry(Kind::Silent, 2, from, Some(16));
+        let pause = event(Kind::Silent, 1, 10, Some(15));
+        let silence = |from| event(Kind::Silent, 2, from, Some(16));
         assert!(follows(&silence(10), &pause) && follows(&silence(14), &pause));
         assert!(!follows(&silence(16), &pause) && !follows(&silence(8), &pause));
         assert!(!follows(&pause, &pause));
@@ -354,7 +354,7 @@ mod tests {
     fn parts_are_flattened_and_never_cyclic() {
         let mut drafts = Drafts::default();
         for topic in 0..3 {
-            drafts.add(entry(Kind::Silent, topic, 1, None));
+            drafts.add(event(Kind::Silent, topic, 1, None));
         }
         drafts.fold(2, 1);
         drafts.fold(1, 0);

@@ -1,13 +1,13 @@
 //! Rate changes: between two adjacent even stretches of one sender.
 
-use super::make::{Drafts, LedgerInput};
+use super::make::{Drafts, LogInput};
 use super::{Detail, Kind};
 use crate::base::rhythm::{FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
 use crate::graph::history::{Bound, Sender, Stretch};
 
 /// Adds all changes of rates.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
         for pair in sender.stretches.windows(2) {
@@ -17,7 +17,7 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
             {
                 let what = context.publication(sender);
                 let width = before.period.max(after.period);
-                let mut entry = context.entry(
+                let mut event = context.event(
                     Kind::Rate,
                     what,
                     Bound {
@@ -26,11 +26,11 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
                         latest: after.first.plus(width),
                     },
                 );
-                entry.detail = Detail::Rates {
+                event.detail = Detail::Rates {
                     from_hz: before.hz(),
                     to_hz: after.hz(),
                 };
-                drafts.add(entry);
+                drafts.add(event);
             }
         }
     }
@@ -47,7 +47,7 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
 }
 
 /// Whether the sender restarted between the two.
-fn is_away(context: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
+fn is_away(context: &LogInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
     let lives = context.lives(context.publication(sender)).iter();
     !after.is_joined
         && lives
@@ -55,7 +55,7 @@ fn is_away(context: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: 
             .any(|end| before.last <= end.latest && end.time <= after.first)
 }
 
-impl LedgerInput<'_> {
+impl LogInput<'_> {
     /// The publication of a sender; its topic if the sender is unknown.
     pub(super) fn publication(&self, sender: &Sender) -> Element {
         let edge = sender

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Conclusions, ElementKey, Reliability};
 use crate::base::time::Span;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, Name};
+use crate::evidence::observation::{Name, Observation};
 
 /// Complete lists of the topics that nodes publish and subscribe, as far as there are any.
 #[derive(Debug, Default)]
@@ -27,19 +27,28 @@ impl Closed {
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
             let word = SOURCES.get(fact.source).map_or("", |s| s.word);
-            if let (Claim::Lists(node, _) | Claim::Publish(node, _), Some((first, last)), true) =
-                (fact.claim, known.facts.times.bounds(fact.times), listed)
-            {
+            if let (
+                Observation::Lists(node, _) | Observation::Publish(node, _),
+                Some((first, last)),
+                true,
+            ) = (
+                fact.observation,
+                known.facts.times.bounds(fact.times),
+                listed,
+            ) {
                 let span = heard.entry(node).or_insert(Span::new(first, last));
                 span.start = span.start.min(first);
                 span.end = span.end.max(last);
             }
-            match (fact.claim, word) {
-                (Claim::Lists(node, topic), _)
-                | (Claim::Publish(node, topic) | Claim::Subscribe(node, topic), "rosgraph") => {
+            match (fact.observation, word) {
+                (Observation::Lists(node, topic), _)
+                | (
+                    Observation::Publish(node, topic) | Observation::Subscribe(node, topic),
+                    "rosgraph",
+                ) => {
                     closed.all.entry(node).or_default().insert(topic);
                 }
-                (Claim::Publish(node, topic), "rosout") if listed => {
+                (Observation::Publish(node, topic), "rosout") if listed => {
                     closed.published.entry(node).or_default().insert(topic);
                 }
                 _ => {}

@@ -1,4 +1,4 @@
-//! Proofs from the claims of a mission: every reason to believe in a node, a topic or an edge.
+//! Proofs from the observations of a mission: every reason to believe in a node, a topic or an edge.
 
 mod at_word;
 mod closed;
@@ -12,8 +12,10 @@ use crate::bag::Connection;
 use crate::base::name::OWN_NODE;
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId};
-use crate::evidence::proof::closed::Closed;
+use crate::evidence::inference::closed::Closed;
+use crate::evidence::observation::{
+    Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
+};
 use crate::evidence::times::SeriesId;
 
 pub(crate) use incident::{Incident, IncidentKind};
@@ -128,14 +130,14 @@ pub(crate) enum Validity {
 
 /// A reason to believe in an element.
 #[derive(Clone, Debug)]
-pub(crate) struct Proof {
+pub(crate) struct Inference {
     pub(crate) what: ElementKey,
     pub(crate) source: SourceId,
-    pub(crate) degree: Degree,
+    pub(crate) confidence: Confidence,
     pub(crate) when: Validity,
 }
 
-impl Proof {
+impl Inference {
     /// Renumbers the names.
     pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
         self.what = self.what.renamed(to);
@@ -165,8 +167,8 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 #[derive(Debug)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
-    pub(crate) facts: Claims,
-    pub(crate) proofs: Vec<Proof>,
+    pub(crate) facts: Observations,
+    pub(crate) inferences: Vec<Inference>,
     /// Statements besides who is in the graph, by time for each element.
     pub(crate) incidents: Vec<Incident>,
     /// Proofs that were explained by their source, while `why` asks for them.
@@ -190,7 +192,7 @@ pub(crate) struct Conclusions<'a> {
 }
 
 impl<'a> Conclusions<'a> {
-    pub(crate) fn new(streams: &'a [Stream], facts: Claims, mission: (Stamp, Stamp)) -> Self {
+    pub(crate) fn new(streams: &'a [Stream], facts: Observations, mission: (Stamp, Stamp)) -> Self {
         let mut recorded: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
         for (at, stream) in streams.iter().enumerate() {
             recorded.entry(stream.topic).or_default().push(at);
@@ -202,7 +204,7 @@ impl<'a> Conclusions<'a> {
             offers: offers(&facts.offers, streams),
             streams,
             facts,
-            proofs: Vec::new(),
+            inferences: Vec::new(),
             incidents: Vec::new(),
             worded: BTreeSet::new(),
             copies: BTreeSet::new(),
@@ -215,8 +217,8 @@ impl<'a> Conclusions<'a> {
     }
 
     /// Adds a proof.
-    pub(crate) fn prove(&mut self, proof: Proof) {
-        match proof.what {
+    pub(crate) fn add(&mut self, inference: Inference) {
+        match inference.what {
             ElementKey::Node(node) => {
                 self.nodes.insert(node);
             }
@@ -230,27 +232,27 @@ impl<'a> Conclusions<'a> {
             }
             ElementKey::Topic(_) => {}
         }
-        self.proofs.push(proof);
+        self.inferences.push(inference);
     }
 
     /// Adds a proof, with its explanation for `why`; `time` if it belongs to one.
     pub(crate) fn because(
         &mut self,
-        proof: Proof,
+        inference: Inference,
         time: Option<Stamp>,
         words: impl FnOnce(&Self) -> String,
     ) {
-        if self.facts.is_watched(proof.what.names()) {
+        if self.facts.is_watched(inference.what.names()) {
             let text = words(self);
-            self.worded.insert((proof.what, proof.source));
+            self.worded.insert((inference.what, inference.source));
             self.facts.pieces.push(EvidenceLine {
                 time,
-                source: SOURCES.get(proof.source).map_or("", |s| s.word),
-                degree: proof.degree,
+                source: SOURCES.get(inference.source).map_or("", |s| s.word),
+                confidence: inference.confidence,
                 text,
             });
         }
-        self.prove(proof);
+        self.add(inference);
     }
 
     /// Adds the inference of a rule, alive as long as `basis`, unless the element is known already or stronger evidence
@@ -263,13 +265,13 @@ impl<'a> Conclusions<'a> {
         words: impl FnOnce(&Self) -> String,
     ) {
         if !self.knows(what) && !self.denies(what) {
-            let proof = Proof {
+            let inference = Inference {
                 what,
                 source,
-                degree: Degree::Inferred,
+                confidence: Confidence::Inferred,
                 when: Validity::Like(basis),
             };
-            self.because(proof, None, words);
+            self.because(inference, None, words);
         }
     }
 
@@ -288,13 +290,13 @@ impl<'a> Conclusions<'a> {
         }
         for at in self.recorded.get(&topic).cloned().unwrap_or_default() {
             if self.streams[at].publisher.is_none() {
-                let proof = Proof {
+                let inference = Inference {
                     what,
                     source,
-                    degree: Degree::Inferred,
+                    confidence: Confidence::Inferred,
                     when: Validity::Messages(at),
                 };
-                self.because(proof, None, &words);
+                self.because(inference, None, &words);
             }
         }
     }
@@ -359,7 +361,7 @@ impl<'a> Conclusions<'a> {
     /// Whether a node other than `node` names this topic as its own, as publisher or subscriber.
     pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
         self.facts.list.iter().any(|fact| {
-            matches!(fact.claim, Claim::Lists(n, t) | Claim::Publish(n, t) if t == topic && n != node)
+            matches!(fact.observation, Observation::Lists(n, t) | Observation::Publish(n, t) if t == topic && n != node)
         })
     }
 
@@ -410,10 +412,10 @@ impl<'a> Conclusions<'a> {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
         }
-        self.prove(Proof {
+        self.add(Inference {
             what,
             source,
-            degree: Degree::Inferred,
+            confidence: Confidence::Inferred,
             when: Validity::Like(basis),
         });
     }
@@ -436,10 +438,14 @@ impl<'a> Conclusions<'a> {
     /// The node of a name without its namespace: the only known one that ends so, else one of this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
-        let loggers = self.facts.list.iter().filter_map(|fact| match fact.claim {
-            Claim::Logger(name, _) => Some(name),
-            _ => None,
-        });
+        let loggers = self
+            .facts
+            .list
+            .iter()
+            .filter_map(|fact| match fact.observation {
+                Observation::Logger(name, _) => Some(name),
+                _ => None,
+            });
         let names: BTreeSet<Name> = loggers.chain(self.nodes.iter().copied()).collect();
         let mut ending = names.iter().filter(|n| self.text(**n).ends_with(&*text));
         match (names.contains(&node), ending.next(), ending.next()) {
@@ -454,7 +460,7 @@ impl<'a> Conclusions<'a> {
     }
 
     /// The times at which a fact was claimed, sorted; empty if they cannot be read, with the error kept.
-    pub(crate) fn times(&mut self, fact: &ClaimRecord) -> Vec<Stamp> {
+    pub(crate) fn times(&mut self, fact: &ObservationRecord) -> Vec<Stamp> {
         self.facts.times(fact).unwrap_or_else(|error| {
             self.failed = Some(error);
             Vec::new()

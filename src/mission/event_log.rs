@@ -20,22 +20,22 @@ use std::sync::Arc;
 use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Window;
 
 pub(crate) use changes::{explain, places};
 pub(crate) use from_changes::described;
-pub(crate) use make::{LedgerInput, make, sorted};
+pub(crate) use make::{LogInput, make, sorted};
 
 /// The most reconfigurations of a mission: the limit of automatic windows.
 const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 
-/// An entry's index in [`Ledger::entries`].
-pub type EntryId = u32;
+/// An event's index in [`EventLog::events`].
+pub type EventId = u32;
 
-/// The parts of entries.
-pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
+/// The parts of events.
+pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// All events of a mission, and its phases.
 ///
@@ -45,18 +45,18 @@ pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
 ///
 /// let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 /// let mission = read(&Reading::of([bag]))?;
-/// for (_, entry) in mission.ledger.headlines(mission.span) {
-///     println!("{} s: {}", mission.offset(entry.time) / 1_000_000_000, entry.kind.word());
+/// for (_, event) in mission.log.headlines(mission.span) {
+///     println!("{} s: {}", mission.offset(event.time) / 1_000_000_000, event.kind.word());
 /// }
-/// let started = mission.ledger.entries.iter().filter(|e| e.kind == Kind::Started);
+/// let started = mission.log.events.iter().filter(|e| e.kind == Kind::Started);
 /// # assert!(started.count() > 0);
 /// # Ok::<(), bagreel::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct Ledger {
+pub struct EventLog {
     /// Sorted by time, then kind, then name.
-    pub entries: Vec<Entry>,
+    pub events: Vec<Event>,
     /// The interruptions of the recording, which are not actions of the robot, sorted by time.
     pub interruptions: Vec<Interruption>,
     /// The phases, in order and without gaps; empty if not detected.
@@ -67,7 +67,7 @@ pub struct Ledger {
 }
 
 worded! {
-    /// The kind of an event. Ordered as entries of one time are listed.
+    /// The kind of an event. Ordered as events of one time are listed.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
     #[non_exhaustive]
     pub enum Kind {
@@ -75,9 +75,9 @@ worded! {
         Started = "started",
         /// A node ended.
         Stopped = "stopped",
-        /// A node, or an anonymous role, was gone from [`Entry::time`] to [`Entry::until`] and is back.
+        /// A node, or an anonymous role, was gone from [`Event::time`] to [`Event::until`] and is back.
         Restarted = "restarted",
-        /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a
+        /// A node or topic with a rhythm paused from [`Event::time`] to [`Event::until`]; there is no proof of a
         /// restart.
         Silent = "silent",
         /// A topic of unknown publisher, or an edge of a living node, began.
@@ -110,7 +110,7 @@ impl Kind {
     }
 }
 
-/// The values of an entry besides its kind and time.
+/// The values of an event besides its kind and time.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Detail {
@@ -145,7 +145,7 @@ pub enum Detail {
 /// An event.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Entry {
+pub struct Event {
     /// The kind.
     pub kind: Kind,
     /// The element. Where an anonymous role restarted, its new node.
@@ -161,18 +161,18 @@ pub struct Entry {
     /// The values of the event.
     pub detail: Detail,
     /// The strength of the evidence for it.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// The entry that this one is a part of: an edge of a node that started. Parts have no parts.
-    pub part_of: Option<EntryId>,
+    /// The event that this one is a part of: an edge of a node that started. Parts have no parts.
+    pub part_of: Option<EventId>,
     /// Whether it is housekeeping or the recorder's, which is only shown on request.
     pub quiet: bool,
     /// The number of elements in it, itself and its parts, ≥ 1.
     pub weight: u32,
 }
 
-impl Entry {
+impl Event {
     /// Whether it is shown separately: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()
@@ -232,13 +232,13 @@ pub struct Phase {
     pub same_as: Option<u32>,
 }
 
-impl Ledger {
-    /// The ledger from the changes between windows, if nothing more precise is known.
+impl EventLog {
+    /// The log from the changes between windows, if nothing more precise is known.
     pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
         from_changes::from_changes(elements, windows)
     }
 
-    /// The word for the element of an entry of this kind.
+    /// The word for the element of an event of this kind.
     pub(crate) fn word(&self, kind: Kind) -> &'static str {
         match kind {
             Kind::Started | Kind::Appeared if self.compares => "only in B",
@@ -248,16 +248,16 @@ impl Ledger {
     }
 
     /// Entries with times in `span`, with their ids, in order.
-    pub fn inside(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
-        let first = self.entries.partition_point(|e| e.time < span.start);
-        let entries = self.entries.iter().enumerate().skip(first);
-        entries
+    pub fn inside(&self, span: Span) -> impl Iterator<Item = (EventId, &Event)> {
+        let first = self.events.partition_point(|e| e.time < span.start);
+        let events = self.events.iter().enumerate().skip(first);
+        events
             .take_while(move |(_, e)| e.time < span.end)
             .map(|(id, e)| (u32::try_from(id).unwrap_or(u32::MAX), e))
     }
 
     /// The headlines with times in `span`, in order.
-    pub fn headlines(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
+    pub fn headlines(&self, span: Span) -> impl Iterator<Item = (EventId, &Event)> {
         self.inside(span).filter(|(_, e)| e.is_headline())
     }
 
@@ -266,20 +266,20 @@ impl Ledger {
         let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
         let mut turns = Vec::new();
         let mut last: Option<Stamp> = None;
-        for (_, entry) in self.headlines(span).filter(|(_, e)| !e.kind.is_remark()) {
-            if last.is_none_or(|last| entry.time.since(last) > close) {
-                turns.push(entry.time);
+        for (_, event) in self.headlines(span).filter(|(_, e)| !e.kind.is_remark()) {
+            if last.is_none_or(|last| event.time.since(last) > close) {
+                turns.push(event.time);
             }
-            last = Some(entry.time);
+            last = Some(event.time);
         }
         turns
     }
 
     /// The robot's mode switches: nodes that stop and others that start within a few seconds.
     pub(crate) fn switches(&self) -> Vec<Switch> {
-        let turns = self.entries.iter().filter(|e| e.is_headline());
+        let turns = self.events.iter().filter(|e| e.is_headline());
         let turns = turns.filter(|e| matches!(e.kind, Kind::Started | Kind::Stopped));
-        let turns: Vec<&Entry> = turns.collect();
+        let turns: Vec<&Event> = turns.collect();
         let mut found: Vec<Switch> = Vec::new();
         // The first turn, the one after the last within reach, and the stops between them.
         let (mut at, mut end, mut stopped) = (0, 0, 0);
@@ -309,19 +309,19 @@ impl Ledger {
         found
     }
 
-    /// The ids of the parts of all entries, in order, by the ids of those entries.
-    pub fn all_parts(&self) -> BTreeMap<EntryId, Vec<EntryId>> {
+    /// The ids of the parts of all events, in order, by the ids of those events.
+    pub fn all_parts(&self) -> BTreeMap<EventId, Vec<EventId>> {
         let mut parts = Parts::new();
-        for (id, entry) in (0..).zip(&self.entries) {
-            if let Some(whole) = entry.part_of {
+        for (id, event) in (0..).zip(&self.events) {
+            if let Some(whole) = event.part_of {
                 parts.entry(whole).or_default().push(id);
             }
         }
         parts
     }
 
-    /// The parts of an entry, in order.
-    pub fn parts(&self, id: EntryId) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(move |e| e.part_of == Some(id))
+    /// The parts of an event, in order.
+    pub fn parts(&self, id: EventId) -> impl Iterator<Item = &Event> {
+        self.events.iter().filter(move |e| e.part_of == Some(id))
     }
 }

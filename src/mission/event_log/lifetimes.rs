@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, LedgerInput};
-use super::{EntryId, Kind};
+use super::make::{Drafts, LogInput};
+use super::{EventId, Kind};
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Life};
@@ -16,15 +16,15 @@ enum Turn {
     Ends,
 }
 
-/// The entries about turns, by node and topic.
+/// The events about turns, by node and topic.
 #[derive(Default)]
 struct Wholes {
-    nodes: BTreeMap<(NodeId, Turn), Vec<(Bound, EntryId)>>,
-    topics: BTreeMap<(TopicId, Turn, Stamp), EntryId>,
+    nodes: BTreeMap<(NodeId, Turn), Vec<(Bound, EventId)>>,
+    topics: BTreeMap<(TopicId, Turn, Stamp), EventId>,
 }
 
-/// Adds the entries of all lifetimes.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+/// Adds the events of all lifetimes.
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
     for turns in turns_by_role(context).values() {
         add_role(context, drafts, &mut wholes, turns);
@@ -43,9 +43,9 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
     for what in recorded() {
         let Element::Topic(id) = what else { continue };
         for (turn, at) in turns(context.lives(what)) {
-            let mut entry = context.entry(kind(turn), what, at);
-            entry.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
-            drafts.add(entry);
+            let mut event = context.event(kind(turn), what, at);
+            event.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
+            drafts.add(event);
         }
     }
 }
@@ -70,7 +70,7 @@ fn kind(turn: Turn) -> Kind {
 type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
 
 /// The turns of all nodes by role: anonymous nodes share a role, any other node is its own.
-fn turns_by_role<'a>(context: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
+fn turns_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
     let nodes = (0..).zip(&context.elements.nodes);
     for (id, node) in nodes.filter(|(id, _)| !context.is_timeless(Element::Node(*id))) {
@@ -85,13 +85,8 @@ fn turns_by_role<'a>(context: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> 
     all
 }
 
-/// Adds the entries of one role: an end followed by a beginning is a restart.
-fn add_role(
-    context: &LedgerInput<'_>,
-    drafts: &mut Drafts,
-    wholes: &mut Wholes,
-    turns: &RoleTurns,
-) {
+/// Adds the events of one role: an end followed by a beginning is a restart.
+fn add_role(context: &LogInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &RoleTurns) {
     let mut rest = turns.as_slice();
     while let Some((&(_, turn, node, at), after)) = rest.split_first() {
         let back = after
@@ -102,14 +97,14 @@ fn add_role(
                 Turn::Begins => Kind::Started,
                 Turn::Ends => Kind::Stopped,
             };
-            let id = drafts.add(context.entry(kind, Element::Node(node), at));
+            let id = drafts.add(context.event(kind, Element::Node(node), at));
             wholes.nodes.entry((node, turn)).or_default().push((at, id));
             rest = after;
             continue;
         };
-        let mut entry = context.entry(Kind::Restarted, Element::Node(heir), at);
-        entry.until = Some(again.time);
-        let id = drafts.add(entry);
+        let mut event = context.event(Kind::Restarted, Element::Node(heir), at);
+        event.until = Some(again.time);
+        let id = drafts.add(event);
         wholes
             .nodes
             .entry((node, Turn::Ends))
@@ -122,7 +117,7 @@ fn add_role(
             .push((again, id));
         if heir != node {
             for (kind, node, at) in [(Kind::Stopped, node, at), (Kind::Started, heir, again)] {
-                let mut part = context.entry(kind, Element::Node(node), at);
+                let mut part = context.event(kind, Element::Node(node), at);
                 part.part_of = Some(id);
                 drafts.add(part);
             }
@@ -131,9 +126,9 @@ fn add_role(
     }
 }
 
-/// Adds the entry of an edge: as a part of its node's entry at that time, or alone.
+/// Adds the event of an edge: as a part of its node's event at that time, or alone.
 fn add_edge(
-    context: &LedgerInput<'_>,
+    context: &LogInput<'_>,
     drafts: &mut Drafts,
     wholes: &mut Wholes,
     what: Element,
@@ -151,9 +146,9 @@ fn add_edge(
             .filter(|(far, node, _)| *far <= TOGETHER_NS || may(node))
             .min_by_key(|(far, _, _)| *far)
             .map(|(_, _, id)| id);
-        let mut entry = context.entry(kind(turn), what, at);
-        entry.part_of = near;
-        let id = drafts.add(entry);
+        let mut event = context.event(kind(turn), what, at);
+        event.part_of = near;
+        let id = drafts.add(event);
         let whole = near.unwrap_or(id);
         wholes.topics.entry((topic, turn, at.time)).or_insert(whole);
     }

@@ -1,17 +1,17 @@
 //! Remarks about elements: subscribers that receive nothing, duplicate names, messages that the recorder lost, which
 //! explain silences, and the input switches of a mux.
 
-use super::make::{Drafts, LedgerInput, exact};
-use super::{Detail, EntryId, Kind};
+use super::make::{Drafts, LogInput, exact};
+use super::{Detail, EventId, Kind};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::Stamp;
-use crate::evidence::Degree;
-use crate::evidence::claim::Name;
-use crate::evidence::proof::IncidentKind;
+use crate::evidence::Confidence;
+use crate::evidence::inference::IncidentKind;
+use crate::evidence::observation::Name;
 use crate::graph::{Element, NodeId};
 
 /// Adds all of them.
-pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     for incident in &context.history.incidents {
         let (kind, detail) = match &incident.kind {
             IncidentKind::Starved(policy) => {
@@ -28,15 +28,15 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
                 (Kind::HandedOver, Detail::Senders { from, to })
             }
         };
-        let mut entry = context.entry(kind, incident.what, exact(incident.time));
-        entry.until = incident.until;
-        entry.detail = detail;
-        entry.degree = match kind {
-            Kind::HandedOver => Degree::Inferred,
-            _ => Degree::Stated,
+        let mut event = context.event(kind, incident.what, exact(incident.time));
+        event.until = incident.until;
+        event.detail = detail;
+        event.confidence = match kind {
+            Kind::HandedOver => Confidence::Inferred,
+            _ => Confidence::Stated,
         };
-        entry.evidence = incident.evidence;
-        let id = drafts.add(entry);
+        event.evidence = incident.evidence;
+        let id = drafts.add(event);
         if kind == Kind::Lost {
             let until = incident.until.unwrap_or(incident.time);
             explain(drafts, id, incident.what, (incident.time, until));
@@ -45,7 +45,7 @@ pub(super) fn tell(context: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// The known publishers of a topic.
-fn publishers(context: &LedgerInput<'_>, topic: Name) -> Vec<NodeId> {
+fn publishers(context: &LogInput<'_>, topic: Name) -> Vec<NodeId> {
     let topic = context.history.topic_ids.get(&topic);
     let edges = context.elements.publishes.iter();
     let own = edges.filter(|edge| Some(&edge.topic) == topic && !edge.evidence.is_guess());
@@ -54,20 +54,20 @@ fn publishers(context: &LedgerInput<'_>, topic: Name) -> Vec<NodeId> {
 
 /// Makes the silences of a topic and of its nodes parts of the loss that explains them. A loss is reported after it
 /// happened.
-fn explain(drafts: &mut Drafts, loss: EntryId, topic: Element, (from, to): (Stamp, Stamp)) {
+fn explain(drafts: &mut Drafts, loss: EventId, topic: Element, (from, to): (Stamp, Stamp)) {
     let list = &mut drafts.list;
     let silences = (0..).zip(list.iter()).filter(|(_, e)| {
         let is_then = e.time <= to && e.until.is_none_or(|end| from <= end.plus(CLOSE_NS));
         e.kind == Kind::Silent && e.what == topic && is_then
     });
-    let wholes: Vec<EntryId> = silences.map(|(id, e)| e.part_of.unwrap_or(id)).collect();
+    let wholes: Vec<EventId> = silences.map(|(id, e)| e.part_of.unwrap_or(id)).collect();
     for whole in wholes {
         let is_silence = list
             .get(whole as usize)
             .is_some_and(|e| e.kind == Kind::Silent);
-        for (id, entry) in (0..).zip(list.iter_mut()) {
-            if is_silence && (id == whole || entry.part_of == Some(whole)) {
-                entry.part_of = Some(loss);
+        for (id, event) in (0..).zip(list.iter_mut()) {
+            if is_silence && (id == whole || event.part_of == Some(whole)) {
+                event.part_of = Some(loss);
             }
         }
     }

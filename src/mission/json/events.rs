@@ -1,12 +1,12 @@
-//! The ledger's entries as JSON, written and read back.
+//! The log's events as JSON, written and read back.
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{Text, degree_of, evidence, words};
+use super::elements::{Text, confidence_of, evidence, words};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Elements, NodeId};
-use crate::mission::ledger::{
-    Detail, Entry, Interruption, InterruptionKind, Kind, Ledger, Phase, sorted,
+use crate::mission::event_log::{
+    Detail, Event, EventLog, Interruption, InterruptionKind, Kind, Phase, sorted,
 };
 
 /// An element by its name, or an edge by its two names.
@@ -53,9 +53,9 @@ impl<'a> ElementName<'a> {
     }
 }
 
-/// An entry; when read, everything except kind, element and time is optional.
+/// An event; when read, everything except kind, element and time is optional.
 #[derive(Deserialize, Serialize)]
-pub(crate) struct EntryJson<'a> {
+pub(crate) struct EventJson<'a> {
     #[serde(default)]
     id: u32,
     kind: Text<'a>,
@@ -152,40 +152,38 @@ impl<'a> DetailJson<'a> {
     }
 }
 
-/// The entries of a ledger, in order.
-pub(crate) fn entries<'a>(
-    ledger: &'a Ledger,
+/// The events of a log, in order.
+pub(crate) fn events<'a>(
+    log: &'a EventLog,
     elements: &'a Elements,
-) -> impl Iterator<Item = EntryJson<'a>> + Clone {
-    let parts = ledger.all_parts();
-    (0..)
-        .zip(&ledger.entries)
-        .map(move |(id, entry)| EntryJson {
-            id,
-            kind: entry.kind.word().into(),
-            named: ElementName::new(entry.what, elements),
-            role: role(entry.what, elements).map(Text::from),
-            time_ns: entry.time.0,
-            earliest_ns: Some(entry.earliest.0),
-            latest_ns: Some(entry.latest.0),
-            until_ns: entry.until.map(|t| t.0),
-            detail: DetailJson::new(&entry.detail, elements),
-            degree: Some(entry.degree.word().into()),
-            evidence: words(entry.evidence),
-            parts: parts.get(&id).cloned().unwrap_or_default(),
-            cause: entry.part_of,
-            quiet: entry.quiet,
-            weight: Some(entry.weight),
-        })
+) -> impl Iterator<Item = EventJson<'a>> + Clone {
+    let parts = log.all_parts();
+    (0..).zip(&log.events).map(move |(id, event)| EventJson {
+        id,
+        kind: event.kind.word().into(),
+        named: ElementName::new(event.what, elements),
+        role: role(event.what, elements).map(Text::from),
+        time_ns: event.time.0,
+        earliest_ns: Some(event.earliest.0),
+        latest_ns: Some(event.latest.0),
+        until_ns: event.until.map(|t| t.0),
+        detail: DetailJson::new(&event.detail, elements),
+        degree: Some(event.confidence.word().into()),
+        evidence: words(event.evidence),
+        parts: parts.get(&id).cloned().unwrap_or_default(),
+        cause: event.part_of,
+        quiet: event.quiet,
+        weight: Some(event.weight),
+    })
 }
 
-/// Every entry of a ledger as an object on one line.
+/// Every event of a log as an object on one line.
 pub(crate) fn rows<'a>(
-    ledger: &'a Ledger,
+    log: &'a EventLog,
     elements: &'a Elements,
 ) -> impl Iterator<Item = String> + 'a {
     // Only maps with non-string keys fail, and there are none.
-    entries(ledger, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
+    events(log, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
 }
 
 /// A text in quotes.
@@ -193,16 +191,16 @@ pub(crate) fn text(text: &str) -> String {
     serde_json::to_string(text).unwrap_or_default()
 }
 
-/// The role of the node that an entry is about.
+/// The role of the node that an event is about.
 fn role(what: Element, elements: &Elements) -> Option<&str> {
     let (node, _) = elements.ends(what);
     node.map(|id| &*elements.nodes[id as usize].role)
 }
 
-/// The ledger of rows that were read; `None` if one of them is about an element that is not in any window.
-pub(crate) fn read(rows: &[EntryJson<'_>], elements: &Elements) -> Option<Vec<Entry>> {
-    let entries = rows.iter().map(|row| row.entry(elements));
-    let mut list = entries.collect::<Option<Vec<_>>>()?;
+/// The log of rows that were read; `None` if one of them is about an element that is not in any window.
+pub(crate) fn read(rows: &[EventJson<'_>], elements: &Elements) -> Option<Vec<Event>> {
+    let events = rows.iter().map(|row| row.event(elements));
+    let mut list = events.collect::<Option<Vec<_>>>()?;
     for (id, row) in (0..).zip(rows) {
         for part in &row.parts {
             list.get_mut(*part as usize)?.part_of = Some(id);
@@ -211,9 +209,9 @@ pub(crate) fn read(rows: &[EntryJson<'_>], elements: &Elements) -> Option<Vec<En
     Some(sorted(list, elements).0)
 }
 
-impl EntryJson<'_> {
-    fn entry(&self, elements: &Elements) -> Option<Entry> {
-        Some(Entry {
+impl EventJson<'_> {
+    fn event(&self, elements: &Elements) -> Option<Event> {
+        Some(Event {
             kind: Kind::from_word(&self.kind)?,
             what: self.named.element(elements)?,
             time: Stamp(self.time_ns),
@@ -221,7 +219,7 @@ impl EntryJson<'_> {
             latest: Stamp(self.latest_ns.unwrap_or(self.time_ns)),
             until: self.until_ns.map(Stamp),
             detail: self.detail.detail(elements)?,
-            degree: degree_of(self.degree.as_deref()),
+            confidence: confidence_of(self.degree.as_deref()),
             evidence: evidence(&self.evidence),
             part_of: None,
             quiet: self.quiet,

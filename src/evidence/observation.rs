@@ -1,6 +1,6 @@
-//! Claims that the messages of a mission make about its graph, with their source, strength and times.
+//! Observations that the messages of a mission make about its graph, with their source, strength and times.
 //!
-//! A claim is kept once per source with the times at which it was made, so that millions of messages that repeat
+//! An observation is kept once per source with the times at which it was made, so that millions of messages that repeat
 //! themselves take no more room than their (compressed) times.
 
 use std::cell::Cell;
@@ -17,7 +17,7 @@ use crate::evidence::times::{SeriesId, Stamps};
 worded! {
     /// The strength of the evidence for something. Ordered: the stronger is the smaller.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    pub enum Degree {
+    pub enum Confidence {
         /// Messages of this very connection, or the middleware's own statistics.
         #[default]
         Measured = "measured",
@@ -34,9 +34,9 @@ worded! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Name(pub(crate) u32);
 
-/// A claim of a source. The number of a name has no meaning: order by its text.
+/// An observation of a source. The number of a name has no meaning: order by its text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Claim {
+pub(crate) enum Observation {
     /// This node is alive.
     Node(Name),
     /// This node has just begun.
@@ -86,13 +86,13 @@ pub(crate) enum Claim {
     Duplicate(Name),
     /// The recorder lost so many messages of this topic.
     Lost(Name, Name),
-    /// A snapshot was taken: claims that the source made in an earlier snapshot of the same name and not in this one
+    /// A snapshot was taken: observations that the source made in an earlier snapshot of the same name and not in this one
     /// have ended.
     Snapshot(Name),
 }
 
-impl Claim {
-    /// The first two names in the claim.
+impl Observation {
+    /// The first two names in the observation.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         let (first, second) = (Cell::new(None), Cell::new(None));
         self.renamed(&|name| {
@@ -107,7 +107,7 @@ impl Claim {
         [first.get(), second.get()]
     }
 
-    /// The same claim with its names renumbered.
+    /// The same observation with its names renumbered.
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),
@@ -142,13 +142,13 @@ impl Claim {
 /// The place of a source in the table of sources.
 pub(crate) type SourceId = usize;
 
-/// A claim by one source.
+/// An observation by one source.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ClaimRecord {
-    pub(crate) claim: Claim,
+pub(crate) struct ObservationRecord {
+    pub(crate) observation: Observation,
     pub(crate) source: SourceId,
-    pub(crate) degree: Degree,
-    /// The snapshots that this claim belongs to, which end it when it is missing.
+    pub(crate) confidence: Confidence,
+    /// The snapshots that this observation belongs to, which end it when it is missing.
     pub(crate) snapshot: Option<Name>,
     /// The times at which it was made.
     pub(crate) times: SeriesId,
@@ -162,7 +162,7 @@ pub struct EvidenceLine {
     /// The word of the source.
     pub source: &'static str,
     /// The strength.
-    pub degree: Degree,
+    pub confidence: Confidence,
     /// The statement, in one line; may hold anything, so escape it where it is written.
     pub text: String,
 }
@@ -186,9 +186,9 @@ pub(crate) struct Measurement {
     pub(crate) age_ns: Option<i64>,
 }
 
-/// All claims of a mission.
+/// All observations of a mission.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Claims {
+pub(crate) struct Observations {
     /// The names that [`EvidenceLine`]s are kept for; if empty, none are kept.
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
@@ -212,18 +212,18 @@ pub(crate) struct Claims {
     texts: Vec<Arc<str>>,
     /// The number of bytes of all texts.
     bytes: usize,
-    places: HashMap<(Claim, SourceId, Option<Name>), usize>,
-    pub(crate) list: Vec<ClaimRecord>,
+    places: HashMap<(Observation, SourceId, Option<Name>), usize>,
+    pub(crate) list: Vec<ObservationRecord>,
     /// All times, which are added until this is shared.
     pub(crate) times: Arc<Stamps>,
     /// The name that stands for all texts that found no room.
     overflow: Option<Name>,
-    /// The number of claims that found no room.
+    /// The number of observations that found no room.
     pub(crate) dropped: u64,
 }
 
-impl Claims {
-    /// The same claims with times of their own, to which more can be added.
+impl Observations {
+    /// The same observations with times of their own, to which more can be added.
     ///
     /// # Errors
     /// As [`Stamps::since`].
@@ -254,7 +254,7 @@ impl Claims {
         name
     }
 
-    /// The name that stands for all texts that find no room; no claim about it is kept.
+    /// The name that stands for all texts that find no room; no observation about it is kept.
     fn overflow(&mut self) -> Name {
         let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         let texts = &mut self.texts;
@@ -276,7 +276,7 @@ impl Claims {
             .map_or_else(|| "".into(), Arc::clone)
     }
 
-    /// Keeps the words of a claim if `why` asks about its names.
+    /// Keeps the words of an observation if `why` asks about its names.
     pub(crate) fn explain(
         &mut self,
         said: Statement,
@@ -284,13 +284,13 @@ impl Claims {
         time: Option<Stamp>,
         words: impl FnOnce() -> String,
     ) {
-        if self.is_watched(said.claim.names()) && self.pieces.len() < budget::EVIDENCE_LINES {
+        if self.is_watched(said.observation.names()) && self.pieces.len() < budget::EVIDENCE_LINES {
             let text: String = words().chars().take(budget::EVIDENCE_LINE).collect();
             if !text.is_empty() {
                 self.pieces.push(EvidenceLine {
                     time,
                     source,
-                    degree: said.degree,
+                    confidence: said.confidence,
                     text,
                 });
             }
@@ -338,13 +338,13 @@ impl Claims {
         Arc::get_mut(&mut self.times).map_or(Ok(()), Stamps::finish)
     }
 
-    /// Adds a claim by `source`, at `time` if it has one.
+    /// Adds an observation by `source`, at `time` if it has one.
     pub(crate) fn add(&mut self, source: SourceId, said: Statement, time: Option<Stamp>) {
-        if self.overflow.is_some() && said.claim.names().contains(&self.overflow) {
+        if self.overflow.is_some() && said.observation.names().contains(&self.overflow) {
             self.dropped += 1;
             return;
         }
-        let key = (said.claim, source, said.snapshot);
+        let key = (said.observation, source, said.snapshot);
         let place = match self.places.get(&key) {
             Some(place) => *place,
             None if self.list.len() >= budget::CLAIMS => {
@@ -355,10 +355,10 @@ impl Claims {
                 let Some(times) = Arc::get_mut(&mut self.times).map(Stamps::series) else {
                     return;
                 };
-                self.list.push(ClaimRecord {
-                    claim: said.claim,
+                self.list.push(ObservationRecord {
+                    observation: said.observation,
                     source,
-                    degree: said.degree,
+                    confidence: said.confidence,
                     snapshot: said.snapshot,
                     times,
                 });
@@ -367,7 +367,7 @@ impl Claims {
             }
         };
         let fact = &mut self.list[place];
-        fact.degree = fact.degree.min(said.degree);
+        fact.confidence = fact.confidence.min(said.confidence);
         if let Some(times) = Arc::get_mut(&mut self.times) {
             times.add(fact.times, time.as_slice(), None);
         }
@@ -390,7 +390,7 @@ impl Claims {
         let names = (0..).map(Name);
         self.ids = self.texts.iter().cloned().zip(names).collect();
         for fact in &mut self.list {
-            fact.claim = fact.claim.renamed(&to);
+            fact.observation = fact.observation.renamed(&to);
             fact.snapshot = fact.snapshot.map(to);
         }
         for measured in &mut self.measured {
@@ -398,7 +398,10 @@ impl Claims {
             measured.publisher = measured.publisher.map(to);
             measured.subscriber = measured.subscriber.map(to);
         }
-        let keys = self.list.iter().map(|f| (f.claim, f.source, f.snapshot));
+        let keys = self
+            .list
+            .iter()
+            .map(|f| (f.observation, f.source, f.snapshot));
         self.places = keys.zip(0..).collect();
         new
     }
@@ -409,7 +412,7 @@ impl Claims {
     }
 
     /// The times at which a fact was claimed, sorted.
-    pub(crate) fn times(&self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
+    pub(crate) fn times(&self, fact: &ObservationRecord) -> io::Result<Vec<Stamp>> {
         self.times.times(fact.times)
     }
 }
@@ -417,7 +420,7 @@ impl Claims {
 /// The number that stands for an age of 0, in microseconds: clocks may differ either way.
 const AGE_0: i64 = 1 << 31;
 
-/// The age of a number that [`Claims::age`] kept, in nanoseconds.
+/// The age of a number that [`Observations::age`] kept, in nanoseconds.
 pub(crate) fn age_of(kept: u32) -> i64 {
     (i64::from(kept) - AGE_0) * 1000
 }
@@ -435,11 +438,11 @@ fn note(
     }
 }
 
-/// A claim with everything that belongs to it except its source and time.
+/// An observation with everything that belongs to it except its source and time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Statement {
-    pub(crate) claim: Claim,
-    pub(crate) degree: Degree,
+    pub(crate) observation: Observation,
+    pub(crate) confidence: Confidence,
     pub(crate) snapshot: Option<Name>,
 }
 
@@ -449,40 +452,43 @@ mod tests {
 
     fn alive(node: Name) -> Statement {
         Statement {
-            claim: Claim::Node(node),
-            degree: Degree::Stated,
+            observation: Observation::Node(node),
+            confidence: Confidence::Stated,
             snapshot: None,
         }
     }
 
     #[test]
     fn names_beyond_the_budget_are_counted_and_left_out() {
-        let mut claims = Claims::default();
+        let mut observations = Observations::default();
         let long = "x".repeat(budget::NAME + 1);
         for k in 0..budget::NAMES + 10 {
-            let node = claims.name(&format!("/n{k}"));
-            claims.add(0, alive(node), None);
+            let node = observations.name(&format!("/n{k}"));
+            observations.add(0, alive(node), None);
         }
-        let node = claims.name(&long);
-        claims.add(0, alive(node), None);
-        assert_eq!((claims.list.len(), claims.dropped), (budget::NAMES, 11));
-        claims.renumber();
-        let node = claims.name("/one more");
-        claims.add(0, alive(node), None);
-        assert_eq!(claims.dropped, 12);
+        let node = observations.name(&long);
+        observations.add(0, alive(node), None);
+        assert_eq!(
+            (observations.list.len(), observations.dropped),
+            (budget::NAMES, 11)
+        );
+        observations.renumber();
+        let node = observations.name("/one more");
+        observations.add(0, alive(node), None);
+        assert_eq!(observations.dropped, 12);
     }
 
     #[test]
     fn long_names_do_not_exhaust_memory() {
-        let mut claims = Claims::default();
+        let mut observations = Observations::default();
         for k in 0..1000 {
-            claims.name(&format!("{k:060000}"));
+            observations.name(&format!("{k:060000}"));
         }
-        assert!(claims.bytes <= budget::NAMES_BYTES);
+        assert!(observations.bytes <= budget::NAMES_BYTES);
         assert!(
-            (500..600).contains(&claims.texts.len()),
+            (500..600).contains(&observations.texts.len()),
             "{}",
-            claims.texts.len()
+            observations.texts.len()
         );
     }
 }

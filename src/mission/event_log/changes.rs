@@ -1,20 +1,20 @@
-//! The changes between windows, each with the entry that explains it.
+//! The changes between windows, each with the event that explains it.
 
 use std::collections::BTreeMap;
 
-use super::{Detail, Entry, EntryId, Kind, Ledger};
+use super::{Detail, Event, EventId, EventLog, Kind};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::{Change, ValueKind, diff};
 use crate::graph::{Element, Elements, Graph};
 use crate::mission::Window;
 
-/// The changes of each window since the previous one, with the ids of the entries that explain them.
+/// The changes of each window since the previous one, with the ids of the events that explain them.
 pub(crate) fn explain(
     windows: impl Iterator<Item = (Span, Graph)>,
     elements: &Elements,
-    ledger: &Ledger,
-) -> Vec<(Vec<Change>, Vec<EntryId>)> {
-    let turns = EntryTurns::new(ledger, elements);
+    log: &EventLog,
+) -> Vec<(Vec<Change>, Vec<EventId>)> {
+    let turns = EventTurns::new(log, elements);
     let mut before: Option<(Span, Graph)> = None;
     let mut all = Vec::new();
     for (span, graph) in windows {
@@ -22,7 +22,7 @@ pub(crate) fn explain(
         if let Some((old_span, old)) = &before {
             structure(old, &graph, span, elements, &turns, &mut list);
             let news = Span::new(old_span.end.max(span.start), span.end);
-            list.extend(values(ledger, news));
+            list.extend(values(log, news));
         }
         all.push(list.into_iter().unzip());
         before = Some((span, graph));
@@ -30,28 +30,28 @@ pub(crate) fn explain(
     all
 }
 
-/// The times at which elements begin or end according to entries, sorted.
-struct EntryTurns {
-    begins: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
-    ends: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
+/// The times at which elements begin or end according to events, sorted.
+struct EventTurns {
+    begins: BTreeMap<Element, Vec<(Stamp, EventId)>>,
+    ends: BTreeMap<Element, Vec<(Stamp, EventId)>>,
     /// Unnamed publishers and their publications, with their topics: they appear and vanish with the topic.
     unnamed: BTreeMap<Element, Element>,
 }
 
-impl EntryTurns {
-    fn new(ledger: &Ledger, elements: &Elements) -> Self {
+impl EventTurns {
+    fn new(log: &EventLog, elements: &Elements) -> Self {
         let (mut begins, mut ends) = (BTreeMap::new(), BTreeMap::new());
         let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
             to.entry(what).or_default().push((time, id));
         };
-        for (id, entry) in (0..).zip(&ledger.entries) {
-            match entry.kind {
-                Kind::Started | Kind::Appeared => add(&mut begins, entry.what, entry.time, id),
-                Kind::Stopped | Kind::Vanished => add(&mut ends, entry.what, entry.time, id),
+        for (id, event) in (0..).zip(&log.events) {
+            match event.kind {
+                Kind::Started | Kind::Appeared => add(&mut begins, event.what, event.time, id),
+                Kind::Stopped | Kind::Vanished => add(&mut ends, event.what, event.time, id),
                 Kind::Restarted => {
-                    let until = entry.until.unwrap_or(entry.time);
-                    add(&mut begins, entry.what, until, id);
-                    add(&mut ends, entry.what, entry.time, id);
+                    let until = event.until.unwrap_or(event.time);
+                    add(&mut begins, event.what, until, id);
+                    add(&mut ends, event.what, event.time, id);
                 }
                 _ => {}
             }
@@ -66,13 +66,13 @@ impl EntryTurns {
         }
     }
 
-    /// The last entry of a list before `end`, else its first.
+    /// The last event of a list before `end`, else its first.
     fn find(
         &self,
-        list: &BTreeMap<Element, Vec<(Stamp, EntryId)>>,
+        list: &BTreeMap<Element, Vec<(Stamp, EventId)>>,
         what: Element,
         end: Stamp,
-    ) -> Option<(Stamp, EntryId)> {
+    ) -> Option<(Stamp, EventId)> {
         let topic = || list.get(self.unnamed.get(&what)?);
         let list = list.get(&what).or_else(topic)?;
         let next = list.partition_point(|(time, _)| *time < end);
@@ -98,8 +98,8 @@ fn structure(
     new: &Graph,
     span: Span,
     elements: &Elements,
-    turns: &EntryTurns,
-    list: &mut Vec<(Change, EntryId)>,
+    turns: &EventTurns,
+    list: &mut Vec<(Change, EventId)>,
 ) {
     let diff = diff(old, new);
     for what in diff.added() {
@@ -117,22 +117,22 @@ fn structure(
     }
 }
 
-/// The changes of a window in entries that are not about existence: rates, hand-overs, restarts, values.
-fn values(ledger: &Ledger, news: Span) -> impl Iterator<Item = (Change, EntryId)> + '_ {
-    let inside = (0..).zip(&ledger.entries).filter(move |(_, e)| {
+/// The changes of a window in events that are not about existence: rates, hand-overs, restarts, values.
+fn values(log: &EventLog, news: Span) -> impl Iterator<Item = (Change, EventId)> + '_ {
+    let inside = (0..).zip(&log.events).filter(move |(_, e)| {
         news.contains(
             e.until
                 .filter(|_| e.kind == Kind::Restarted)
                 .unwrap_or(e.time),
         )
     });
-    inside.filter_map(|(id, entry)| Some((change(entry)?, id)))
+    inside.filter_map(|(id, event)| Some((change(event)?, id)))
 }
 
-/// The change in an entry, unless it is about existence.
-fn change(entry: &Entry) -> Option<Change> {
-    let what = entry.what;
-    match (&entry.detail, entry.kind) {
+/// The change in an event, unless it is about existence.
+fn change(event: &Event) -> Option<Change> {
+    let what = event.what;
+    match (&event.detail, event.kind) {
         (Detail::Count(_), _) => None,
         (_, kind) if kind.is_remark() => None,
         (Detail::Rates { from_hz, to_hz }, _) => Some(Change::Rate {
@@ -161,7 +161,7 @@ fn change(entry: &Entry) -> Option<Change> {
         (Detail::None, Kind::Restarted) => match what {
             Element::Node(node) => Some(Change::Restarted {
                 node,
-                time: entry.until.unwrap_or(entry.time),
+                time: event.until.unwrap_or(event.time),
             }),
             _ => None,
         },
@@ -169,14 +169,14 @@ fn change(entry: &Entry) -> Option<Change> {
     }
 }
 
-/// The ids of the entries that explain the windows' changes, in a ledger that was made from them: for each change, the
+/// The ids of the events that explain the windows' changes, in a log that was made from them: for each change, the
 /// nearest in time with the same kind and element.
-pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
-    let mut of: BTreeMap<(Kind, Element), Vec<EntryId>> = BTreeMap::new();
-    for (id, entry) in (0..).zip(&ledger.entries) {
-        of.entry((entry.kind, entry.what)).or_default().push(id);
+pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
+    let mut of: BTreeMap<(Kind, Element), Vec<EventId>> = BTreeMap::new();
+    for (id, event) in (0..).zip(&log.events) {
+        of.entry((event.kind, event.what)).or_default().push(id);
     }
-    let time = |id: EntryId| ledger.entries[id as usize].time;
+    let time = |id: EventId| log.events[id as usize].time;
     let place = |change: &Change, start: Stamp| {
         let all = of.get(&kind_of(change))?;
         let next = all.partition_point(|id| time(*id) < start);
@@ -192,7 +192,7 @@ pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
     windows.iter().map(of_window).collect()
 }
 
-/// The kind and the element of the entry that explains a change.
+/// The kind and the element of the event that explains a change.
 fn kind_of(change: &Change) -> (Kind, Element) {
     let turn = |what: Element, node, other| match what {
         Element::Node(_) => (node, what),

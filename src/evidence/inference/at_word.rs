@@ -1,69 +1,74 @@
-//! Claims taken literally, with their times: signs, and ends by claims that revoke them.
+//! Observations taken literally, with their times: signs, and ends by observations that revoke them.
 
 use std::collections::BTreeMap;
 
-use super::{Conclusions, ElementKey, Proof, Validity};
+use super::{Conclusions, ElementKey, Inference, Validity};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Claim, ClaimRecord, Name, SourceId};
+use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
 
 impl Conclusions<'_> {
-    /// All claims of one source with their signs and ends, sorted.
-    pub(crate) fn claims(
+    /// All observations of one source with their signs and ends, sorted.
+    pub(crate) fn observations(
         &mut self,
         source: SourceId,
-    ) -> Vec<(ClaimRecord, Vec<Stamp>, Vec<Stamp>)> {
+    ) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
         let endings = self.endings();
         let facts = self.facts.list.iter().filter(|f| f.source == source);
-        let facts: Vec<ClaimRecord> = facts.copied().collect();
-        let times = |fact: ClaimRecord| {
+        let facts: Vec<ObservationRecord> = facts.copied().collect();
+        let times = |fact: ObservationRecord| {
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
             (fact, signs, ends)
         };
         facts.into_iter().map(times).collect()
     }
 
-    /// Adds the proofs that the claims state without any rule: nodes, topics, publications and subscriptions.
+    /// Adds the proofs that the observations state without any rule: nodes, topics, publications and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let refusals = self.refusals();
         let facts = self.facts.list.iter();
-        let records = facts.filter_map(|fact| match fact.claim {
-            Claim::Node(node) => Some(((fact.source, node), self.facts.times.count(fact.times))),
+        let records = facts.filter_map(|fact| match fact.observation {
+            Observation::Node(node) => {
+                Some(((fact.source, node), self.facts.times.count(fact.times)))
+            }
             _ => None,
         });
         let records: BTreeMap<(SourceId, Name), u64> = records.collect();
         for fact in self.facts.list.clone() {
-            let what = match fact.claim {
-                Claim::Node(node) | Claim::Begins(node) => ElementKey::Node(node),
-                Claim::Topic(topic) => ElementKey::Topic(topic),
-                Claim::Publish(node, topic) => ElementKey::Publish(node, topic),
-                Claim::Subscribe(node, topic)
-                | Claim::Joins(node, topic)
-                | Claim::Refused(node, topic) => ElementKey::Subscribe(topic, node),
+            let what = match fact.observation {
+                Observation::Node(node) | Observation::Begins(node) => ElementKey::Node(node),
+                Observation::Topic(topic) => ElementKey::Topic(topic),
+                Observation::Publish(node, topic) => ElementKey::Publish(node, topic),
+                Observation::Subscribe(node, topic)
+                | Observation::Joins(node, topic)
+                | Observation::Refused(node, topic) => ElementKey::Subscribe(topic, node),
                 _ => continue,
             };
             let (mut signs, ends) = self.signs_and_ends(&fact, &endings);
-            if let (Claim::Joins(..), Some(refused)) = (fact.claim, refusals.get(&what)) {
+            if let (Observation::Joins(..), Some(refused)) = (fact.observation, refusals.get(&what))
+            {
                 signs.retain(|sign| !is_refused(*sign, refused));
             }
-            if signs.is_empty() && matches!(fact.claim, Claim::Joins(..)) {
+            if signs.is_empty() && matches!(fact.observation, Observation::Joins(..)) {
                 continue;
             }
             // If every record has the first number, sequence numbers are unused.
-            if let Claim::Begins(node) = fact.claim
+            if let Observation::Begins(node) = fact.observation
                 && signs.len() > 1
                 && records.get(&(fact.source, node)) == Some(&(signs.len() as u64))
             {
                 continue;
             }
-            self.prove(Proof {
+            self.add(Inference {
                 what,
                 source: fact.source,
-                degree: fact.degree,
-                when: match fact.claim {
-                    Claim::Joins(..) | Claim::Begins(_) => Validity::Begins { signs, ends },
-                    Claim::Refused(..) => Validity::Moments(signs),
+                confidence: fact.confidence,
+                when: match fact.observation {
+                    Observation::Joins(..) | Observation::Begins(_) => {
+                        Validity::Begins { signs, ends }
+                    }
+                    Observation::Refused(..) => Validity::Moments(signs),
                     _ => Validity::Signs { signs, ends },
                 },
             });
@@ -74,7 +79,7 @@ impl Conclusions<'_> {
     fn refusals(&mut self) -> BTreeMap<ElementKey, Vec<Stamp>> {
         let mut refusals: BTreeMap<ElementKey, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
-            if let Claim::Refused(node, topic) = fact.claim {
+            if let Observation::Refused(node, topic) = fact.observation {
                 let times = self.times(&fact);
                 let key = ElementKey::Subscribe(topic, node);
                 refusals.entry(key).or_default().extend(times);
@@ -83,13 +88,16 @@ impl Conclusions<'_> {
         refusals
     }
 
-    /// The times at which claims were revoked, and those of snapshots.
-    fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
-        let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
+    /// The times at which observations were revoked, and those of snapshots.
+    fn endings(&mut self) -> BTreeMap<Observation, Vec<Stamp>> {
+        let mut endings: BTreeMap<Observation, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
-            if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
+            if let Observation::NodeGone(_)
+            | Observation::Unsubscribe(..)
+            | Observation::Snapshot(_) = fact.observation
+            {
                 let times = self.times(&fact);
-                endings.entry(fact.claim).or_default().extend(times);
+                endings.entry(fact.observation).or_default().extend(times);
             }
         }
         for times in endings.values_mut() {
@@ -98,18 +106,20 @@ impl Conclusions<'_> {
         endings
     }
 
-    /// The times at which a claim was made, and at which it was revoked, sorted.
+    /// The times at which an observation was made, and at which it was revoked, sorted.
     fn signs_and_ends(
         &mut self,
-        fact: &ClaimRecord,
-        endings: &BTreeMap<Claim, Vec<Stamp>>,
+        fact: &ObservationRecord,
+        endings: &BTreeMap<Observation, Vec<Stamp>>,
     ) -> (Vec<Stamp>, Vec<Stamp>) {
         let mut signs = self.times(fact);
-        let ending = match fact.claim {
-            Claim::Node(node) => Some(Claim::NodeGone(node)),
-            Claim::Subscribe(node, topic)
-            | Claim::Joins(node, topic)
-            | Claim::SaysSubscribe(node, topic) => Some(Claim::Unsubscribe(node, topic)),
+        let ending = match fact.observation {
+            Observation::Node(node) => Some(Observation::NodeGone(node)),
+            Observation::Subscribe(node, topic)
+            | Observation::Joins(node, topic)
+            | Observation::SaysSubscribe(node, topic) => {
+                Some(Observation::Unsubscribe(node, topic))
+            }
             _ => None,
         };
         let mut ends = ending
@@ -118,7 +128,7 @@ impl Conclusions<'_> {
             .unwrap_or_default();
         let snapshots = fact
             .snapshot
-            .and_then(|name| endings.get(&Claim::Snapshot(name)));
+            .and_then(|name| endings.get(&Observation::Snapshot(name)));
         if let Some(taken) = snapshots {
             let mut absent = absences(&signs, taken);
             if SOURCES.get(fact.source).is_some_and(|source| source.holds) {
@@ -155,7 +165,7 @@ fn is_refused(time: Stamp, refusals: &[Stamp]) -> bool {
     refusals.iter().any(soon)
 }
 
-/// The snapshots that show an absence: the first and the last of each run without the claim. Both lists are sorted.
+/// The snapshots that show an absence: the first and the last of each run without the observation. Both lists are sorted.
 fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
     let mut absent = Vec::new();
     let mut from = 0;

@@ -1,70 +1,70 @@
-//! The ledger of a mission of which only the windows are known: each change belongs to its window.
+//! The log of a mission of which only the windows are known: each change belongs to its window.
 
 use std::collections::BTreeMap;
 
-use super::{Detail, Entry, EntryId, Kind, Ledger};
+use super::{Detail, Event, EventId, EventLog, Kind};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::diff::{Change, ValueKind};
 use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
 use crate::mission::Window;
 
-/// The ledger from the changes between windows. A change without a time inside its window is put at the window's start.
-pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
-    let mut entries: Vec<Entry> = Vec::new();
+/// The log from the changes between windows. A change without a time inside its window is put at the window's start.
+pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog {
+    let mut events: Vec<Event> = Vec::new();
     for window in windows {
-        let offset = entries.len();
+        let offset = events.len();
         let owners = WindowTurns::new(elements, window);
-        let all: Vec<Entry> = owners.entries().collect();
-        for entry in &all {
-            let part_of = entry.part_of.map(|at| id(offset + whole(&all, at)));
-            entries.push(Entry {
+        let all: Vec<Event> = owners.events().collect();
+        for event in &all {
+            let part_of = event.part_of.map(|at| id(offset + whole(&all, at)));
+            events.push(Event {
                 part_of,
-                ..entry.clone()
+                ..event.clone()
             });
         }
     }
-    Ledger {
-        entries: sorted(&entries),
-        ..Ledger::default()
+    EventLog {
+        events: sorted(&events),
+        ..EventLog::default()
     }
 }
 
-/// The outermost entry that explains this one: parts have no parts.
-fn whole(entries: &[Entry], mut at: EntryId) -> usize {
+/// The outermost event that explains this one: parts have no parts.
+fn whole(events: &[Event], mut at: EventId) -> usize {
     // A topic may belong to a publication, and that to a node or a hand-over.
     for _ in 0..3 {
-        at = entries[at as usize].part_of.unwrap_or(at);
+        at = events[at as usize].part_of.unwrap_or(at);
     }
     at as usize
 }
 
-/// The entries sorted by time, then kind, then element, i.e. by name; references of parts are updated.
-fn sorted(entries: &[Entry]) -> Vec<Entry> {
-    let mut order: Vec<usize> = (0..entries.len()).collect();
-    order.sort_by_key(|at| (entries[*at].time, entries[*at].kind, entries[*at].what, *at));
-    let mut places = vec![0; entries.len()];
+/// The events sorted by time, then kind, then element, i.e. by name; references of parts are updated.
+fn sorted(events: &[Event]) -> Vec<Event> {
+    let mut order: Vec<usize> = (0..events.len()).collect();
+    order.sort_by_key(|at| (events[*at].time, events[*at].kind, events[*at].what, *at));
+    let mut places = vec![0; events.len()];
     for (new, old) in order.iter().enumerate() {
         places[*old] = id(new);
     }
-    let mut weights = vec![1; entries.len()];
-    for whole in entries.iter().filter_map(|e| e.part_of) {
+    let mut weights = vec![1; events.len()];
+    for whole in events.iter().filter_map(|e| e.part_of) {
         weights[whole as usize] += 1;
     }
-    let entry = |old: &usize| {
-        let entry = entries[*old].clone();
-        let part_of = entry.part_of.map(|at| places[at as usize]);
-        Entry {
+    let event = |old: &usize| {
+        let event = events[*old].clone();
+        let part_of = event.part_of.map(|at| places[at as usize]);
+        Event {
             part_of,
             weight: weights[*old],
-            ..entry
+            ..event
         }
     };
-    order.iter().map(entry).collect()
+    order.iter().map(event).collect()
 }
 
-fn id(place: usize) -> EntryId {
-    EntryId::try_from(place).unwrap_or(EntryId::MAX)
+fn id(place: usize) -> EventId {
+    EventId::try_from(place).unwrap_or(EventId::MAX)
 }
 
 /// The elements that appeared or vanished in one window, and their relations.
@@ -114,12 +114,12 @@ impl<'a> WindowTurns<'a> {
         node.zip(topic)
     }
 
-    fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
+    fn events(&self) -> impl Iterator<Item = Event> + '_ {
         let changes = self.window.changes.iter().enumerate();
-        changes.map(|(at, change)| self.entry(at, change))
+        changes.map(|(at, change)| self.event(at, change))
     }
 
-    fn entry(&self, at: usize, change: &Change) -> Entry {
+    fn event(&self, at: usize, change: &Change) -> Event {
         let (kind, what, time, detail) = described(change);
         // The last sign of life is not the end.
         let time = time.filter(|_| !matches!(change, Change::Removed { .. }));
@@ -127,7 +127,7 @@ impl<'a> WindowTurns<'a> {
         let whole = self.whole(change).filter(|whole| *whole != at);
         let Span { start, end } = self.window.span;
         let time = time.unwrap_or(start);
-        Entry {
+        Event {
             kind,
             what,
             time,
@@ -135,7 +135,7 @@ impl<'a> WindowTurns<'a> {
             latest: end,
             until: None,
             detail,
-            degree: Degree::Measured,
+            confidence: Confidence::Measured,
             evidence: Evidence::NONE,
             part_of: whole.map(id),
             quiet: false,

@@ -1,49 +1,49 @@
-//! Makes a mission's entries from its lifetimes: each kind in its own file, then sorted and joined.
+//! Makes a mission's events from its lifetimes: each kind in its own file, then sorted and joined.
 
-use super::{Detail, Entry, EntryId, Kind, causes, hands, incidents, lifetimes, rates, silence};
+use super::{Detail, Event, EventId, Kind, causes, hands, incidents, lifetimes, rates, silence};
 use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life};
 use crate::graph::{Element, Elements, History};
 
-/// The data from which entries are made.
+/// The data from which events are made.
 #[derive(Clone, Copy)]
-pub(crate) struct LedgerInput<'a> {
+pub(crate) struct LogInput<'a> {
     pub(crate) elements: &'a Elements,
     pub(crate) history: &'a History,
     /// The fraction by which a rate must change, ≥ 0.
     pub(crate) rate_change: f64,
 }
 
-/// Unsorted entries; a part refers to the index of its whole.
+/// Unsorted events; a part refers to the index of its whole.
 #[derive(Default)]
 pub(crate) struct Drafts {
-    pub(crate) list: Vec<Entry>,
+    pub(crate) list: Vec<Event>,
 }
 
 impl Drafts {
-    /// Adds an entry; returns its index.
-    pub(crate) fn add(&mut self, entry: Entry) -> EntryId {
-        self.list.push(entry);
-        EntryId::try_from(self.list.len() - 1).unwrap_or(EntryId::MAX)
+    /// Adds an event; returns its index.
+    pub(crate) fn add(&mut self, event: Event) -> EventId {
+        self.list.push(event);
+        EventId::try_from(self.list.len() - 1).unwrap_or(EventId::MAX)
     }
 
-    /// The entry at this index.
-    pub(crate) fn get(&self, id: EntryId) -> &Entry {
+    /// The event at this index.
+    pub(crate) fn get(&self, id: EventId) -> &Event {
         &self.list[id as usize]
     }
 
-    /// Makes a headline a part of another entry, unless that is a part of it.
-    pub(crate) fn fold(&mut self, part: EntryId, whole: EntryId) {
+    /// Makes a headline a part of another event, unless that is a part of it.
+    pub(crate) fn fold(&mut self, part: EventId, whole: EventId) {
         let whole = self.root(whole);
         if whole != part {
             self.list[part as usize].part_of = Some(whole);
         }
     }
 
-    /// The headline that an entry is a part of, or the entry itself.
-    fn root(&self, mut id: EntryId) -> EntryId {
+    /// The headline that an event is a part of, or the event itself.
+    fn root(&self, mut id: EventId) -> EventId {
         while let Some(whole) = self.get(id).part_of {
             id = whole;
         }
@@ -59,8 +59,8 @@ impl Drafts {
     }
 }
 
-/// Every entry of a mission, sorted.
-pub(crate) fn make(context: &LedgerInput<'_>) -> Vec<Entry> {
+/// Every event of a mission, sorted.
+pub(crate) fn make(context: &LogInput<'_>) -> Vec<Event> {
     let mut drafts = Drafts::default();
     lifetimes::tell(context, &mut drafts);
     silence::tell(context, &mut drafts);
@@ -74,41 +74,41 @@ pub(crate) fn make(context: &LedgerInput<'_>) -> Vec<Entry> {
 
 /// Sorts by time, kind and name, updates the references of parts and the weights of wholes; also returns the new index
 /// of each.
-pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, Vec<EntryId>) {
+pub(crate) fn sorted(mut list: Vec<Event>, elements: &Elements) -> (Vec<Event>, Vec<EventId>) {
     let mut order: Vec<usize> = (0..list.len()).collect();
     let key = |at: &usize| {
-        let entry = &list[*at];
+        let event = &list[*at];
         (
-            entry.time,
-            entry.kind,
-            elements.ends(entry.what),
-            entry.what,
+            event.time,
+            event.kind,
+            elements.ends(event.what),
+            event.what,
         )
     };
     order.sort_by_key(key);
-    let mut new: Vec<EntryId> = vec![0; list.len()];
+    let mut new: Vec<EventId> = vec![0; list.len()];
     for (place, old) in (0..).zip(&order) {
         new[*old] = place;
     }
     let mut weights = vec![1_u32; list.len()];
-    for entry in &mut list {
-        if let Some(whole) = entry.part_of {
+    for event in &mut list {
+        if let Some(whole) = event.part_of {
             weights[whole as usize] = weights[whole as usize].saturating_add(1);
-            entry.part_of = Some(new[whole as usize]);
+            event.part_of = Some(new[whole as usize]);
         }
     }
-    for (entry, weight) in list.iter_mut().zip(weights) {
-        entry.weight = weight;
+    for (event, weight) in list.iter_mut().zip(weights) {
+        event.weight = weight;
     }
-    let mut list: Vec<Option<Entry>> = list.into_iter().map(Some).collect();
+    let mut list: Vec<Option<Event>> = list.into_iter().map(Some).collect();
     let list = order.iter().filter_map(|at| list[*at].take()).collect();
     (list, new)
 }
 
-impl<'a> LedgerInput<'a> {
-    /// An entry about an element at a moment.
-    pub(crate) fn entry(&self, kind: Kind, what: Element, at: Bound) -> Entry {
-        Entry {
+impl<'a> LogInput<'a> {
+    /// An event about an element at a moment.
+    pub(crate) fn event(&self, kind: Kind, what: Element, at: Bound) -> Event {
+        Event {
             kind,
             what,
             time: at.time,
@@ -116,11 +116,11 @@ impl<'a> LedgerInput<'a> {
             latest: at.latest.max(at.time),
             until: None,
             detail: Detail::None,
-            degree: self
+            confidence: self
                 .history
                 .records
                 .of(what)
-                .map_or(Degree::Declared, |record| record.degree),
+                .map_or(Confidence::Declared, |record| record.confidence),
             evidence: self.elements.evidence(what),
             part_of: None,
             quiet: self.is_quiet(what),
@@ -176,7 +176,7 @@ pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
 }
 
 /// Adds the changes of nodes' lifecycle states.
-fn lifecycles(context: &LedgerInput<'_>, drafts: &mut Drafts) {
+fn lifecycles(context: &LogInput<'_>, drafts: &mut Drafts) {
     let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();
     for change in &context.history.transitions {
@@ -185,18 +185,18 @@ fn lifecycles(context: &LedgerInput<'_>, drafts: &mut Drafts) {
         if from == change.state {
             continue;
         }
-        let mut entry = context.entry(
+        let mut event = context.event(
             Kind::Lifecycle,
             Element::Node(change.node),
             exact(change.time),
         );
-        entry.degree = Degree::Stated;
-        entry.evidence = Evidence::of("lifecycle");
-        entry.detail = Detail::Values {
+        event.confidence = Confidence::Stated;
+        event.evidence = Evidence::of("lifecycle");
+        event.detail = Detail::Values {
             from,
             to: change.state.clone(),
         };
-        drafts.add(entry);
+        drafts.add(event);
     }
 }
 

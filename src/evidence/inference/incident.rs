@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Conclusions, ElementKey};
 use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Name, SourceId};
+use crate::evidence::observation::{Name, SourceId};
 
 /// The kind of an incident, with what is stated about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
