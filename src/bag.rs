@@ -37,8 +37,8 @@ use input::{closed, head, place};
 #[doc(hidden)]
 pub use model::Growth;
 pub use model::{
-    Connection, ConnectionId, Encoding, Lumps, Message, OpenOptions, Reader, Report, Sink, Tier,
-    Want,
+    ChunkCounts, Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink,
+    Tier, Want,
 };
 pub(crate) use model::{ETAG, Growing};
 pub(crate) use object::{list, version};

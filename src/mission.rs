@@ -135,8 +135,8 @@ impl Mission {
     pub(crate) fn explain(&mut self) {
         let spans = self.windows.iter().map(|w| w.span);
         let windows = spans.zip(&self.graphs);
-        let told = event_log::explain(windows, &self.elements, &self.log);
-        for (window, (changes, events)) in self.windows.iter_mut().zip(told) {
+        let reported = event_log::explain(windows, &self.elements, &self.log);
+        for (window, (changes, events)) in self.windows.iter_mut().zip(reported) {
             (window.changes, window.events) = (changes, events);
         }
     }

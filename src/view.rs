@@ -109,8 +109,8 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
         }
     }
     for frame in &mut list {
-        let roll = |at: &usize| frame.rolls.get(*at).cloned().unwrap_or_default();
-        frame.rolls = equal.iter().map(roll).collect();
+        let member_list = |at: &usize| frame.member_lists.get(*at).cloned().unwrap_or_default();
+        frame.member_lists = equal.iter().map(member_list).collect();
     }
     View {
         also: bundles::also_here(in_words, shown_in_words, &namespaces),

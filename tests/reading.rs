@@ -514,7 +514,7 @@ fn a_pipe_is_read_from_the_front() {
 struct Dice(u64);
 
 impl Dice {
-    fn roll(&mut self, below: usize) -> usize {
+    fn member_list(&mut self, below: usize) -> usize {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -526,12 +526,12 @@ impl Dice {
 /// Damages a bag: flipped bytes, big numbers, cuts, gaps of zeros, doubled parts.
 fn damage(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    for _ in 0..=dice.roll(3) {
-        let at = dice.roll(bytes.len());
-        let len = 1 + dice.roll(64);
+    for _ in 0..=dice.member_list(3) {
+        let at = dice.member_list(bytes.len());
+        let len = 1 + dice.member_list(64);
         let end = (at + len).min(bytes.len());
-        match dice.roll(8) {
-            0..=2 => bytes[at] ^= 1 << dice.roll(8),
+        match dice.member_list(8) {
+            0..=2 => bytes[at] ^= 1 << dice.member_list(8),
             3 => bytes[at..end.min(at + 8)].fill(0xff),
             4 => bytes[at..end].fill(0),
             5 => drop(bytes.drain(at..end)),

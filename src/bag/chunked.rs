@@ -22,7 +22,7 @@ use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
 use crate::bag::model::{
-    Connection, ConnectionId, Lumps, OpenOptions, Reader, Report, Sink, Tier, Want,
+    ChunkCounts, Connection, ConnectionId, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
 use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::error::{Error, Result};
@@ -118,7 +118,7 @@ struct Indexed<G> {
     plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
     verify: bool,
-    lumps: Option<Lumps>,
+    chunk_counts: Option<ChunkCounts>,
     grammar: PhantomData<fn() -> G>,
 }
 
@@ -150,7 +150,7 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 plan,
                 facts,
                 verify: options.verify,
-                lumps: options.lumps,
+                chunk_counts: options.chunk_counts,
                 grammar,
             }))
         }
@@ -230,7 +230,7 @@ impl<G: Grammar> Indexed<G> {
         plan.notices.iter().for_each(|n| sink.notice(n.clone()));
         let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
         let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
-        let (chunks, tier) = self.in_lumps(plan, chunks, range, sink);
+        let (chunks, tier) = self.by_chunk_counts(plan, chunks, range, sink);
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
@@ -270,25 +270,25 @@ impl<G: Grammar> Indexed<G> {
 
     /// Counts chunks as a whole where that is requested and sufficient; returns the other chunks and the tier that
     /// results.
-    fn in_lumps<'p>(
+    fn by_chunk_counts<'p>(
         &self,
         plan: &ChunkPlan,
         chunks: Vec<&'p Chunk>,
         range: Option<Span>,
         sink: &mut Clip<'_>,
     ) -> (Vec<&'p Chunk>, Tier) {
-        let Some(lumps) = self.lumps.filter(|l| plan.chunks.len() > l.above) else {
+        let Some(chunk_counts) = self.chunk_counts.filter(|l| plan.chunks.len() > l.above) else {
             return (chunks, Tier::Index);
         };
         let is_inside = |c: &Chunk| range.is_none_or(|r| r.contains(c.first) && r.contains(c.last));
         let left = chunks.into_iter().filter(|chunk| {
-            let window = lumps.window(chunk.first);
-            let is_one = window == lumps.window(chunk.last) && is_inside(chunk);
-            let Some(counts) = is_one.then(|| plan.lump(chunk)).flatten() else {
+            let window = chunk_counts.window(chunk.first);
+            let is_one = window == chunk_counts.window(chunk.last) && is_inside(chunk);
+            let Some(counts) = is_one.then(|| plan.chunk_count(chunk)).flatten() else {
                 return true;
             };
             for (connection, count) in counts {
-                sink.lump(connection, window, count);
+                sink.chunk_count(connection, window, count);
             }
             false
         });

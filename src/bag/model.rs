@@ -117,10 +117,10 @@ pub trait Sink {
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
     /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is
-    /// known: instead of their stamps, and only where [`OpenOptions::lumps`] asks for it.
-    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+    /// known: instead of their stamps, and only where [`OpenOptions::chunk_counts`] asks for it.
+    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
         if let Some(sink) = self.behind() {
-            sink.lump(connection, window, count);
+            sink.chunk_count(connection, window, count);
         }
     }
 
@@ -237,12 +237,12 @@ pub struct OpenOptions {
     /// Read everything by the second, independent reader instead (tier `verify`).
     pub verify: bool,
     /// How to count by chunks where that suffices; `None` to count message by message.
-    pub lumps: Option<Lumps>,
+    pub chunk_counts: Option<ChunkCounts>,
 }
 
 /// How to count a chunk that lies in a single window as a whole, without reading it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lumps {
+pub struct ChunkCounts {
     /// The start of one of the windows.
     pub origin: Stamp,
     /// The length of all windows.
@@ -251,7 +251,7 @@ pub struct Lumps {
     pub above: usize,
 }
 
-impl Lumps {
+impl ChunkCounts {
     /// The start of the window that contains `at`; saturates at the ends of the range.
     pub fn window(&self, at: Stamp) -> Stamp {
         let (origin, period) = (i128::from(self.origin.0), i128::from(self.period.nanos()));

@@ -58,8 +58,9 @@ impl Sink for MovedSink<'_> {
         self.sink.stamps(connection, &stamps, sizes);
     }
 
-    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
-        self.sink.lump(connection, window.plus(self.by), count);
+    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+        self.sink
+            .chunk_count(connection, window.plus(self.by), count);
     }
 
     fn message(&mut self, message: Message<'_>) {

@@ -286,10 +286,10 @@ impl<'a> Board<'a> {
         groups
     }
 
-    fn rates(&self, canvas: &mut PaperCanvas<'_>, told: &dyn Fn(&Track) -> Option<String>) {
+    fn rates(&self, canvas: &mut PaperCanvas<'_>, reported: &dyn Fn(&Track) -> Option<String>) {
         let right = self.place.axis.right + RATES;
         for (y, track, ..) in self.lives.lines(canvas, &self.place) {
-            let (color, text) = match told(track) {
+            let (color, text) = match reported(track) {
                 Some(text) => (ink::TEXT, text),
                 None => (ink::QUIET, "–".to_owned()),
             };

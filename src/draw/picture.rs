@@ -329,13 +329,15 @@ impl<'a> Picture<'a> {
         let full = view.inhabited(seen);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
-        let mut rolls = frame.rolls.iter();
+        let mut member_lists = frame.member_lists.iter();
         for (at, (space, place)) in spaces.enumerate() {
             let id = encoded(&space.name);
-            let roll = (!space.replicas.is_empty()).then(|| rolls.next()).flatten();
+            let member_list = (!space.replicas.is_empty())
+                .then(|| member_lists.next())
+                .flatten();
             let now = view.place_in_time(frame.index);
-            let roll =
-                roll.map(|who| boxes.roll(space, (*place, self.shifts[at]), &id, (now, who)));
+            let member_list = member_list
+                .map(|who| boxes.member_list(space, (*place, self.shifts[at]), &id, (now, who)));
             let empty = (!full[at]).then(|| {
                 if self.measured.graph.first_seen[at] > frame.index {
                     "not on yet"
@@ -345,7 +347,7 @@ impl<'a> Picture<'a> {
             });
             let mut space = boxes.space(space, *place, &id, empty);
             titles.push(boxes.title_of(&mut space, self.shifts[at]));
-            titles.extend(roll.filter(|roll| !roll.pieces.is_empty()));
+            titles.extend(member_list.filter(|member_list| !member_list.pieces.is_empty()));
             groups.push(space);
         }
         let whole = Rect::new(0.0, 0.0, self.layout.size.w, self.layout.size.h);

@@ -38,26 +38,26 @@ pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     let Some(bulk) = clusters.iter().max_by_key(|c| c.messages) else {
         return Belief::default();
     };
-    let strangers: u64 = days.values().sum::<u64>() - bulk.messages;
-    let is_rare = strangers <= (days.values().sum::<u64>() / RARE).max(1);
+    let outliers: u64 = days.values().sum::<u64>() - bulk.messages;
+    let is_rare = outliers <= (days.values().sum::<u64>() / RARE).max(1);
     let others = || clusters.iter().filter(|c| *c != bulk);
     let is_unset = bulk.first > UNSET_DAYS && others().all(|c| (0..=UNSET_DAYS).contains(&c.last));
     let whole = clusters.last().map_or(0, |c| c.last) - clusters.first().map_or(0, |c| c.first);
     let is_too_long = whole >= budget::SPAN_DAYS;
-    if strangers < bulk.messages && (is_rare || is_unset) || is_too_long {
+    if outliers < bulk.messages && (is_rare || is_unset) || is_too_long {
         let last = bulk.last.min(bulk.first + budget::SPAN_DAYS - 1);
         let span = Span::new(
             Stamp(bulk.first.saturating_mul(DAY)),
             Stamp((last + 1).saturating_mul(DAY)),
         );
         return Belief {
-            span: (strangers > 0 || is_too_long).then_some(span),
+            span: (outliers > 0 || is_too_long).then_some(span),
             jump: None,
         };
     }
     Belief {
         span: None,
-        jump: (clusters.len() > 1).then(|| told(&clusters)),
+        jump: (clusters.len() > 1).then(|| stated(&clusters)),
     }
 }
 
@@ -82,7 +82,7 @@ fn clusters(days: &BTreeMap<i64, u64>) -> Vec<DayCluster> {
 /// The number of clusters that are named.
 const NAMED: usize = 3;
 
-fn told(clusters: &[DayCluster]) -> String {
+fn stated(clusters: &[DayCluster]) -> String {
     let one = |c: &DayCluster| {
         let date = Stamp(c.first.saturating_mul(DAY)).to_string();
         let date = date.split('T').next().unwrap_or_default();
@@ -141,10 +141,10 @@ mod tests {
     #[test]
     fn a_plausible_clock_jump_is_reported() {
         let days = [(10_957, 249), (20_000, 250)].into_iter().collect();
-        let told = believed(&days).jump.unwrap();
+        let stated = believed(&days).jump.unwrap();
         assert!(
-            told.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
-            "{told}"
+            stated.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
+            "{stated}"
         );
         let one = [(20_000, 249), (20_001, 250)].into_iter().collect();
         assert_eq!(believed(&one).jump, None);

@@ -111,7 +111,7 @@ pub struct Collector {
     /// The number of payload bytes compared so far.
     compared: u64,
     /// Whether the messages of each stream are texts that are kept.
-    told: Vec<bool>,
+    stated: Vec<bool>,
     texts: Vec<(Stamp, String)>,
     messages: Stamps,
     facts: Observations,
@@ -256,7 +256,7 @@ impl Collector {
 
     /// Keeps the text of a message, if those of its topic were asked for.
     fn keep_text(&mut self, place: usize, message: &Message<'_>) {
-        if !self.told[place] || self.texts.len() >= MOST_TEXTS {
+        if !self.stated[place] || self.texts.len() >= MOST_TEXTS {
             return;
         }
         let encoding = &self.streams[place].connection.encoding;
@@ -408,7 +408,7 @@ impl Sink for BagSink<'_> {
             connection: connection.clone(),
             topic,
             publisher: publisher.map(|p| all.facts.name(&p)),
-            speaker: None,
+            sender: None,
             latched: is_held(connection),
             trust: Reliability::Whole,
             is_outside: false,
@@ -436,8 +436,8 @@ impl Sink for BagSink<'_> {
         let aged = equal_stamps::is_stamped(connection);
         let stamped = all.options.infer_stamps && aged;
         let compared = all.options.payload_bytes > 0;
-        let told = all.options.keeps_texts_of(connection);
-        let want = all.options.want(!readers.is_empty() || told, stamped);
+        let stated = all.options.keeps_texts_of(connection);
+        let want = all.options.want(!readers.is_empty() || stated, stamped);
         if want == Want::Payload || stamped {
             all.read.insert(self.bag);
         }
@@ -451,7 +451,7 @@ impl Sink for BagSink<'_> {
         all.readers.push(readers);
         all.stamped.push(stamped);
         all.aged.push(aged);
-        all.told.push(told);
+        all.stated.push(stated);
         let definition = connection.definition.as_deref();
         let schema = echo::schema(&connection.type_name, definition);
         all.schemas.push(schema.filter(|_| compared));

@@ -132,7 +132,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         Stream {
             topic: to(stream.topic),
             publisher,
-            speaker: publisher.map(role),
+            sender: publisher.map(role),
             ..stream.clone()
         }
     };
@@ -187,9 +187,9 @@ fn concluded<'a>(
             conclude(row, &mut known);
         }
     }
-    let strange = strangers(&known, &options.topology.entries);
+    let unmatched = unmatched(&known, &options.topology.entries);
     for entry in &options.topology.entries {
-        told(&mut known, entry, (start, end), &recorded.messages);
+        stated(&mut known, entry, (start, end), &recorded.messages);
     }
     let mut notices = Notices::new();
     notices.extend(options.topology.notices.iter().cloned());
@@ -199,7 +199,7 @@ fn concluded<'a>(
     let undrawn = Vec::new();
     unknown::conclude(&mut known);
     explain(&mut known, &recorded.messages);
-    notices.extend(strange);
+    notices.extend(unmatched);
     (known, notices, undrawn)
 }
 
@@ -220,7 +220,7 @@ fn declared(
 
 /// Notices about names in the user's files that are not in the bags: topics, and nodes whose name is close to a known
 /// one.
-fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> {
+fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> {
     let texts = |names: &mut dyn Iterator<Item = Name>| -> BTreeSet<Arc<str>> {
         names.map(|name| known.text(name)).collect()
     };
@@ -231,7 +231,7 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
         _ => None,
     });
     let services: BTreeSet<&String> = services.collect();
-    let mut told = BTreeMap::new();
+    let mut stated = BTreeMap::new();
     for entry in entries.iter().filter(|e| !e.declared) {
         let (node, topic) = match &entry.element {
             NamedElement::Node(node) => (Some(node), None),
@@ -251,7 +251,7 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
             let near = nearest(name, all.iter().map(AsRef::as_ref));
             // A bag hides nodes, which is why the user names them; topics it does not hide.
             if near.is_some() || what == "topic" {
-                told.entry((what, name)).or_insert((&entry.place, near));
+                stated.entry((what, name)).or_insert((&entry.place, near));
             }
         }
     }
@@ -262,7 +262,7 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
         let text = format!("{place}: no {what} of the bag is called `{name}`{near}");
         Notice::new(NoticeKind::Note, text)
     };
-    told.into_iter().map(notice).collect()
+    stated.into_iter().map(notice).collect()
 }
 
 /// Explains proofs that rest on no single message, for elements that `why` asks about.
@@ -339,7 +339,7 @@ fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
 }
 
 /// Adds an entry of the user's file.
-fn told(
+fn stated(
     known: &mut Conclusions<'_>,
     entry: &TopologyEntry,
     mission: (Stamp, Stamp),

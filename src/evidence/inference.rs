@@ -30,7 +30,7 @@ pub(crate) struct Stream {
     pub(crate) topic: Name,
     pub(crate) publisher: Option<Name>,
     /// The node that counts as its publisher when graphs are built: by its name or by its role.
-    pub(crate) speaker: Option<Name>,
+    pub(crate) sender: Option<Name>,
     /// Whether the last message stays valid after its time: latched (ROS 1) or transient local (ROS 2).
     pub(crate) latched: bool,
     /// The reliability of its publisher's name.

@@ -122,16 +122,16 @@ mod tests {
 
     #[test]
     fn a_process_continues_until_its_sequence_numbers_drop() {
-        let told = |numbers: &[u32]| {
+        let stated = |numbers: &[u32]| {
             let mut all = Numbers::default();
             for (at, number) in (0..).zip(numbers) {
                 all.add(Stamp(at), &payload(*number, 5));
             }
             [(1, 2), (2, 3)].map(|(from, to)| all.count_on(Stamp(from), Stamp(to)))
         };
-        assert_eq!(told(&[7, 8, 9, 12]), [true, true]);
-        assert_eq!(told(&[7, 8, 3, 4]), [false, true]);
-        assert_eq!(told(&[0, 0, 0, 0]), [false, false]);
+        assert_eq!(stated(&[7, 8, 9, 12]), [true, true]);
+        assert_eq!(stated(&[7, 8, 3, 4]), [false, true]);
+        assert_eq!(stated(&[0, 0, 0, 0]), [false, false]);
     }
 
     #[test]

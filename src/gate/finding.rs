@@ -277,7 +277,7 @@ impl Finding {
     }
 
     /// The sentence and all details, separated by `between`.
-    pub(crate) fn told(&self, between: &str) -> String {
+    pub(crate) fn reported(&self, between: &str) -> String {
         let mut all = vec![self.says.as_str()];
         all.extend(self.details.iter().map(String::as_str));
         all.join(between)

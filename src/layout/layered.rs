@@ -308,7 +308,7 @@ fn best_block(
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
-    // The most promising first: most of the others can then be told to be worse before they have places.
+    // The most promising first: most of the others can then be reported to be worse before they have places.
     let hoped = |ordering: &Ordering| {
         let found = (&ordering.layers, &ordering.rows, ordering.crossings);
         hope(plan, options, part, found, orientation)

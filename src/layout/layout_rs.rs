@@ -61,9 +61,9 @@ fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let before = panic::take_hook();
-        panic::set_hook(Box::new(move |told| {
+        panic::set_hook(Box::new(move |reported| {
             if !IS_EXPECTED.get() {
-                before(told);
+                before(reported);
             }
         }));
     });
@@ -213,9 +213,9 @@ mod tests {
     #[test]
     fn panics_inside_are_silenced_and_others_are_not() {
         let before = panic::take_hook();
-        panic::set_hook(Box::new(move |told| {
+        panic::set_hook(Box::new(move |reported| {
             HEARD.set(HEARD.get() + 1);
-            before(told);
+            before(reported);
         }));
         assert!(unheard(|| panic!("expected")).is_err());
         assert_eq!(HEARD.get(), 0);

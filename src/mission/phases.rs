@@ -55,7 +55,7 @@ pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase>
     let spans = between(&starts, whole.end);
     let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
     let unit = if is_topics(&present) { "topic" } else { "node" };
-    told(&spans, &found, &ramps, unit)
+    reported(&spans, &found, &ramps, unit)
 }
 
 /// The intervals from each start to the next, the last one to `end`.
@@ -76,7 +76,7 @@ pub(crate) fn of_spans(
     let of = |span: &Span| configuration(elements, sending, &present, *span);
     let found: Vec<Configuration> = spans.iter().map(of).collect();
     let unit = if is_topics(&present) { "topic" } else { "node" };
-    told(spans, &found, &vec![false; spans.len()], unit)
+    reported(spans, &found, &vec![false; spans.len()], unit)
 }
 
 /// The majority graph of each of these phases.
@@ -162,7 +162,7 @@ fn differing(
     times.get(times.len() / 2).copied()
 }
 
-fn told(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> Vec<Phase> {
+fn reported(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> Vec<Phase> {
     let nothing = BTreeSet::new();
     let phase = |k: usize| {
         let before = k.checked_sub(1).map_or(&nothing, |b| &found[b].names);

@@ -15,7 +15,7 @@ use crate::graph::Element;
 use crate::layout::{Engine, Layout, LayoutOptions, Plan, RING, engine, extend, lay_out};
 use crate::mission::Mission;
 use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
-use notices::{parts, so_that, told};
+use notices::{parts, reported, so_that};
 
 /// The style used to decide what is drawn.
 const PLAIN: &str = "light";
@@ -207,7 +207,7 @@ impl Fitting<'_> {
     /// Collapses the constant elements of namespaces until the text is legible. Returns the namespaces with the boxes
     /// that were left outside.
     fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
-        let told = self.changing();
+        let reported = self.changing();
         let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
         loop {
             let is_new = |name: &Arc<str>| {
@@ -222,7 +222,7 @@ impl Fitting<'_> {
             }
             let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
             for candidate in self.at_once(fresh) {
-                let mut changing = self.best.view.holding(&told, &candidate.name);
+                let mut changing = self.best.view.holding(&reported, &candidate.name);
                 changing.retain(|name| !is_hopeless && !self.options.expand.contains(name));
                 if changing.is_empty() || candidate.items >= changing.len() + FEWEST_STEADY {
                     self.options.collapse.push(Arc::clone(&candidate.name));
@@ -240,32 +240,32 @@ impl Fitting<'_> {
     fn changing(&self) -> BTreeSet<Element> {
         let elements = &self.mission.elements;
         let view = &self.best.view;
-        let mut told: BTreeSet<Element> = headlines(self.mission).collect();
-        let topics: BTreeSet<_> = told
+        let mut reported: BTreeSet<Element> = headlines(self.mission).collect();
+        let topics: BTreeSet<_> = reported
             .iter()
             .filter_map(|what| elements.ends(*what).1)
             .collect();
         let edges = elements
             .edges()
             .filter(|(_, edge)| topics.contains(&edge.topic));
-        told.extend(edges.map(|(_, edge)| Element::Node(edge.node)));
-        let is_told = |item: u32| {
+        reported.extend(edges.map(|(_, edge)| Element::Node(edge.node)));
+        let is_reported = |item: u32| {
             view.items[item as usize]
                 .members
                 .iter()
-                .any(|m| told.contains(m))
+                .any(|m| reported.contains(m))
         };
         let lines = view
             .arrows
             .iter()
-            .filter(|a| is_told(a.from) != is_told(a.to));
+            .filter(|a| is_reported(a.from) != is_reported(a.to));
         let partners: BTreeSet<u32> = lines.flat_map(|arrow| [arrow.from, arrow.to]).collect();
         let members = partners
             .iter()
             .flat_map(|item| &view.items[*item as usize].members);
         let members: Vec<Element> = members.copied().collect();
-        told.extend(members);
-        told
+        reported.extend(members);
+        reported
     }
 
     /// Collapses these namespaces including the boxes left outside, until the text is legible.
@@ -346,7 +346,7 @@ impl Fitting<'_> {
         if drawing.is_fitted || drawing.purpose.is_some() {
             let collapsed = &self.options.collapse[drawing.view.collapse.len()..];
             let kept = &self.options.expand[drawing.view.expand.len()..];
-            notices.extend(told(drawing, &parts(collapsed, kept), &self.page, text).iter());
+            notices.extend(reported(drawing, &parts(collapsed, kept), &self.page, text).iter());
             if self.options.mode != drawing.view.mode {
                 let text = format!(
                     "drew one line per pair of boxes{}; draw each topic with `--mode {}`",

@@ -88,7 +88,7 @@ impl Live {
         });
         let (file, heartbeat) = begun.map_err(Error::io("write", &path))?;
         let is_over = Arc::new(AtomicBool::new(false));
-        let (told, news) = channel();
+        let (reported, news) = channel();
         let watched = Watched {
             file,
             heartbeat,
@@ -99,7 +99,7 @@ impl Live {
             is_over: is_over.clone(),
         };
         let (name, place) = (text.to_string(), place.trim_end_matches('/').to_owned());
-        let recorder = spawn(move || record(watch, &name, &place, watched, &told));
+        let recorder = spawn(move || record(watch, &name, &place, watched, &reported));
         Ok(Some(Self {
             path,
             is_over,
@@ -136,7 +136,7 @@ impl Drop for Live {
 }
 
 /// Watches the system and reconnects if the connection fails.
-fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Sender<String>) {
+fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, reported: &Sender<String>) {
     let mut wait = BEAT;
     while !watched.is_over() {
         watched.written = None;
@@ -154,7 +154,7 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Se
             "no connection to {name}: {why}; trying again in {} s",
             wait.as_secs()
         );
-        if told.send(text).is_err() {
+        if reported.send(text).is_err() {
             break;
         }
         let until = SystemTime::now() + wait;
@@ -164,7 +164,7 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, told: &Se
         wait = (wait * 2).min(MOST_WAIT);
     }
     if let Err(error) = watched.file.finish() {
-        let _ = told.send(format!(
+        let _ = reported.send(format!(
             "the recording of {name} could not be ended: {error}"
         ));
     }

@@ -27,7 +27,7 @@ impl Viewed {
             }
         }
         let is_bundled = options.mode == Mode::Bundles;
-        let told: BTreeSet<TopicId> = headlines(mission)
+        let reported: BTreeSet<TopicId> = headlines(mission)
             .filter_map(|what| elements.ends(what).1)
             .collect();
         let is_anything = nodes.iter().any(Option::is_some);
@@ -42,7 +42,7 @@ impl Viewed {
                 self.is_in_words[1][at] = is_anything && all.is_empty();
                 continue;
             }
-            let is_seen = self.selection.topics[at].is_none() && told.contains(&id);
+            let is_seen = self.selection.topics[at].is_none() && reported.contains(&id);
             let is_carried =
                 self.drawn[at] && all.len() > 1 && !senders.is_empty() && !receivers.is_empty();
             if key.is_some() || !is_seen || is_carried {
@@ -71,7 +71,7 @@ impl Viewed {
             .iter()
             .filter(|reason| reason.is_none());
         let is_rule = 2 * is_busy.iter().filter(|busy| **busy).count() >= seen.count();
-        for event in bundles::news(mission) {
+        for event in bundles::changed(mission) {
             if let (Some(node), _) = mission.elements.ends(event.what) {
                 is_busy[node as usize] = true;
             }

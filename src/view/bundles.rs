@@ -118,7 +118,7 @@ fn changing_nodes(
 ) -> (Vec<bool>, Vec<bool>) {
     let mut changes = vec![false; mission.elements.nodes.len()];
     let mut changes_itself = changes.clone();
-    for event in news(mission) {
+    for event in changed(mission) {
         let nodes = match mission.elements.ends(event.what) {
             (Some(node), _) => {
                 changes_itself[node as usize] = true;
@@ -143,7 +143,7 @@ pub(crate) fn beginning(mission: &Mission) -> Option<Stamp> {
 }
 
 /// The headlines but for the starts in the first window, or in the beginning of the only one.
-pub(crate) fn news(mission: &Mission) -> impl Iterator<Item = &Event> {
+pub(crate) fn changed(mission: &Mission) -> impl Iterator<Item = &Event> {
     let first = mission.windows.first().map(|window| window.span.end);
     let first = beginning(mission).or(first);
     let is_first =

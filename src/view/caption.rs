@@ -23,7 +23,7 @@ const MOST_NAMED: usize = 3;
 const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate];
 
 /// A writer of headlines, window by window.
-pub(crate) struct Speaker<'a> {
+pub(crate) struct CaptionWriter<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
     log: &'a EventLog,
@@ -40,7 +40,7 @@ pub(crate) struct Speaker<'a> {
 /// The events of a window, in the order of their phrases, each with what is equal within one phrase.
 type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
-impl<'a> Speaker<'a> {
+impl<'a> CaptionWriter<'a> {
     pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed) -> Self {
         Self {
             elements: &mission.elements,
@@ -55,7 +55,7 @@ impl<'a> Speaker<'a> {
     }
 
     /// Puts the events of a window into words.
-    pub(crate) fn tell(&mut self, frame: &mut Frame) {
+    pub(crate) fn write(&mut self, frame: &mut Frame) {
         let whats = frame.headlines.iter().map(|h| h.what);
         let whats = whats.chain(frame.lasting.iter().map(|l| l.what));
         let home: &'a str = home(whats.filter_map(|what| self.subject(what)));

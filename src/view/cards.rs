@@ -58,7 +58,7 @@ impl Drawn {
             }
             let is_plumbing = hides_plumbing && is_plumbing(&self.items[topic as usize].name)
                 || self.is_hub(owners.keys());
-            if (owners.len() == 1 || is_plumbing) && self.is_told(topic, &lines, is_plumbing) {
+            if (owners.len() == 1 || is_plumbing) && self.is_reported(topic, &lines, is_plumbing) {
                 let own = owners.into_iter();
                 rows.extend(
                     own.map(|(owner, lines)| self.row((topic, owner), &lines, is_plumbing)),
@@ -105,7 +105,7 @@ impl Drawn {
 
     /// Whether one of these arrows of a topic is there whenever the topic is; of plumbing, whenever something is
     /// reported of it.
-    fn is_told(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
+    fn is_reported(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
         let Some(looks) = self.items_shown.get(topic as usize) else {
             return true;
         };
@@ -150,12 +150,12 @@ impl Drawn {
             let look = self.items_shown[topic as usize].at(window as usize);
             let look = look.zip(line).map(|(look, line)| {
                 // A connection that came or went is the change of the row, too.
-                let told = if look.mark.is_some() { look } else { line };
+                let reported = if look.mark.is_some() { look } else { line };
                 let events = look.events.iter().chain(&line.events);
                 let events: BTreeSet<_> = events.copied().collect();
                 Shown {
-                    mark: told.mark,
-                    rates: told.rates,
+                    mark: reported.mark,
+                    rates: reported.rates,
                     events: events.into_iter().collect(),
                     ..(if is_plumbing { line } else { look }).clone()
                 }
@@ -285,11 +285,11 @@ fn both_ways(ways: [&Showing; 2]) -> Showing {
         .collect();
     for window in windows {
         let looks = ways.map(|way| way.at(window as usize));
-        let is_told = |look: &&&Shown| look.mark.is_some();
+        let is_reported = |look: &&&Shown| look.mark.is_some();
         let look = looks
             .iter()
             .flatten()
-            .find(is_told)
+            .find(is_reported)
             .or(looks.iter().flatten().next());
         let events = looks.iter().flatten().flat_map(|look| &look.events);
         let events: BTreeSet<_> = events.copied().collect();

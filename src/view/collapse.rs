@@ -110,25 +110,25 @@ pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_
 }
 
 /// The number of headlines about each name: of a node, of a topic, of an edge by its topic.
-pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
-    let (elements, mut news) = (&mission.elements, BTreeMap::new());
+pub(crate) fn changed(mission: &Mission) -> BTreeMap<&str, usize> {
+    let (elements, mut changed) = (&mission.elements, BTreeMap::new());
     for what in headlines(mission) {
         let (node, topic) = elements.names(what);
         let name = node.or(topic);
-        *news.entry(name.unwrap_or_default()).or_default() += 1;
+        *changed.entry(name.unwrap_or_default()).or_default() += 1;
     }
-    news
+    changed
 }
 
 impl View {
     /// The boxes inside a namespace that hold one of these elements.
-    pub(crate) fn holding(&self, told: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
+    pub(crate) fn holding(&self, reported: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
         let is_inside = |name: &str| {
             let rest = name.strip_prefix(space);
             rest.is_some_and(|rest| rest.starts_with('/'))
         };
         let inside = self.items.iter().filter(|item| is_inside(&item.name));
-        let changes = |item: &&Item| item.members.iter().any(|member| told.contains(member));
+        let changes = |item: &&Item| item.members.iter().any(|member| reported.contains(member));
         let open = inside.filter(|item| item.kind != ItemKind::Namespace);
         open.filter(changes)
             .map(|item| Arc::clone(&item.name))
@@ -139,7 +139,7 @@ impl View {
     /// each box that they hold, then innermost ones before those around them, the largest first, then by name. Those
     /// that hold fewer than two boxes, or that `options` keeps open, are left out.
     pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Collapsible> {
-        let news = news(mission);
+        let changed = changed(mission);
         let open = Collapse::new(options).expand;
         let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
         for item in &self.items {
@@ -163,9 +163,9 @@ impl View {
             .iter()
             .map(|(space, size)| {
                 let below = format!("{space}/");
-                let inside = news.range(below.as_str()..);
+                let inside = changed.range(below.as_str()..);
                 let inside = inside.take_while(|(name, _)| name.starts_with(&below));
-                let own = news.get(space).copied().unwrap_or_default();
+                let own = changed.get(space).copied().unwrap_or_default();
                 let candidate = Collapsible {
                     name: Arc::from(*space),
                     items: *size,

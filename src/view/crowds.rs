@@ -152,7 +152,7 @@ fn fold(
 
 impl View {
     /// The looks in window `k` with the colours of crowds on their frames alone: their members stand as if nothing
-    /// happened, and those that are gone do not stand, unless a line to them is news of its own.
+    /// happened, and those that are gone do not stand, unless a line to them changed itself.
     pub(crate) fn calm(&self, k: usize) -> SeenWindow {
         let seen = self.seen(k);
         let Some(frame) = self.frames.get(k).filter(|frame| !frame.crowds.is_empty()) else {
@@ -162,9 +162,14 @@ impl View {
             let arrow = self.arrows.get(shown.id as usize);
             arrow.into_iter().flat_map(|arrow| [arrow.from, arrow.to])
         };
-        let is_news = |shown: &&Shown| !shown.events.is_empty() && !frame.is_crowd(shown);
-        let told: BTreeSet<u32> = seen.arrows.iter().filter(is_news).flat_map(ends).collect();
-        let stays = |shown: &Shown| told.contains(&shown.id).then(|| shown.clone());
+        let is_changed = |shown: &&Shown| !shown.events.is_empty() && !frame.is_crowd(shown);
+        let reported: BTreeSet<u32> = seen
+            .arrows
+            .iter()
+            .filter(is_changed)
+            .flat_map(ends)
+            .collect();
+        let stays = |shown: &Shown| reported.contains(&shown.id).then(|| shown.clone());
         let items = seen.items.iter();
         let items: Vec<Shown> = items
             .filter_map(|shown| frame.calmed(shown).or_else(|| stays(shown)))

@@ -119,8 +119,8 @@ impl Keep {
     }
 
     fn window(&self, window: &Window) -> Window {
-        let told = window.changes.iter().zip(&window.events);
-        let kept = told.filter_map(|(change, event)| {
+        let reported = window.changes.iter().zip(&window.events);
+        let kept = reported.filter_map(|(change, event)| {
             Some((self.change(change)?, new_id(&self.events, *event)?))
         });
         let (changes, events) = kept.unzip();

@@ -77,7 +77,7 @@ pub struct Frame {
     pub messages: u64,
     /// For each namespace that stands for several, in the order of [`View::namespaces`](super::View::namespaces), the
     /// presence of each of them.
-    pub rolls: Vec<Vec<Attendance>>,
+    pub member_lists: Vec<Vec<Attendance>>,
     /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
     pub headlines: Vec<Headline>,
     /// The events of earlier windows that last into it or end in it: marked and in words, but counted once, where they
@@ -103,7 +103,7 @@ impl Frame {
             span,
             partial: false,
             messages: 0,
-            rolls: Vec::new(),
+            member_lists: Vec::new(),
             headlines: Vec::new(),
             lasting: Vec::new(),
             counts: Counts::default(),
@@ -143,14 +143,14 @@ impl Frame {
         let mut best = (0, self.shortened(1, 1));
         for phrases in (1..=self.caption.len()).rev() {
             for names in (1..=longest).rev() {
-                let told = self.caption.iter().take(phrases);
-                let told: usize = told.map(|p| p.names.len().min(names)).sum();
-                if told <= best.0 {
+                let reported = self.caption.iter().take(phrases);
+                let reported: usize = reported.map(|p| p.names.len().min(names)).sum();
+                if reported <= best.0 {
                     break;
                 }
                 let text = self.shortened(phrases, names);
                 if fits(&text) {
-                    best = (told, text);
+                    best = (reported, text);
                     break;
                 }
             }
@@ -159,13 +159,13 @@ impl Frame {
     }
 
     fn shortened(&self, phrases: usize, names: usize) -> String {
-        let told = self.caption.iter().take(phrases).map(|p| p.text(names));
-        let mut told: Vec<String> = told.collect();
+        let reported = self.caption.iter().take(phrases).map(|p| p.text(names));
+        let mut reported: Vec<String> = reported.collect();
         let rest = self.caption.iter().skip(phrases).map(|p| p.names.len());
         let rest: usize = rest.sum();
         if rest > 0 {
-            told.push(format!("+{rest}"));
+            reported.push(format!("+{rest}"));
         }
-        told.join("; ")
+        reported.join("; ")
     }
 }

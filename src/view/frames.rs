@@ -1,7 +1,7 @@
 //! The windows one after the other, each with the headlines of the event log in it.
 
 use super::bundles::beginning;
-use super::caption::Speaker;
+use super::caption::CaptionWriter;
 use super::items::Viewed;
 use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
@@ -25,38 +25,38 @@ pub(crate) struct Frames {
 
 /// The windows one after the other. In one without headlines, only elements whose numbers changed are looked at.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
-    let mut stage = ShownWindows::new(mission, options, viewed);
-    let mut speaker = Speaker::new(mission, viewed);
+    let mut windows = ShownWindows::new(mission, options, viewed);
+    let mut writer = CaptionWriter::new(mission, viewed);
     let mut walk = mission.graphs.walk();
     let mut list = Vec::with_capacity(mission.windows.len());
     let turns = turns(mission);
     for ((at, window), has_turn) in (0..).zip(&mission.windows).zip(turns) {
-        walk.next(|what, row| stage.hear(what, row));
-        let hides = stage.now.hides_the_silent() && stage.is_touched();
-        if has_turn || hides || stage.now.is_other_length(window.span) {
-            stage.turn(at, window);
+        walk.next(|what, row| windows.hear(what, row));
+        let hides = windows.now.hides_the_silent() && windows.is_touched();
+        if has_turn || hides || windows.now.is_other_length(window.span) {
+            windows.turn(at, window);
         } else {
-            stage.go_on(at);
+            windows.go_on(at);
         }
-        let headlines = std::mem::take(&mut stage.turn.news.headlines);
+        let headlines = std::mem::take(&mut windows.turn.changed.headlines);
         let mut frame = Frame {
             partial: window.partial,
             messages: window.messages,
             counts: Counts::of(&headlines),
             headlines,
-            lasting: stage.turn.news.lasting.clone(),
-            rolls: stage.rolls.clone(),
+            lasting: windows.turn.changed.lasting.clone(),
+            member_lists: windows.member_lists.clone(),
             ..Frame::empty(window.index, window.span)
         };
-        speaker.tell(&mut frame);
+        writer.write(&mut frame);
         list.push(frame);
     }
     join_empty(&mut list);
     let lengths = Lengths::new(mission.windows.iter().map(|w| w.span));
     Frames {
         list,
-        items: stage.items.finish(&lengths),
-        arrows: stage.arrows.finish(&lengths),
+        items: windows.items.finish(&lengths),
+        arrows: windows.arrows.finish(&lengths),
     }
 }
 
@@ -107,11 +107,11 @@ struct ShownWindows<'a> {
     lives: ItemTurns<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
-    /// What begins before it is no news.
+    /// What begins before it is not a change.
     beginning: Option<Stamp>,
     now: Now<'a>,
     turn: WindowTurn,
-    rolls: Vec<Vec<Attendance>>,
+    member_lists: Vec<Vec<Attendance>>,
     items: Cast,
     arrows: Cast,
 }
@@ -173,7 +173,7 @@ impl<'a> ShownWindows<'a> {
             beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
-            rolls: Vec::new(),
+            member_lists: Vec::new(),
             items: Cast::new(viewed.items.len()),
             arrows: Cast::new(viewed.arrows.len()),
         }
@@ -204,14 +204,14 @@ impl<'a> ShownWindows<'a> {
         self.turn = WindowTurn {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
-            news: News::new(
+            changed: News::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),
                 self.viewed,
             ),
         };
-        self.rolls = rolls(self.viewed, &before, &after, window.index == 0);
+        self.member_lists = member_lists(self.viewed, &before, &after, window.index == 0);
         self.items.take_touched();
         self.arrows.take_touched();
         let items = self.turn.items(self.viewed, &self.now);
@@ -227,7 +227,7 @@ impl<'a> ShownWindows<'a> {
     /// Shows a window without headlines after another without: everything that is there stays there, and what is away
     /// stays away.
     fn go_on(&mut self, at: u32) {
-        for who in self.rolls.iter_mut().flatten() {
+        for who in self.member_lists.iter_mut().flatten() {
             *who = match who {
                 Attendance::Joined | Attendance::Here => Attendance::Here,
                 Attendance::Left | Attendance::Away => Attendance::Away,
@@ -236,8 +236,8 @@ impl<'a> ShownWindows<'a> {
         for id in self.items.take_touched() {
             let is_there = self.turn.after.items[id as usize];
             let shown = is_there.then(|| self.now.item(id)).flatten();
-            let told = self.turn.news.items.get(&id);
-            let shown = shown.and_then(|shown| marked(shown, (true, true), told));
+            let reported = self.turn.changed.items.get(&id);
+            let shown = shown.and_then(|shown| marked(shown, (true, true), reported));
             self.items.show(at, id, shown);
         }
         for id in self.arrows.take_touched() {
@@ -247,12 +247,13 @@ impl<'a> ShownWindows<'a> {
             let is_there = ends && self.turn.after.arrows[id as usize];
             let shown = is_there.then(|| self.now.arrow(id)).flatten();
             let shown = shown.and_then(|shown| {
-                let news = &self.turn.news;
-                let ends = [arrow.from, arrow.to].map(|id| news.items.get(&id));
-                let ends = ends.map(|told| told.map(|told| (told.mark, &told.events[..])));
-                let told = news.arrows.get(&id).cloned();
-                let told = told.or_else(|| with_ends((true, true), ends));
-                marked(shown, (true, true), told.as_ref())
+                let changed = &self.turn.changed;
+                let ends = [arrow.from, arrow.to].map(|id| changed.items.get(&id));
+                let ends = ends
+                    .map(|reported| reported.map(|reported| (reported.mark, &reported.events[..])));
+                let reported = changed.arrows.get(&id).cloned();
+                let reported = reported.or_else(|| with_ends((true, true), ends));
+                marked(shown, (true, true), reported.as_ref())
             });
             self.arrows.show(at, id, shown);
         }
@@ -260,7 +261,12 @@ impl<'a> ShownWindows<'a> {
 }
 
 /// The presence of each member of each fleet, given the elements alive before and after the window.
-fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<Vec<Attendance>> {
+fn member_lists(
+    viewed: &Viewed,
+    before: &Alive,
+    after: &Alive,
+    is_first: bool,
+) -> Vec<Vec<Attendance>> {
     let attendance = |elements: &Vec<Element>| {
         let is = |alive: &Alive| elements.iter().any(|e| alive.is(*e));
         match (is(before), is(after)) {

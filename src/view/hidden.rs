@@ -112,7 +112,7 @@ mod tests {
     use crate::view::{Hide, NameFilter, ViewOptions, view};
 
     /// The notices, each as `count text`.
-    fn told(window: &str, options: &ViewOptions) -> Vec<String> {
+    fn reported(window: &str, options: &ViewOptions) -> Vec<String> {
         let (_, notices) = view(&mission(&[window]), options);
         notices
             .iter()
@@ -124,7 +124,7 @@ mod tests {
     fn hidden_elements_are_reported() {
         let window = "/a>/clock /a>/rosout /record_7</t /a>/t /b/x</t";
         assert_eq!(
-            told(window, &ViewOptions::default()),
+            reported(window, &ViewOptions::default()),
             [
                 "2 housekeeping left out (/clock, /rosout): `--hide none` shows it",
                 "1 recorder and player left out (/record_7): `--show-recorder` shows them",
@@ -134,14 +134,14 @@ mod tests {
             hide: Hide::NONE,
             ..ViewOptions::default()
         };
-        assert!(told(window, &all).is_empty());
+        assert!(reported(window, &all).is_empty());
         let narrow = ViewOptions {
             hide: Hide::NONE,
             ns_filter: NameFilter::parse("/b/.*").unwrap(),
             ..ViewOptions::default()
         };
         assert_eq!(
-            told(window, &narrow),
+            reported(window, &narrow),
             [
                 "2 nodes outside `--ns-filter` left out (/a, /record_7): widen the filter to see them",
                 "2 topics without a node inside `--ns-filter` left out (/clock, /rosout): widen the filter to see them",

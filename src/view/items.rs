@@ -435,7 +435,7 @@ impl Viewed {
         }
     }
 
-    /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not told
+    /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not reported
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
         let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);

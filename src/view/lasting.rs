@@ -89,8 +89,8 @@ impl<'a> LastingEvents<'a> {
         let lasting = self.open.iter().filter_map(|at| {
             let (id, event) = all[*at];
             let ended = Some(end(*at)).filter(|end| *end < window.end);
-            let is_told = ended.is_some() || event.kind == Kind::Restarted;
-            is_told.then_some(Lasting {
+            let is_reported = ended.is_some() || event.kind == Kind::Restarted;
+            is_reported.then_some(Lasting {
                 event: id,
                 what: event.what,
                 since: event.time,

@@ -10,7 +10,7 @@ use crate::graph::Element;
 use crate::mission::EventLog;
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
-/// The news of an item or arrow in a window.
+/// The changes of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Told {
     /// Whether something of it began, or ended.
@@ -27,7 +27,7 @@ pub(crate) struct Told {
 /// The parts of each headline, by their places in the event log.
 pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
-/// The news of one window by the id of the item or arrow.
+/// The changes of one window by the id of the item or arrow.
 #[derive(Default)]
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
@@ -37,44 +37,44 @@ pub(crate) struct News {
 }
 
 impl News {
-    /// The news of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
-    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is no
-    /// news.
+    /// The changes of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
+    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is
+    /// not a change.
     pub(crate) fn new(
         log: &EventLog,
         (parts, beginning): (&Parts, Option<Stamp>),
         (span, lasting): (Span, Vec<Lasting>),
         viewed: &Viewed,
     ) -> Self {
-        let mut news = Self::default();
+        let mut changed = Self::default();
         for last in &lasting {
             if let Some(event) = log.events.get(last.event as usize) {
-                news.tell(viewed, event, last.event, last.part());
+                changed.tell(viewed, event, last.event, last.part());
             }
         }
-        news.lasting = lasting;
+        changed.lasting = lasting;
         for (id, event) in log.headlines(span) {
             let is_start = matches!(event.kind, Kind::Started | Kind::Appeared);
             let is_first = is_start && beginning.is_some_and(|end| event.time < end);
             if is_first || !viewed.sees(event.what) {
                 continue;
             }
-            news.headlines.push(Headline {
+            changed.headlines.push(Headline {
                 event: id,
                 kind: event.kind,
                 what: event.what,
                 time: event.time,
             });
-            news.tell(viewed, event, id, Part::of(event, span));
+            changed.tell(viewed, event, id, Part::of(event, span));
             // A return has its own mark.
             let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
                 if let Some(part) = log.events.get(*part as usize) {
-                    news.tell(viewed, part, id, Part::Whole);
+                    changed.tell(viewed, part, id, Part::Whole);
                 }
             }
         }
-        news
+        changed
     }
 
     fn tell(&mut self, viewed: &Viewed, event: &Event, headline: EventId, part: Part) {
@@ -220,16 +220,16 @@ impl EventSign {
 
     /// Notes the event for an item or arrow; of several marks on the same one, the more telling one stays.
     fn keep(&self, all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach) {
-        let told = all.entry(id).or_default();
-        told.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
-        told.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
-        if let Err(place) = told.events.binary_search(&self.headline) {
-            told.events.insert(place, self.headline);
+        let reported = all.entry(id).or_default();
+        reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
+        reported.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
+        if let Err(place) = reported.events.binary_search(&self.headline) {
+            reported.events.insert(place, self.headline);
         }
         let mark = self.mark(reach);
-        if mark.map(weight) > told.mark.map(weight) {
-            told.mark = mark;
-            told.rates = self.rates.filter(|_| reach == Reach::Whole);
+        if mark.map(weight) > reported.mark.map(weight) {
+            reported.mark = mark;
+            reported.rates = self.rates.filter(|_| reach == Reach::Whole);
         }
     }
 }

@@ -137,10 +137,10 @@ mod tests {
             ..ViewOptions::default()
         };
         let mission = mission(&["/robot1/nav/planner>/robot1/plan"]);
-        let told = unmatched(&mission.elements, &options);
-        let told: Vec<&str> = told.iter().map(|notice| notice.text.as_str()).collect();
+        let reported = unmatched(&mission.elements, &options);
+        let reported: Vec<&str> = reported.iter().map(|notice| notice.text.as_str()).collect();
         assert_eq!(
-            told,
+            reported,
             [
                 "`--ns-filter -/rviz` matches no node; there are /robot1/nav/planner",
                 "`--topic-filter /robot1/plam` matches no topic; the nearest name is `/robot1/plan`",

@@ -448,10 +448,11 @@ mod tests {
         let windows = [all(&[1, 2, 3]), all(&[1, 2, 3, 4]), all(&[2, 3, 4])];
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let (seen, _) = view(&mission(&windows), &ViewOptions::default());
-        let rolls: Vec<&[Attendance]> = seen.frames.iter().map(|f| &f.rolls[0][..]).collect();
-        assert_eq!(rolls[0], [Here, Here, Here, Away]);
-        assert_eq!(rolls[1], [Here, Here, Here, Joined]);
-        assert_eq!(rolls[2], [Left, Here, Here, Here]);
+        let member_lists: Vec<&[Attendance]> =
+            seen.frames.iter().map(|f| &f.member_lists[0][..]).collect();
+        assert_eq!(member_lists[0], [Here, Here, Here, Away]);
+        assert_eq!(member_lists[1], [Here, Here, Here, Joined]);
+        assert_eq!(member_lists[2], [Left, Here, Here, Here]);
         let odom = seen
             .items
             .iter()

@@ -307,8 +307,8 @@ impl Serialize for ElementRuns {
     /// `[classes, rates, lifecycles, turns]`, each [`flat`]; empty lists at the end are left out.
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let lists = [&self.classes, &self.rates, &self.lifecycles, &self.turns];
-        let told = lists.iter().rposition(|list| !list.is_empty());
-        let lists = &lists[..told.map_or(0, |last| last + 1)];
+        let reported = lists.iter().rposition(|list| !list.is_empty());
+        let lists = &lists[..reported.map_or(0, |last| last + 1)];
         let all: Vec<Vec<u32>> = lists.iter().map(|list| flat(list)).collect();
         all.serialize(to)
     }
@@ -348,7 +348,7 @@ mod tests {
         Runs::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
     }
 
-    fn told(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
+    fn reported(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
         let life = &runs.arrows[0];
         let tell = |w| {
             let class = &runs.classes[at(&life.classes, w) as usize];
@@ -378,7 +378,7 @@ mod tests {
             ("active removed", "0"),
             ("off", "0"),
         ];
-        assert_eq!(told(&runs, 6), expected);
+        assert_eq!(reported(&runs, 6), expected);
     }
 
     #[test]
@@ -388,7 +388,7 @@ mod tests {
             serde_json::to_string(&runs.arrows).unwrap(),
             "[[[0,1],[0,1]]]"
         );
-        assert_eq!(told(&runs, 50)[49], ("active w2", "10"));
+        assert_eq!(reported(&runs, 50)[49], ("active w2", "10"));
     }
 
     #[test]

@@ -280,8 +280,8 @@ mod tests {
         let a = Showing::of([one.as_ref(), one.as_ref(), two.as_ref()]);
         let b = Showing::of([None, one.as_ref(), one.as_ref()]);
         let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
-        let told: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
+        let reported: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
         let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];
-        assert_eq!(told, want.map(|(a, b)| (Some(a), b)));
+        assert_eq!(reported, want.map(|(a, b)| (Some(a), b)));
     }
 }

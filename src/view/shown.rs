@@ -164,8 +164,9 @@ impl Shown {
         let mut rows: Vec<&TopicRow> = self.topics.iter().collect();
         let hz = |row: &TopicRow| row.hz.unwrap_or(0.0);
         rows.sort_by(|a, b| {
-            let news = b.mark.is_some().cmp(&a.mark.is_some());
-            news.then(hz(b).total_cmp(&hz(a)))
+            let changed = b.mark.is_some().cmp(&a.mark.is_some());
+            changed
+                .then(hz(b).total_cmp(&hz(a)))
                 .then(a.topic.cmp(&b.topic))
         });
         rows.into_iter()

@@ -6,12 +6,12 @@ use super::state::{LivingItems, Now};
 use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
-/// The items and arrows there before and after a window, and the news in between.
+/// The items and arrows there before and after a window, and the changes in between.
 #[derive(Default)]
 pub(super) struct WindowTurn {
     pub(super) before: LivingItems,
     pub(super) after: LivingItems,
-    pub(super) news: News,
+    pub(super) changed: News,
 }
 
 /// An item in a window with headlines.
@@ -31,7 +31,7 @@ impl WindowTurn {
             Marked {
                 is_there: shown.is_some(),
                 marked: shown.and_then(|shown| {
-                    let mut shown = marked(shown, there, self.news.items.get(&id))?;
+                    let mut shown = marked(shown, there, self.changed.items.get(&id))?;
                     let is_folded = item.kind == ItemKind::Namespace;
                     shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
                     Some(shown)
@@ -58,10 +58,10 @@ impl WindowTurn {
             let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
             let is_kept = ends.iter().any(is_back);
             let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
-            let told = self.news.arrows.get(&id).cloned();
+            let reported = self.changed.arrows.get(&id).cloned();
             let ends = ends.map(|end| Some((end.mark, &end.events[..])));
-            let told = told.or_else(|| with_ends(there, ends));
-            let shown = marked(shown, there, told.as_ref())?;
+            let reported = reported.or_else(|| with_ends(there, ends));
+            let shown = marked(shown, there, reported.as_ref())?;
             if arrow.kind != ArrowKind::Bundle {
                 return Some(shown);
             }
@@ -110,8 +110,8 @@ impl WindowTurn {
 
     /// The number of headlines reported on a folded namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
-        let told = self.news.headlines.iter();
-        let counts = Counts::of(told.filter(|h| shown.events.binary_search(&h.event).is_ok()));
+        let reported = self.changed.headlines.iter();
+        let counts = Counts::of(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
         (counts.total() > 0).then(|| Box::new(counts))
     }
 }
@@ -133,7 +133,7 @@ fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
     }
 }
 
-/// The news of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
+/// The changes of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
 /// before and is there after.
 pub(super) fn with_ends(
     there: (bool, bool),
@@ -159,27 +159,27 @@ pub(super) fn with_ends(
 
 /// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
 /// event.
-pub(super) fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
-    let Some(told) = told else {
+pub(super) fn marked(shown: Shown, there: (bool, bool), reported: Option<&Told>) -> Option<Shown> {
+    let Some(reported) = reported else {
         return there.1.then_some(shown);
     };
     let mark = match there {
-        (false, true) if told.came => Some(Mark::Added),
-        (_, false) if told.went => Some(Mark::Removed),
+        (false, true) if reported.came => Some(Mark::Added),
+        (_, false) if reported.went => Some(Mark::Removed),
         // It ended and began within one window.
-        (true, true) if told.came && told.went => told.mark.or(Some(Mark::Restarted)),
+        (true, true) if reported.came && reported.went => reported.mark.or(Some(Mark::Restarted)),
         // One of several that are drawn as one.
-        (true, true) if told.came || told.went => told.mark.or(Some(Mark::Inside)),
-        _ => told.mark,
+        (true, true) if reported.came || reported.went => reported.mark.or(Some(Mark::Inside)),
+        _ => reported.mark,
     };
     let is_gone = mark == Some(Mark::Removed);
     Some(Shown {
         mark,
         hz: if is_gone { Some(0.0) } else { shown.hz },
-        rates: told
+        rates: reported
             .rates
             .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
-        events: told.events.clone(),
+        events: reported.events.clone(),
         ..shown
     })
 }

@@ -68,15 +68,15 @@ impl ChunkPlan {
 
     /// The stated message count of a chunk per connection; `None` if a connection is not described or the counts are
     /// inconsistent.
-    pub(super) fn lump(&self, chunk: &Chunk) -> Option<Vec<(ConnectionId, u64)>> {
+    pub(super) fn chunk_count(&self, chunk: &Chunk) -> Option<Vec<(ConnectionId, u64)>> {
         let counts = self.counts.get(chunk.counts.clone())?;
         let known = |(raw, count): &(u32, u32)| {
             let id = self.connections.get(*raw);
             id.map(|id| (id, u64::from(*count)))
         };
-        let lump: Vec<_> = counts.iter().map(known).collect::<Option<_>>()?;
-        let sum: u64 = lump.iter().map(|(_, count)| count).sum();
-        (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(lump)
+        let chunk_count: Vec<_> = counts.iter().map(known).collect::<Option<_>>()?;
+        let sum: u64 = chunk_count.iter().map(|(_, count)| count).sum();
+        (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(chunk_count)
     }
 
     /// Whether `chunk` is stated to contain messages of a wanted connection; `false` if its counts are not kept.

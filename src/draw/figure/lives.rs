@@ -283,7 +283,7 @@ impl<'a> LivesFigure<'a> {
         y_of: impl Fn(usize) -> Option<f64>,
     ) -> Vec<(f64, f64, f64)> {
         let mut taken: Vec<(f64, f64, f64)> = Vec::new();
-        let mut told: Vec<((usize, usize), &String)> = Vec::new();
+        let mut reported: Vec<((usize, usize), &String)> = Vec::new();
         let stroke = Stroke::solid(ink::CHANGED, 0.3);
         for handover in &self.marks.handovers {
             let (Some(from), Some(to)) = (y_of(handover.from), y_of(handover.to)) else {
@@ -306,8 +306,8 @@ impl<'a> LivesFigure<'a> {
             taken.push((x, low, high));
             let (a, b) = (handover.from, handover.to);
             let pair = (a.min(b), a.max(b));
-            if !told.contains(&(pair, &handover.topic)) {
-                told.push((pair, &handover.topic));
+            if !reported.contains(&(pair, &handover.topic)) {
+                reported.push((pair, &handover.topic));
                 let most = place.axis.right - place.axis.left;
                 let text = canvas.cut(&handover.topic, Type::Small, most);
                 let wide = canvas.width(&text, Type::Small);
@@ -391,14 +391,14 @@ fn talk(
     }
     let (sends, receives) = (sent_by(source, track), received_by(source, track));
     let list = |topics: &[&str], most: usize| {
-        let told: Vec<&str> = topics
+        let reported: Vec<&str> = topics
             .iter()
             .take(most)
             .map(|t| relative(t, name))
             .collect();
-        match topics.len() - told.len() {
-            0 => told.join(", "),
-            more => format!("{} +{more}", told.join(", ")),
+        match topics.len() - reported.len() {
+            0 => reported.join(", "),
+            more => format!("{} +{more}", reported.join(", ")),
         }
     };
     let (mut a, mut b) = (sends.len(), receives.len());

@@ -149,8 +149,8 @@ fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>)
     }?;
     paint(&mut canvas, sheet, tracks, &drawn);
     let end = drawn.placed.size.h + 0.2;
-    let told = (groups.is_some(), drawn.placed.left_out, drawn.labels.len());
-    let y = below(&mut canvas, sheet, end, told, &drawn.alone);
+    let reported = (groups.is_some(), drawn.placed.left_out, drawn.labels.len());
+    let y = below(&mut canvas, sheet, end, reported, &drawn.alone);
     Some(canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Map")))
 }
 

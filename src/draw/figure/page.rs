@@ -234,9 +234,9 @@ fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
 
 /// The notes below the legend: the members of folded rows where no column tells them, and the number of events
 /// without a letter.
-fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
+fn lives_notes(lives: &LivesFigure<'_>, is_reported: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
-    for row in lives.rows.iter().filter(|_| !is_told) {
+    for row in lives.rows.iter().filter(|_| !is_reported) {
         if let FigureRow::Folded(all, space) = row {
             let names: Vec<&str> = all
                 .iter()

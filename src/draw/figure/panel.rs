@@ -1,4 +1,4 @@
-//! One step as a panel: its boxes by their fates, its arrows, its words.
+//! One step as a panel: its boxes by their states, its arrows, its words.
 
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::notes::{Unbroken, flow_at, sentence};
@@ -12,9 +12,9 @@ use crate::mission::EventId;
 /// The room inside a panel's border in millimetres.
 pub(crate) const INSIDE: f64 = 1.3;
 
-/// The fate of a box in a step.
+/// The state of a box in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fate {
+pub(crate) enum BoxState {
     Began,
     Ended,
     ChangedHands,
@@ -23,7 +23,7 @@ pub(crate) enum Fate {
 
 /// One box of a panel.
 pub(crate) struct PanelBox {
-    pub(crate) fate: Fate,
+    pub(crate) state: BoxState,
     /// The namespace of its names, `/robot2`; empty for that of the whole panel.
     pub(crate) space: String,
     pub(crate) lines: Vec<String>,
@@ -46,7 +46,7 @@ impl PanelBox {
         let names = self
             .lines
             .iter()
-            .map(|l| canvas.width(l, type_of(self.fate)));
+            .map(|l| canvas.width(l, type_of(self.state)));
         let widest = names.fold(0.0, f64::max);
         let space = canvas.width(&self.space, Type::Small);
         let (wide, rows) = if self.has_head() {
@@ -67,7 +67,7 @@ pub(crate) struct Panel {
     /// The namespace of the names that have none before them; empty if there is none.
     pub(crate) home: String,
     pub(crate) looks: Vec<PanelBox>,
-    pub(crate) talks: Vec<(Talk, Fate)>,
+    pub(crate) talks: Vec<(Talk, BoxState)>,
     pub(crate) labels: Vec<Vec<Vec<String>>>,
     pub(crate) placed: PlacedPanel,
     pub(crate) notes: Vec<(Color, String)>,
@@ -82,14 +82,14 @@ impl Panel {
     /// The nodes that began and ended, without namespaces and numbers, sorted: equal for steps that repeat each other.
     pub(crate) fn changes(&self) -> Vec<(bool, String)> {
         let changed = self.looks.iter().filter(|look| {
-            let fates = [Fate::Began, Fate::Ended];
-            fates.contains(&look.fate)
+            let states = [BoxState::Began, BoxState::Ended];
+            states.contains(&look.state)
         });
         let names = changed.flat_map(|look| {
             let is_digit = |c: char| c.is_ascii_digit() || c == '_';
             let plain = move |line: &String| line.trim_end_matches(is_digit).to_owned();
             let names = look.lines.iter().map(plain);
-            names.map(|name| (look.fate == Fate::Began, name))
+            names.map(|name| (look.state == BoxState::Began, name))
         });
         let mut names: Vec<_> = names.collect();
         names.sort();
@@ -103,8 +103,8 @@ pub(crate) fn items(notes: &[(Color, String)]) -> Vec<Unbroken> {
     notes.iter().map(item).collect()
 }
 
-pub(crate) fn type_of(fate: Fate) -> Type {
-    if fate == Fate::Neighbour {
+pub(crate) fn type_of(state: BoxState) -> Type {
+    if state == BoxState::Neighbour {
         Type::Small
     } else {
         Type::Strong
@@ -129,13 +129,13 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
         .placed
         .clone()
         .moved(aside, rect.y + INSIDE * 0.8 + canvas.sizes.pitch() + 0.6);
-    for (at, (talk, fate)) in panel.talks.iter().enumerate() {
-        let color = match fate {
-            Fate::Ended => ink::REMOVED,
-            Fate::Neighbour => ink::LINE,
-            Fate::Began | Fate::ChangedHands => ink::ADDED,
+    for (at, (talk, state)) in panel.talks.iter().enumerate() {
+        let color = match state {
+            BoxState::Ended => ink::REMOVED,
+            BoxState::Neighbour => ink::LINE,
+            BoxState::Began | BoxState::ChangedHands => ink::ADDED,
         };
-        let dash: &[f64] = if *fate == Fate::Ended {
+        let dash: &[f64] = if *state == BoxState::Ended {
             &[0.9, 0.6]
         } else {
             &[]
@@ -152,14 +152,14 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
 }
 
 fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
-    let (fill, color, dash, width) = match look.fate {
-        Fate::Began => (ink::ADDED_FILL, ink::ADDED, &[][..], 0.38),
-        Fate::Ended => (ink::PAPER, ink::REMOVED, &[1.1, 0.7][..], 0.38),
-        Fate::ChangedHands => (ink::CHANGED_FILL, ink::CHANGED, &[][..], 0.3),
-        Fate::Neighbour => (ink::TINT, ink::RULE, &[][..], HAIRLINE),
+    let (fill, color, dash, width) = match look.state {
+        BoxState::Began => (ink::ADDED_FILL, ink::ADDED, &[][..], 0.38),
+        BoxState::Ended => (ink::PAPER, ink::REMOVED, &[1.1, 0.7][..], 0.38),
+        BoxState::ChangedHands => (ink::CHANGED_FILL, ink::CHANGED, &[][..], 0.3),
+        BoxState::Neighbour => (ink::TINT, ink::RULE, &[][..], HAIRLINE),
     };
     canvas.frame(rect, 0.6, fill, &Stroke::dashed(color, width, dash));
-    if look.fate == Fate::ChangedHands {
+    if look.state == BoxState::ChangedHands {
         // A double frame, to be distinguishable in grey print.
         let inner = Stroke::solid(ink::CHANGED, HAIRLINE);
         canvas.frame(rect.grown(-0.45), 0.3, Color::NONE, &inner);
@@ -174,20 +174,20 @@ fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     };
     for (k, text) in look.lines.iter().enumerate() {
         let x = rect.x + 1.0 + aside;
-        canvas.text(x, y(k + below), type_of(look.fate), ink::TEXT, text);
+        canvas.text(x, y(k + below), type_of(look.state), ink::TEXT, text);
     }
-    if matches!(look.fate, Fate::Began | Fate::Ended) {
-        badge(canvas, Point::new(rect.right(), rect.y), look.fate, color);
+    if matches!(look.state, BoxState::Began | BoxState::Ended) {
+        badge(canvas, Point::new(rect.right(), rect.y), look.state, color);
     }
 }
 
 /// Draws a disc with a plus or a minus at a corner.
-fn badge(canvas: &mut PaperCanvas<'_>, at: Point, fate: Fate, color: Color) {
+fn badge(canvas: &mut PaperCanvas<'_>, at: Point, state: BoxState, color: Color) {
     canvas.disc(at, 0.75, color, &Stroke::default());
     let sign = Stroke::solid(ink::PAPER, 0.26);
     let (x, y, half) = (at.x, at.y, 0.42);
     canvas.line(Point::new(x - half, y), Point::new(x + half, y), &sign);
-    if fate == Fate::Began {
+    if state == BoxState::Began {
         canvas.line(Point::new(x, y - half), Point::new(x, y + half), &sign);
     }
 }

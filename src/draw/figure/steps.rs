@@ -14,7 +14,7 @@ use super::groups::{cut, depths, groups};
 use super::marks::{Marks, Sign};
 use super::notes::{Unbroken, flow, sentence};
 use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
-use super::panel::{Fate, INSIDE, Panel, PanelBox, items, paint};
+use super::panel::{BoxState, INSIDE, Panel, PanelBox, items, paint};
 use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
@@ -53,22 +53,22 @@ struct StepSource<'s> {
 
 /// The figure and its remarks.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
-    let mut studio = StepSource::new(sheet)?;
-    let columns = studio.columns;
-    let mut chosen = studio.chosen()?;
+    let mut steps = StepSource::new(sheet)?;
+    let columns = steps.columns;
+    let mut chosen = steps.chosen()?;
     loop {
-        let panels: Option<Vec<Panel>> = chosen.iter().map(|k| studio.panel(*k)).collect();
+        let panels: Option<Vec<Panel>> = chosen.iter().map(|k| steps.panel(*k)).collect();
         let Some(mut panels) = panels else {
             // Fewer panels side by side are wider; shorter namespaces make fewer groups.
-            match (studio.columns, studio.depth) {
-                (1, 1) => return Err(studio.too_wide()),
-                (1, _) => (studio.columns, studio.depth) = (columns, studio.depth - 1),
-                _ => studio.columns -= 1,
+            match (steps.columns, steps.depth) {
+                (1, 1) => return Err(steps.too_wide()),
+                (1, _) => (steps.columns, steps.depth) = (columns, steps.depth - 1),
+                _ => steps.columns -= 1,
             }
             continue;
         };
-        let (left, repeated) = (studio.left_out(&chosen), studio.fold_repeated(&mut panels));
-        let scene = studio.page(&panels, &repeated, left);
+        let (left, repeated) = (steps.left_out(&chosen), steps.fold_repeated(&mut panels));
+        let scene = steps.page(&panels, &repeated, left);
         if scene.size.h <= MOST_HEIGHT * PX_PER_MM {
             return Ok((scene, Vec::new()));
         }
@@ -78,7 +78,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
                 "`--steps 3` shows fewer of them, `--rows groups` makes them smaller, `--ns-filter` leaves nodes out",
             ));
         }
-        studio.drop_least(&mut chosen);
+        steps.drop_least(&mut chosen);
     }
 }
 
@@ -185,9 +185,9 @@ impl<'s> StepSource<'s> {
             .filter(|at| !began.contains(at) && !ended.contains(at))
             .collect();
         let mut boxes = self.boxes(&[
-            (Fate::Began, &began),
-            (Fate::Ended, &ended),
-            (Fate::ChangedHands, &partners),
+            (BoxState::Began, &began),
+            (BoxState::Ended, &ended),
+            (BoxState::ChangedHands, &partners),
         ]);
         let mut vertex: Vec<Option<usize>> = vec![None; self.tracks.len()];
         for (k, (_, members)) in boxes.iter().enumerate() {
@@ -197,20 +197,20 @@ impl<'s> StepSource<'s> {
         }
         let changed = boxes.len();
         let linked = self.neighbours(k, &mut boxes, &mut vertex, (before, after));
-        let fates: Vec<Fate> = boxes.iter().map(|(fate, _)| *fate).collect();
-        let talks = self.talks(k, &vertex, &fates, &handed);
+        let states: Vec<BoxState> = boxes.iter().map(|(state, _)| *state).collect();
+        let talks = self.talks(k, &vertex, &states, &handed);
         let home = self.home(&boxes);
         let looks: Vec<PanelBox> = boxes
             .iter()
             .enumerate()
-            .map(|(at, (fate, members))| {
+            .map(|(at, (state, members))| {
                 let named = (at >= changed).then(|| linked.get(&at).copied()).flatten();
                 let mut events = self.events(k, members);
                 let turned = turned
                     .iter()
                     .flat_map(|t| members.iter().filter_map(|m| t.get(m)));
                 events.extend(turned.flatten());
-                let mut look = self.look(*fate, members, named, home);
+                let mut look = self.look(*state, members, named, home);
                 look.events = events.into_iter().collect();
                 look
             })
@@ -264,23 +264,23 @@ impl<'s> StepSource<'s> {
     }
 
     /// The changed nodes: one by one if they are few, else by groups.
-    fn boxes(&self, kinds: &[(Fate, &BTreeSet<usize>)]) -> Vec<(Fate, Vec<usize>)> {
+    fn boxes(&self, kinds: &[(BoxState, &BTreeSet<usize>)]) -> Vec<(BoxState, Vec<usize>)> {
         let many: usize = kinds.iter().map(|(_, own)| own.len()).sum();
         let grouped = match self.sheet.options.rows {
             Some(rows) => rows == RowKind::Groups,
             None => many > ONE_BY_ONE,
         };
         let mut all = Vec::new();
-        for (fate, own) in kinds {
+        for (state, own) in kinds {
             if !grouped {
-                all.extend(own.iter().map(|at| (*fate, vec![*at])));
+                all.extend(own.iter().map(|at| (*state, vec![*at])));
                 continue;
             }
             let mut spaces: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
             for at in *own {
                 spaces.entry(self.space(*at)).or_default().push(*at);
             }
-            all.extend(spaces.into_values().map(|members| (*fate, members)));
+            all.extend(spaces.into_values().map(|members| (*state, members)));
         }
         all
     }
@@ -289,18 +289,21 @@ impl<'s> StepSource<'s> {
     fn neighbours(
         &self,
         k: usize,
-        boxes: &mut Vec<(Fate, Vec<usize>)>,
+        boxes: &mut Vec<(BoxState, Vec<usize>)>,
         vertex: &mut [Option<usize>],
         names: (&BTreeSet<Arc<str>>, &BTreeSet<Arc<str>>),
     ) -> BTreeMap<usize, usize> {
         let source = self.sheet.source;
         let own: Vec<Option<usize>> = (0..self.tracks.len()).map(Some).collect();
         let mut links: BTreeMap<usize, usize> = BTreeMap::new();
-        for (phase, names, fate) in [(k - 1, names.0, Fate::Ended), (k, names.1, Fate::Began)] {
+        for (phase, names, state) in [
+            (k - 1, names.0, BoxState::Ended),
+            (k, names.1, BoxState::Began),
+        ] {
             let range = source.phases[phase].span;
             for talk in self.talks.between(&own, range, true) {
                 for (a, b) in [(talk.from, talk.to), (talk.to, talk.from)] {
-                    let changes = vertex[a].is_some_and(|v| boxes[v].0 == fate);
+                    let changes = vertex[a].is_some_and(|v| boxes[v].0 == state);
                     let stays = vertex[b].is_none() && names.contains(&self.tracks[b].name);
                     if changes && stays {
                         *links.entry(b).or_default() += 1;
@@ -328,7 +331,7 @@ impl<'s> StepSource<'s> {
                 vertex[*at] = Some(boxes.len());
             }
             linked.insert(boxes.len(), best);
-            boxes.push((Fate::Neighbour, free));
+            boxes.push((BoxState::Neighbour, free));
         }
         linked
     }
@@ -339,22 +342,22 @@ impl<'s> StepSource<'s> {
         &self,
         k: usize,
         vertex: &[Option<usize>],
-        fates: &[Fate],
+        states: &[BoxState],
         handed: &[(u32, Arc<str>, Arc<str>, EventId)],
-    ) -> Vec<(Talk, Fate)> {
+    ) -> Vec<(Talk, BoxState)> {
         let source = self.sheet.source;
         let mut all = Vec::new();
-        for (phase, fate) in [(k - 1, Fate::Ended), (k, Fate::Began)] {
+        for (phase, state) in [(k - 1, BoxState::Ended), (k, BoxState::Began)] {
             let range = source.phases[phase].span;
             for mut talk in self.talks.between(vertex, range, true) {
-                let ends = [fates[talk.from], fates[talk.to]];
-                if ends.contains(&fate) {
-                    all.push((talk, fate));
+                let ends = [states[talk.from], states[talk.to]];
+                if ends.contains(&state) {
+                    all.push((talk, state));
                     continue;
                 }
-                if !ends.contains(&Fate::ChangedHands)
-                    || ends.contains(&Fate::Began)
-                    || ends.contains(&Fate::Ended)
+                if !ends.contains(&BoxState::ChangedHands)
+                    || ends.contains(&BoxState::Began)
+                    || ends.contains(&BoxState::Ended)
                 {
                     continue;
                 }
@@ -362,12 +365,12 @@ impl<'s> StepSource<'s> {
                 talk.topics.retain(|(topic, _)| {
                     let moved = handed.iter().find(|(t, ..)| t == topic);
                     moved.is_some_and(|(_, from, to, _)| {
-                        let sender = if fate == Fate::Ended { from } else { to };
+                        let sender = if state == BoxState::Ended { from } else { to };
                         self.track(sender).and_then(|at| vertex[at]) == Some(talk.from)
                     })
                 });
                 if !talk.topics.is_empty() {
-                    all.push((talk, fate));
+                    all.push((talk, state));
                 }
             }
         }
@@ -376,7 +379,7 @@ impl<'s> StepSource<'s> {
 
     /// The namespace that most boxes are in, which the panel then says once; `None` if it is the root, or that of one
     /// box.
-    fn home(&self, boxes: &[(Fate, Vec<usize>)]) -> Option<&str> {
+    fn home(&self, boxes: &[(BoxState, Vec<usize>)]) -> Option<&str> {
         let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
         for first in boxes.iter().filter_map(|(_, members)| members.first()) {
             *spaces.entry(self.space(*first)).or_default() += 1;
@@ -394,7 +397,7 @@ impl<'s> StepSource<'s> {
 
     fn look(
         &self,
-        fate: Fate,
+        state: BoxState,
         members: &[usize],
         named: Option<usize>,
         home: Option<&str>,
@@ -416,7 +419,7 @@ impl<'s> StepSource<'s> {
         let space = members.first().map_or("/", |at| self.space(*at));
         let space = if Some(space) == home { "" } else { space };
         PanelBox {
-            fate,
+            state,
             space: space.to_owned(),
             lines,
             events: Vec::new(),
@@ -427,7 +430,7 @@ impl<'s> StepSource<'s> {
         &self,
         canvas: &PaperCanvas<'_>,
         looks: &[PanelBox],
-        talks: &[(Talk, Fate)],
+        talks: &[(Talk, BoxState)],
         labels: &[Vec<Vec<String>>],
     ) -> Option<PlacedPanel> {
         let vertex = |look: &PanelBox| Vertex {

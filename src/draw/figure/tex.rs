@@ -14,12 +14,12 @@ pub(crate) fn caption(
     let mut parts = vec![what(options.kind).to_owned()];
     if !source.phases.is_empty() {
         let start = source.span().start;
-        let told = source.phases.iter().enumerate().map(|(k, phase)| {
+        let reported = source.phases.iter().enumerate().map(|(k, phase)| {
             let at = clock(phase.span.start.since(start));
             format!("{} {} from {at}", k + 1, escaped(&title(source, k)))
         });
-        let told: Vec<String> = told.collect();
-        parts.push(format!("Phases: {}.", told.join("; ")));
+        let reported: Vec<String> = reported.collect();
+        parts.push(format!("Phases: {}.", reported.join("; ")));
     }
     if let Some(bag) = source.mission.bags.first() {
         let length = words::duration(source.span().nanos());

@@ -264,7 +264,7 @@ mod tests {
         Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
     }
 
-    fn told(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
+    fn reported(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
         let pieces = |all: &&[(i64, i64, f64)]| {
             let piece = |(from, to, hz): &(i64, i64, f64)| Piece {
                 span: span(*from, *to),
@@ -281,17 +281,17 @@ mod tests {
 
     #[test]
     fn rates_add_up_while_they_overlap() {
-        let found = told(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
+        let found = reported(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
         assert_eq!(found, [(0, 50, 10.0), (50, 100, 15.0), (100, 200, 5.0)]);
     }
 
     #[test]
     fn invisibly_short_runs_are_not_steps() {
-        let found = told(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
+        let found = reported(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
         assert_eq!(found, [(0, 100, 15.0)]);
-        let found = told(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
+        let found = reported(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
         assert_eq!(found, [(0, 200, 10.0)]);
-        let found = told(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
+        let found = reported(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
         assert_eq!(found, [(0, 100, 10.0), (150, 200, 10.0)]);
     }
 }

@@ -1,6 +1,6 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::boxes::{class, told};
+use super::boxes::{class, reported};
 use super::measured::{LINE, arrow_label};
 use super::options::{self, ArrowLook};
 use super::page::GraphFit;
@@ -216,7 +216,7 @@ impl Arrows<'_> {
         let mut group = Group {
             id: track.id.clone(),
             class: class(&format!("edge {}", arrow.class()), shown),
-            data: told(vec![("from", from.clone()), ("to", to.clone())], shown),
+            data: reported(vec![("from", from.clone()), ("to", to.clone())], shown),
             title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
         };

@@ -1,7 +1,7 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
 use super::card::Card;
-use super::measured::{LINE, Label, Tells, pendant, second_line};
+use super::measured::{LINE, Label, Tells, rate_label, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::spaces::Space;
@@ -189,7 +189,7 @@ impl Boxes<'_> {
         let second = second_line(shown, card.tells);
         let second = second.unwrap_or_else(|| card.label.silence(shown, card.tells).to_owned());
         self.lines(&mut group, &card.label, &second, inner, body, &look);
-        if let Some(text) = pendant(shown, card.tells) {
+        if let Some(text) = rate_label(shown, card.tells) {
             let (below, size) = self.below(place);
             let paint = (look.stroke.color, style.badge.sign);
             badge::pill(&mut group, self.fonts, paint, &text, below, size);
@@ -200,7 +200,7 @@ impl Boxes<'_> {
         group
     }
 
-    /// The middle of the pendant of a box and its font size: over the lower edge, clear of the name, and at most as far
+    /// The middle of the rate label of a box and its font size: over the lower edge, clear of the name, and at most as far
     /// down as boxes are apart.
     fn below(&self, place: Rect) -> (Point, f64) {
         let size = self.style.edge.size * self.fit.scale * 0.95;
@@ -210,8 +210,8 @@ impl Boxes<'_> {
         )
     }
 
-    /// The words of the pendant of a box, without the pill.
-    pub(crate) fn pendant_text(&self, place: Rect, text: &str) -> Text {
+    /// The words of the rate label of a box, without the pill.
+    pub(crate) fn rate_label_text(&self, place: Rect, text: &str) -> Text {
         let (below, size) = self.below(place);
         Text {
             at: Point::new(below.x, below.y + size * 0.36),
@@ -370,11 +370,11 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
     data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
     let members = shown.members.number();
     data.extend(members.map(|(number, _)| ("members", number.to_string())));
-    told(data, shown)
+    reported(data, shown)
 }
 
 /// The attributes of an element, with the places in the event log of its headlines in this window.
-pub(crate) fn told(
+pub(crate) fn reported(
     mut data: Vec<(&'static str, String)>,
     shown: &Shown,
 ) -> Vec<(&'static str, String)> {

@@ -41,8 +41,11 @@ fn changed(counts: &Counts) -> String {
         (counts.values, count(counts.values, "state")),
         (counts.rates, count(counts.rates, "rate")),
     ];
-    let told = parts.into_iter().filter(|(n, _)| *n > 0);
-    told.map(|(_, words)| words).collect::<Vec<_>>().join(", ")
+    let reported = parts.into_iter().filter(|(n, _)| *n > 0);
+    reported
+        .map(|(_, words)| words)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// The words for changes inside a folded namespace: `+1 −4 nodes, 1 restarted`.
@@ -59,8 +62,8 @@ pub(crate) fn inside(counts: &Counts) -> String {
         pair(counts.edges_added, counts.edges_removed, "edge"),
         changed(counts),
     ];
-    let told = parts.into_iter().filter(|words| !words.is_empty());
-    told.collect::<Vec<_>>().join(", ")
+    let reported = parts.into_iter().filter(|words| !words.is_empty());
+    reported.collect::<Vec<_>>().join(", ")
 }
 
 /// The rate that is written, with no more digits than its messages allow; `None` for none.

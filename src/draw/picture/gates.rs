@@ -114,17 +114,17 @@ impl Gate {
 
     /// Whether each line is drawn on its own in some window.
     pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (usize, bool)> {
-        let news = |at: usize| {
+        let changed = |at: usize| {
             let shown = view.arrows_shown.get(at);
             shown.is_some_and(|shown| !shown.looks().iter().all(is_quiet))
         };
-        let is_lead_news = news(self.lead);
+        let is_lead_news = changed(self.lead);
         let all = self.members.iter();
-        all.map(move |(at, _)| (*at, is_lead_news || news(*at)))
+        all.map(move |(at, _)| (*at, is_lead_news || changed(*at)))
     }
 
     /// The look of the line for all that are quiet in a window, and those; `None` if there are none, or if the lead is
-    /// news itself.
+    /// changed itself.
     pub(crate) fn shown<'a>(
         &self,
         view: &View,

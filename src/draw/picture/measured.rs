@@ -270,16 +270,16 @@ impl Measurer<'_> {
     /// The room for the widest label that each arrow shows in some window.
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
-        let told = told_by_arrows(self.view);
+        let reported = told_by_arrows(self.view);
         let nothing = Showing::default();
         let all = self
             .view
             .arrows
             .iter()
             .zip(&self.view.arrows_shown)
-            .zip(told)
+            .zip(reported)
             .zip(topics);
-        let rooms = all.map(|(((arrow, showing), is_told), names)| {
+        let rooms = all.map(|(((arrow, showing), is_reported), names)| {
             let mut widest = None;
             if arrow.kind == ArrowKind::Bundle {
                 // The box of a topic has its name and its rate.
@@ -294,9 +294,9 @@ impl Measurer<'_> {
             }
             // A subscription shows its rate if its topic has another.
             let topic = self.view.items_shown.get(arrow.from as usize);
-            let topic = topic.filter(|_| is_told && arrow.kind == ArrowKind::Subscribe);
+            let topic = topic.filter(|_| is_reported && arrow.kind == ArrowKind::Subscribe);
             let looks = both(
-                if is_told { showing } else { &nothing },
+                if is_reported { showing } else { &nothing },
                 topic.unwrap_or(&nothing),
             );
             for (shown, topic) in looks {
@@ -353,10 +353,10 @@ pub(crate) fn tells(view: &View) -> Vec<Tells> {
 /// Whether each arrow shows its rate: a publication whose topic does not, a subscription with another rate.
 fn told_by_arrows(view: &View) -> Vec<bool> {
     let tells = tells(view);
-    let told = |arrow: &Arrow| {
+    let reported = |arrow: &Arrow| {
         arrow.kind != ArrowKind::Publish || tells.get(arrow.to as usize) != Some(&Tells::Rates)
     };
-    view.arrows.iter().map(told).collect()
+    view.arrows.iter().map(reported).collect()
 }
 
 /// The text of an arrow in a window, and whether it stands on a pill because it changed.
@@ -414,8 +414,8 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     }
 }
 
-/// The pendant of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
-pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
+/// The rate label of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
+pub(crate) fn rate_label(shown: &Shown, tells: Tells) -> Option<String> {
     let (before, now) = shown.rates.filter(|_| tells == Tells::Changes)?;
     Some(words::rate_change(before, now))
 }

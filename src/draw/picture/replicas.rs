@@ -1,4 +1,4 @@
-//! The roll call of equal namespaces that are drawn as one: a chip for each, and their number over time.
+//! The member list of equal namespaces that are drawn as one: a chip for each, and their number over time.
 
 use super::boxes::Boxes;
 use super::spaces::Space;
@@ -8,7 +8,7 @@ use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Attendance, View};
 
-/// The chips of the roll call of a namespace that stands for several: left edges and widths, from where the title begins.
+/// The chips of the member list of a namespace that stands for several: left edges and widths, from where the title begins.
 pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
     if space.replicas.len() > MOST_CHIPS {
         return Vec::new();
@@ -47,7 +47,7 @@ pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f6
 pub(crate) fn shares(view: &View, nth: usize) -> Vec<(f64, f64)> {
     let mut shares: Vec<(f64, f64)> = Vec::new();
     for (k, frame) in view.frames.iter().enumerate() {
-        let Some(who) = frame.rolls.get(nth).filter(|who| !who.is_empty()) else {
+        let Some(who) = frame.member_lists.get(nth).filter(|who| !who.is_empty()) else {
             continue;
         };
         let here = who.iter().filter(|who| who.is_here()).count();
@@ -86,7 +86,7 @@ fn steps(course: &[(f64, f64)], area: &Rect) -> Form {
 
 impl Boxes<'_> {
     /// The chips of several equal namespaces: one for each, filled while it is there, in the colour of its change.
-    pub(crate) fn roll(
+    pub(crate) fn member_list(
         &self,
         space: &Space,
         (place, by): (Rect, f64),

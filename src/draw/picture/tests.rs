@@ -303,9 +303,14 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
         let windows: Vec<String> = counts.iter().map(|n| robots(*n)).collect();
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let scenes = scenes(&windows);
-        let rolls = scenes.iter().map(|scene| {
-            let roll = scene.groups.iter().find(|group| group.class == "roll");
-            let shapes = roll.into_iter().flat_map(|roll| &roll.pieces);
+        let member_lists = scenes.iter().map(|scene| {
+            let member_list = scene
+                .groups
+                .iter()
+                .find(|group| group.class == "roll");
+            let shapes = member_list
+                .into_iter()
+                .flat_map(|member_list| &member_list.pieces);
             let paths = shapes.filter_map(|piece| match piece {
                 Piece::Shape(shape) => match &shape.form {
                     Form::Path(steps) => Some(steps.clone()),
@@ -315,14 +320,14 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
             });
             paths.collect::<Vec<_>>()
         });
-        rolls.collect::<Vec<_>>()
+        member_lists.collect::<Vec<_>>()
     };
-    let told = lines(&[3, 4, 4]);
-    assert!(told.iter().all(|paths| paths.len() == 2));
+    let reported = lines(&[3, 4, 4]);
+    assert!(reported.iter().all(|paths| paths.len() == 2));
     // Up once, and on to the end; the same in every window, in which only the mark of the time moves.
-    assert_eq!(told[0][0].len(), 4);
-    assert_eq!(told[0][0], told[2][0]);
-    assert_ne!(told[0][1], told[2][1]);
+    assert_eq!(reported[0][0].len(), 4);
+    assert_eq!(reported[0][0], reported[2][0]);
+    assert_ne!(reported[0][1], reported[2][1]);
     assert!(lines(&[3, 3]).iter().all(Vec::is_empty));
 }
 
@@ -368,8 +373,8 @@ fn bundles(windows: &[&str]) -> Vec<Vec<String>> {
 #[test]
 fn quiet_lines_to_a_box_outside_begin_at_the_frame_as_one() {
     let quiet = "/r/a>/x@3 /r/b>/y@2 /f</x /f</y /r/a>/z@4 /r/b</z";
-    let news = "/r/a>/x@3 /r/b>/y@20 /f</x /f</y /r/a>/z@4 /r/b</z";
-    let [first, second] = &bundles(&[quiet, news])[..] else {
+    let changed = "/r/a>/x@3 /r/b>/y@20 /f</x /f</y /r/a>/z@4 /r/b</z";
+    let [first, second] = &bundles(&[quiet, changed])[..] else {
         panic!("two windows");
     };
     assert_eq!(first, &["/r > /f: x 3 Hz, y 2 Hz", "/r/a > /r/b: z 4 Hz"]);

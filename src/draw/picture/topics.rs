@@ -120,12 +120,12 @@ fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
 /// those that changed or the one with the highest rate, with the number of the others.
 pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let both = uses(shown) == [true, true];
-    let news = shown.topics.iter().filter(|row| row.mark.is_some()).count();
+    let changed = shown.topics.iter().filter(|row| row.mark.is_some()).count();
     let all = shown.topics.len();
     let most = if all <= MOST {
         all
     } else {
-        news.clamp(1, MOST)
+        changed.clamp(1, MOST)
     };
     let is_whole = shown.mark.is_some_and(|mark| mark.class() == "removed");
     let mut rows: Vec<Row> = Vec::new();

@@ -130,7 +130,7 @@ impl Picture<'_> {
                 let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);
                 let tells_changes = card.tells == Tells::Changes && marks.iter().any(is_rate);
                 if tells_changes {
-                    group.text(boxes.pendant_text(card.place, "-"));
+                    group.text(boxes.rate_label_text(card.place, "-"));
                 }
                 UnionElement {
                     group,
@@ -190,7 +190,7 @@ impl Picture<'_> {
     }
 }
 
-/// An element without news, with or without a rate.
+/// An element without a change, with or without a rate.
 fn plain(hz: Option<f64>) -> Shown {
     Shown {
         hz,

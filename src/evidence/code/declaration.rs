@@ -132,13 +132,13 @@ impl Call {
             self.declaration(role, self.topic.as_ref().map(beside), types)
         };
         // The roles on an action's outgoing (feedback, result, status) and incoming (goal, cancel) topics.
-        let action1 = |tells, told| {
+        let action1 = |tells, stated| {
             vec![
                 one(tells, "/feedback", "Feedback"),
                 one(tells, "/result", "Result"),
                 fixed(tells, "/status", "actionlib_msgs/GoalStatusArray"),
-                one(told, "/goal", "Goal"),
-                fixed(told, "/cancel", "actionlib_msgs/GoalID"),
+                one(stated, "/goal", "Goal"),
+                fixed(stated, "/cancel", "actionlib_msgs/GoalID"),
             ]
         };
         let action2 = |tells| {

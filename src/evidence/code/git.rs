@@ -105,12 +105,12 @@ fn prefix(folder: &Path) -> std::result::Result<String, String> {
 
 /// `code of 2025-12-03 (8e54c1a), the last commit before the recording's end`
 fn words(folder: &Path, commit: &str, version: &Version) -> String {
-    let told = ask(
+    let stated = ask(
         folder,
         &["rev-list", "--max-count=1", "--timestamp", commit],
     )
     .unwrap_or_default();
-    let seconds: i64 = told
+    let seconds: i64 = stated
         .split(' ')
         .next()
         .and_then(|t| t.parse().ok())

@@ -32,7 +32,7 @@ pub(super) struct RecordedTopics {
     /// By name: the topic and its types.
     topics: BTreeMap<String, (Name, BTreeSet<String>)>,
     /// Topics with known publishers in their messages.
-    pub(super) told: BTreeSet<Name>,
+    pub(super) stated: BTreeSet<Name>,
     /// Elements known already, by more than a declaration.
     proved: BTreeSet<ElementKey>,
 }
@@ -215,7 +215,7 @@ impl RecordedTopics {
     fn of(known: &Conclusions<'_>) -> Self {
         let mut all = Self {
             topics: BTreeMap::new(),
-            told: BTreeSet::new(),
+            stated: BTreeSet::new(),
             proved: known
                 .inferences
                 .iter()
@@ -232,7 +232,7 @@ impl RecordedTopics {
                 .or_insert_with(|| (stream.topic, BTreeSet::new()));
             types.insert(type_key(&stream.connection.type_name));
             if stream.publisher.is_some() {
-                all.told.insert(stream.topic);
+                all.stated.insert(stream.topic);
             }
         }
         all
@@ -392,7 +392,7 @@ fn draw(
 fn has_room(known: &Conclusions<'_>, recorded: &RecordedTopics, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
     let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);
-    !recorded.told.contains(&topic) && publishers < offered
+    !recorded.stated.contains(&topic) && publishers < offered
 }
 
 /// `arm/servo.py:41  create_subscription(…); the node is named by rosout; launched at arm.launch.py:67; code of …`

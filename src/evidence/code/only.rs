@@ -280,7 +280,7 @@ fn reason(
 ) -> Option<NotDrawn> {
     let found = &candidates[0].found;
     if found.role == Role::Publishes
-        && (bag.recorded.told.contains(&found.topic)
+        && (bag.recorded.stated.contains(&found.topic)
             || known.publishers(found.topic).next().is_some())
     {
         return Some(NotDrawn::KnownPublisher);

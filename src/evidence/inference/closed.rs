@@ -17,7 +17,7 @@ pub(crate) struct Closed {
     /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
     settled: BTreeSet<Name>,
     /// Topics whose every message names its publisher, with all these publishers.
-    told: BTreeMap<Name, BTreeSet<Name>>,
+    stated: BTreeMap<Name, BTreeSet<Name>>,
 }
 
 impl Closed {
@@ -65,20 +65,20 @@ impl Closed {
         for stream in known.streams {
             match stream.publisher {
                 Some(node) if stream.trust == Reliability::Whole => {
-                    self.told.entry(stream.topic).or_default().insert(node);
+                    self.stated.entry(stream.topic).or_default().insert(node);
                 }
                 _ => {
                     untold.insert(stream.topic);
                 }
             }
         }
-        self.told.retain(|topic, _| !untold.contains(topic));
+        self.stated.retain(|topic, _| !untold.contains(topic));
     }
 
     /// Whether every message of a topic names its publisher, and this node is never named.
     pub(crate) fn headers_deny(&self, what: ElementKey) -> bool {
         match what {
-            ElementKey::Publish(node, topic) => lacks(&self.told, topic, node),
+            ElementKey::Publish(node, topic) => lacks(&self.stated, topic, node),
             _ => false,
         }
     }

@@ -87,7 +87,7 @@ struct RewrittenBag<'a> {
     facts: &'a Observations,
     messages: &'a Stamps,
     /// The observations about each node.
-    told: BTreeMap<Name, Vec<SeriesId>>,
+    stated: BTreeMap<Name, Vec<SeriesId>>,
     /// The streams that each node published, as far as is known.
     own: BTreeMap<Name, Vec<usize>>,
     /// The last message.
@@ -103,10 +103,10 @@ impl<'a> RewrittenBag<'a> {
         facts: &'a Observations,
         messages: &'a Stamps,
     ) -> Self {
-        let mut told: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
+        let mut stated: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
         for fact in &facts.list {
             if let Some(node) = shown(fact.observation) {
-                told.entry(node).or_default().push(fact.times);
+                stated.entry(node).or_default().push(fact.times);
             }
         }
         let mut own: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
@@ -123,7 +123,7 @@ impl<'a> RewrittenBag<'a> {
             of_bag,
             facts,
             messages,
-            told,
+            stated,
             own,
             end: bounds.map(|(_, last)| last).max().unwrap_or(Stamp(0)),
             pauses: None,
@@ -155,12 +155,12 @@ impl<'a> RewrittenBag<'a> {
 
     /// Whether the last sign of a node, other than the messages of this stream, comes long before the end of the bag.
     fn may_have_ended(&self, node: Name, except: usize) -> bool {
-        let told = self.told.get(&node).into_iter().flatten();
-        let told = told.filter_map(|id| self.facts.times.bounds(*id));
+        let stated = self.stated.get(&node).into_iter().flatten();
+        let stated = stated.filter_map(|id| self.facts.times.bounds(*id));
         let own = self.own.get(&node).into_iter().flatten();
         let own = own.filter(|at| **at != except);
         let own = own.filter_map(|at| self.messages.bounds(self.streams[*at].times));
-        let last = told.chain(own).map(|(_, last)| last).max();
+        let last = stated.chain(own).map(|(_, last)| last).max();
         last.is_some_and(|last| self.end.since(last) > BREAK_NS.saturating_mul(UNUSUAL))
     }
 
@@ -189,7 +189,7 @@ impl<'a> RewrittenBag<'a> {
     fn heir(&self, named: &NamedTopics, end: &NodeEnd) -> Option<Name> {
         let next = end.next?;
         let begins = |node: &Name| {
-            let signs = self.told.get(node).into_iter().flatten();
+            let signs = self.stated.get(node).into_iter().flatten();
             let bounds = signs.filter_map(|id| self.facts.times.bounds(*id));
             let first = bounds.map(|(first, _)| first).min();
             first.is_some_and(|first| first.since(next).abs() <= SOON_NS)
@@ -202,7 +202,7 @@ impl<'a> RewrittenBag<'a> {
     /// The times of all signs of a node, without the messages of one stream, sorted.
     fn signs(&self, node: Name, except: usize) -> io::Result<Vec<Stamp>> {
         let mut signs = Vec::new();
-        for id in self.told.get(&node).into_iter().flatten() {
+        for id in self.stated.get(&node).into_iter().flatten() {
             signs.extend(self.facts.times.times(*id)?);
         }
         let own = self.own.get(&node).into_iter().flatten();

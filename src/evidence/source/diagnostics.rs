@@ -89,14 +89,14 @@ fn node(name: &str) -> Option<&str> {
 
 /// Adds publishers by the names in statuses, if the header does not name the publisher.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let told = |topic| {
+    let stated = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);
         of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
     };
     let observations = known.facts.list.iter().map(|fact| fact.observation);
     let untold: BTreeSet<Observation> = observations
         .filter(
-            |observation| matches!(observation, Observation::Reports(_, topic) if !told(*topic)),
+            |observation| matches!(observation, Observation::Reports(_, topic) if !stated(*topic)),
         )
         .collect();
     for (fact, signs, ends) in known.observations(source) {

@@ -208,15 +208,15 @@ mod tests {
 
     #[test]
     fn clients_of_rosbridge_subscribe_and_unsubscribe() {
-        let told = |text| bridged(text);
+        let stated = |text| bridged(text);
         assert_eq!(
-            told("[Client 0] Subscribed to /odom"),
+            stated("[Client 0] Subscribed to /odom"),
             Some((true, "/odom"))
         );
         let gone = "[Client 3f-2] Unsubscribed from /odom";
-        assert_eq!(told(gone), Some((false, "/odom")));
-        assert_eq!(told("Subscribed to /odom"), None);
-        assert_eq!(told("[Client 0] Subscribed to nothing"), None);
+        assert_eq!(stated(gone), Some((false, "/odom")));
+        assert_eq!(stated("Subscribed to /odom"), None);
+        assert_eq!(stated("[Client 0] Subscribed to nothing"), None);
     }
 
     #[test]

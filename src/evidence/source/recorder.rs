@@ -30,14 +30,14 @@ pub(crate) fn read(
 
 /// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be distinguished.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let told = known.facts.list.iter().filter(|fact| fact.source == source);
-    let told = told.filter_map(|fact| match fact.observation {
+    let stated = known.facts.list.iter().filter(|fact| fact.source == source);
+    let stated = stated.filter_map(|fact| match fact.observation {
         Observation::Node(node) => Some(node),
         _ => None,
     });
     let nodes = known.nodes().iter().copied();
     let named = nodes.filter(|node| is_recorder(&known.text(*node)));
-    let recorders: BTreeSet<Name> = told.chain(named).collect();
+    let recorders: BTreeSet<Name> = stated.chain(named).collect();
     for recorder in &recorders {
         known.add(Inference {
             what: ElementKey::Node(*recorder),

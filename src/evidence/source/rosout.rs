@@ -124,7 +124,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if !own && is_broadcaster(known, node, topic) {
             continue;
         }
-        let told = is_told(known, topic);
+        let stated = is_reported(known, topic);
         let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
         let what = match (own, others || silent) {
             (true, _) => ElementKey::Publish(node, topic),
@@ -135,7 +135,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             what,
             source,
             // If headers do not name all publishers, a node that names a topic may be one of them.
-            confidence: if told {
+            confidence: if stated {
                 Confidence::Stated
             } else {
                 Confidence::Inferred
@@ -146,7 +146,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 /// Whether headers name all publishers of a topic.
-fn is_told(known: &Conclusions<'_>, topic: Name) -> bool {
+fn is_reported(known: &Conclusions<'_>, topic: Name) -> bool {
     let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
     of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
 }
@@ -157,14 +157,14 @@ fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let base = role(&own);
     let mut publishers = known.publishers(topic);
     base.len() < own.len()
-        && !is_told(known, topic)
+        && !is_reported(known, topic)
         && publishers.any(|p| role(&known.text(p)) == base)
 }
 
 /// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too.
 /// Used only where headers do not name all publishers.
 fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool {
-    let told = is_told(known, topic);
+    let stated = is_reported(known, topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
         Some(space) => format!("{space}/tf"),
@@ -178,7 +178,7 @@ fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool 
             .map(|f| f.observation)
             .any(|c| c == Observation::Lists(node, twin))
     };
-    !told && !twin.is_some_and(names)
+    !stated && !twin.is_some_and(names)
 }
 
 /// Every topic that a recorder of all topics has seen advertised; `None` without such a recorder. It goes on to

@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn errors_have_their_line() {
-        for (row, told) in [
+        for (row, stated) in [
             ("a,[/x],,,", "is not a list"),
             ("a,,,soon,", "not a number"),
             (",,,,", "empty"),
@@ -159,7 +159,10 @@ mod tests {
         ] {
             let text = format!("Name,Publish,Subscribe,Node-start,Node-end\nok,,,,\n{row}\n");
             let error = parse(&text).unwrap_err().to_string();
-            assert!(error.contains("line 3") && error.contains(told), "{error}");
+            assert!(
+                error.contains("line 3") && error.contains(stated),
+                "{error}"
+            );
         }
     }
 }

@@ -46,7 +46,7 @@ struct PageData<'a> {
     epoch: i64,
     date: String,
     /// The headlines of each window that has any.
-    told: Vec<ToldData>,
+    reported: Vec<ToldData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
@@ -131,7 +131,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         ends: frames.iter().map(|f| clock.secs(f.span.end)).collect(),
         epoch: clock.0.0.div_euclid(1_000_000),
         date: words::date(clock.0.0),
-        told: told(page, &places, clock),
+        reported: reported(page, &places, clock),
         phases: phases(mission, clock),
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
         hands: lives.map_or_else(Vec::new, |lives| {
@@ -234,12 +234,16 @@ fn graph<'a>(
     }
 }
 
-fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<ToldData> {
+fn reported(
+    page: &HtmlPage<'_>,
+    places: &BTreeMap<Element, u32>,
+    clock: PageClock,
+) -> Vec<ToldData> {
     let mission = page.sequence.mission;
     let frames = page.whole.view.frames.iter().enumerate();
     let frames = frames.filter(|(_, frame)| frame.is_changed());
     let parts = mission.log.all_parts();
-    let told = |(at, frame): (usize, &Frame)| {
+    let reported = |(at, frame): (usize, &Frame)| {
         let mut chips = chips(&frame.counts).map(|(text, _)| text);
         let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
         let returns: Vec<_> = frame
@@ -270,7 +274,7 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
             .chain(returns);
         ToldData(at, frame.counts.total(), chips, lines.collect())
     };
-    frames.map(told).collect()
+    frames.map(reported).collect()
 }
 
 fn sign(kind: Kind) -> u8 {

@@ -14,10 +14,10 @@ const MOST_ITEMS: usize = 80;
 /// else as changed if it ever was.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
-    let items = fates(&view.items_shown, last);
-    let arrows = fates(&view.arrows_shown, last);
+    let items = ends(&view.items_shown, last);
+    let arrows = ends(&view.arrows_shown, last);
     let is_changed =
-        |fates: &BTreeMap<u32, Shown>, id: u32| fates.get(&id).is_some_and(|s| s.mark.is_some());
+        |ends: &BTreeMap<u32, Shown>, id: u32| ends.get(&id).is_some_and(|s| s.mark.is_some());
     let mut wanted: Vec<(u8, u32)> = Vec::new();
     for (arrow, id) in view.arrows.iter().zip(0..) {
         let ends = [arrow.from, arrow.to]
@@ -55,8 +55,8 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     if boxes.is_empty() {
         return None;
     }
-    let pick = |fates: &BTreeMap<u32, Shown>, ids: &mut dyn Iterator<Item = u32>| -> Vec<Shown> {
-        ids.filter_map(|id| fates.get(&id).cloned()).collect()
+    let pick = |ends: &BTreeMap<u32, Shown>, ids: &mut dyn Iterator<Item = u32>| -> Vec<Shown> {
+        ids.filter_map(|id| ends.get(&id).cloned()).collect()
     };
     let seen = SeenWindow {
         items: pick(&items, &mut boxes.into_iter()),
@@ -66,16 +66,16 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
 }
 
 /// The outcome of each element up to window `last`: its last state, with a mark for the whole mission.
-fn fates(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
-    let fates = all.iter().filter_map(|showing| fate(showing, last));
-    fates.map(|shown| (shown.id, shown)).collect()
+fn ends(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
+    let ends = all.iter().filter_map(|showing| end(showing, last));
+    ends.map(|shown| (shown.id, shown)).collect()
 }
 
-fn fate(showing: &Showing, last: usize) -> Option<Shown> {
+fn end(showing: &Showing, last: usize) -> Option<Shown> {
     let is_gone = |shown: &Shown| shown.mark == Some(Mark::Removed);
     let runs = || showing.runs().filter_map(|(_, shown)| shown);
-    let fate = runs().rev().find(|shown| !is_gone(shown));
-    let fate = fate.or_else(|| runs().next())?;
+    let end = runs().rev().find(|shown| !is_gone(shown));
+    let end = end.or_else(|| runs().next())?;
     let there = |k: usize| showing.at(k).is_some_and(|shown| !is_gone(shown));
     let is_marked = runs().any(|shown| shown.mark.is_some());
     Some(Shown {
@@ -85,6 +85,6 @@ fn fate(showing: &Showing, last: usize) -> Option<Shown> {
             (true, false) => Some(Mark::Removed),
             _ => is_marked.then_some(Mark::Changed),
         },
-        ..fate.clone()
+        ..end.clone()
     })
 }

@@ -76,7 +76,7 @@ fn details(subject: &Subject<'_>, findings: &[&Finding]) -> String {
     let line = |f: &&Finding| {
         let place = format!("{}:{}", subject.file, f.place.line);
         let word = f.severity.word();
-        format!("{word}[{}] {place}: {}", f.kind.word(), f.told("; "))
+        format!("{word}[{}] {place}: {}", f.kind.word(), f.reported("; "))
     };
     findings.iter().map(line).collect::<Vec<_>>().join(" / ")
 }

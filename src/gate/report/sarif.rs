@@ -64,7 +64,7 @@ fn result(subject: &Subject<'_>, finding: &Finding) -> Value {
     let mut result = json!({
         "ruleId": finding.kind.word(),
         "level": level,
-        "message": {"text": finding.told("\n")},
+        "message": {"text": finding.reported("\n")},
         "locations": [{"physicalLocation": {
             "artifactLocation": {"uri": address(&subject.tracked)},
             "region": {

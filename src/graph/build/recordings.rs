@@ -75,7 +75,7 @@ pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name>
         .iter()
         .filter(|s| s.trust == Reliability::Whole && !s.latched);
     for stream in named.filter(|s| !crate::base::name::is_quiet(s.connection.topic.as_str())) {
-        let (Some(node), Some(times)) = (stream.speaker, recorded.messages.bounds(stream.times))
+        let (Some(node), Some(times)) = (stream.sender, recorded.messages.bounds(stream.times))
         else {
             continue;
         };
@@ -92,13 +92,13 @@ pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name>
 }
 
 /// A sender with its recordings.
-struct Voice<'a> {
+struct SendingNode<'a> {
     node: Option<Name>,
     stretches: &'a [Stretch],
     bags: BTreeSet<usize>,
 }
 
-impl Voice<'_> {
+impl SendingNode<'_> {
     /// The messages that are being sent at a moment, if one should come long before `length` is over.
     fn sending(&self, at: Stamp, length: i64) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|s| s.first <= at);
@@ -132,7 +132,7 @@ const MOST_GAPS: usize = 64;
 /// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and begin again
 /// together without having restarted.
 pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream]) -> Vec<Span> {
-    let mut voices = Vec::new();
+    let mut senders = Vec::new();
     for of_topic in traffic.values() {
         for (place, sender) in of_topic.list.iter().enumerate() {
             if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
@@ -140,21 +140,22 @@ pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream])
             }
             let own = of_topic.streams.iter().zip(&of_topic.of);
             let own = own.filter(|(_, of)| **of == place);
-            voices.push(Voice {
+            senders.push(SendingNode {
                 node: sender.node,
                 stretches: &sender.stretches,
                 bags: own.map(|(at, _)| streams[*at].bag).collect(),
             });
         }
     }
-    let bags: BTreeSet<usize> = voices
+    let bags: BTreeSet<usize> = senders
         .iter()
-        .flat_map(|voice| &voice.bags)
+        .flat_map(|sender| &sender.bags)
         .copied()
         .collect();
     let mut found: Vec<Span> = Vec::new();
     for bag in bags {
-        let of_bag: Vec<&Voice<'_>> = voices.iter().filter(|v| v.bags.contains(&bag)).collect();
+        let of_bag: Vec<&SendingNode<'_>> =
+            senders.iter().filter(|v| v.bags.contains(&bag)).collect();
         for gap in gaps(&of_bag) {
             if !found.iter().any(|pause| pause.shared(gap) > 0) {
                 found.extend(pause(&of_bag, restarts, gap));
@@ -178,11 +179,11 @@ pub(crate) fn unseen(recorded: &Recorded, streams: &[Stream]) -> io::Result<Vec<
 }
 
 /// The gaps of senders that seldom have any, sorted.
-fn gaps(voices: &[&Voice<'_>]) -> Vec<Span> {
-    let steady = voices
+fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
+    let steady = senders
         .iter()
-        .filter(|voice| voice.stretches.len() <= MOST_GAPS);
-    let pairs = steady.flat_map(|voice| voice.stretches.windows(2));
+        .filter(|sender| sender.stretches.len() <= MOST_GAPS);
+    let pairs = steady.flat_map(|sender| sender.stretches.windows(2));
     let apart = pairs.filter(|pair| !pair[1].is_joined);
     let mut gaps: Vec<Span> = apart
         .map(|pair| Span::new(pair[0].last, pair[1].first))
@@ -192,22 +193,22 @@ fn gaps(voices: &[&Voice<'_>]) -> Vec<Span> {
 }
 
 /// The pause of the recording around a gap of one sender, if nearly all others that should have sent have that gap too.
-fn pause(voices: &[&Voice<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
+fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
     let (mut should, mut silent) = (0, 0);
     let mut nodes: BTreeSet<Option<Name>> = BTreeSet::new();
     let mut found = Span::new(Stamp::MIN, Stamp::MAX);
-    for voice in voices {
-        let Some(stretch) = voice.sending(gap.start, gap.nanos()) else {
-            should += u64::from(voice.begins_in(gap));
+    for sender in senders {
+        let Some(stretch) = sender.sending(gap.start, gap.nanos()) else {
+            should += u64::from(sender.begins_in(gap));
             continue;
         };
         should += 1;
         // The last messages of two senders lie at most a period of either apart.
         let near = stretch.period.saturating_mul(2).max(GAP_NS / 2);
-        let Some((last, next)) = voice.gap(gap.start, near) else {
+        let Some((last, next)) = sender.gap(gap.start, near) else {
             continue;
         };
-        let of_node = voice.node.and_then(|node| restarts.get(&node)).into_iter();
+        let of_node = sender.node.and_then(|node| restarts.get(&node)).into_iter();
         let has_restarted = of_node
             .flatten()
             .any(|r| r.death < gap.end && gap.start < r.birth);
@@ -215,7 +216,7 @@ fn pause(voices: &[&Voice<'_>], restarts: &Restarts, gap: Span) -> Option<Span> 
             continue;
         }
         silent += 1;
-        nodes.insert(voice.node);
+        nodes.insert(sender.node);
         found.start = found.start.max(last);
         found.end = found.end.min(next.unwrap_or(Stamp::MAX));
     }
@@ -261,19 +262,19 @@ mod tests {
         }
     }
 
-    fn told(all: &[(u32, &[Stretch])]) -> Vec<(i64, i64)> {
-        let voices: Vec<Voice<'_>> = all
+    fn reported(all: &[(u32, &[Stretch])]) -> Vec<(i64, i64)> {
+        let senders: Vec<SendingNode<'_>> = all
             .iter()
-            .map(|(node, stretches)| Voice {
+            .map(|(node, stretches)| SendingNode {
                 node: Some(Name(*node)),
                 stretches,
                 bags: BTreeSet::new(),
             })
             .collect();
-        let voices: Vec<&Voice<'_>> = voices.iter().collect();
-        let found = gaps(&voices).into_iter();
+        let senders: Vec<&SendingNode<'_>> = senders.iter().collect();
+        let found = gaps(&senders).into_iter();
         let mut found: Vec<_> = found
-            .filter_map(|gap| pause(&voices, &Restarts::new(), gap))
+            .filter_map(|gap| pause(&senders, &Restarts::new(), gap))
             .map(|pause| (pause.start.0 / MILLI, pause.end.0 / MILLI))
             .collect();
         found.dedup();
@@ -287,16 +288,16 @@ mod tests {
         // Too slow to show it: a message every four seconds.
         let seldom = [stretch(0, 30_000, 4_000)];
         let all: &[(u32, &[Stretch])] = &[(1, &fast), (2, &slow), (3, &fast), (4, &seldom)];
-        assert_eq!(told(all), [(9_990, 15_005)]);
+        assert_eq!(reported(all), [(9_990, 15_005)]);
     }
 
     #[test]
     fn a_pause_of_one_node_is_not_a_recorder_pause() {
         let on = [stretch(0, 30_000, 10)];
         let off = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
-        assert_eq!(told(&[(1, &off), (1, &off), (1, &off)]), []);
+        assert_eq!(reported(&[(1, &off), (1, &off), (1, &off)]), []);
         assert_eq!(
-            told(&[(1, &off), (1, &off), (2, &off), (3, &on), (4, &on)]),
+            reported(&[(1, &off), (1, &off), (2, &off), (3, &on), (4, &on)]),
             []
         );
     }

@@ -45,7 +45,7 @@ pub(crate) struct Sender {
 /// The node that sent the messages of a stream, if its name is reliable enough.
 pub(crate) fn sender(stream: &Stream) -> Option<Name> {
     stream
-        .speaker
+        .sender
         .filter(|_| !matches!(stream.trust, Reliability::First | Reliability::Gone))
 }
 

@@ -199,7 +199,7 @@ mod tests {
         all
     }
 
-    fn told(runs: &[(usize, i64)]) -> Vec<(u64, i64, bool)> {
+    fn reported(runs: &[(usize, i64)]) -> Vec<(u64, i64, bool)> {
         let all = stretches(&times(runs));
         all.iter()
             .map(|s| (s.count, s.period / 1_000_000, s.is_joined))
@@ -208,8 +208,8 @@ mod tests {
 
     #[test]
     fn a_steady_sender_sends_one_stretch() {
-        assert_eq!(told(&[(300, 100)]).len(), 1);
-        assert_eq!(told(&[(100_000, 10)]).len(), 1);
+        assert_eq!(reported(&[(300, 100)]).len(), 1);
+        assert_eq!(reported(&[(100_000, 10)]).len(), 1);
     }
 
     #[test]
@@ -231,23 +231,23 @@ mod tests {
 
     #[test]
     fn a_rate_that_changes_is_cut_where_it_does() {
-        let found = told(&[(300, 33), (60, 200)]);
+        let found = reported(&[(300, 33), (60, 200)]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((300..=302).contains(&found[0].0) && found[1].2, "{found:?}");
-        let slow = told(&[(40, 1000), (12, 5000), (60, 1000)]);
+        let slow = reported(&[(40, 1000), (12, 5000), (60, 1000)]);
         assert_eq!(slow.len(), 3, "{slow:?}");
-        let long = told(&[(50_000, 10), (30_000, 20)]);
+        let long = reported(&[(50_000, 10), (30_000, 20)]);
         assert_eq!(long.len(), 2, "{long:?}");
         assert!((49_990..=50_012).contains(&long[0].0), "{long:?}");
     }
 
     #[test]
     fn a_pause_is_a_gap_and_a_lost_message_is_not() {
-        let found = told(&[(50, 100), (1, 30_000), (50, 100)]);
+        let found = reported(&[(50, 100), (1, 30_000), (50, 100)]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(!found[1].2);
         assert_eq!(
-            told(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(),
+            reported(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(),
             1
         );
     }

@@ -172,7 +172,7 @@ mod tests {
     }
 
     /// The order as it is reported, in time that grows with the square of the vertices.
-    fn told(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
+    fn reported(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         let mut left: BTreeSet<usize> = (0..n).collect();
         let (mut first, mut last) = (Vec::new(), Vec::new());
         while !left.is_empty() {
@@ -211,7 +211,7 @@ mod tests {
             let n = 2 + round % 13;
             let edges: Vec<(usize, usize)> =
                 (0..number(3 * n)).map(|_| (number(n), number(n))).collect();
-            assert_eq!(greedy_order(n, &edges), told(n, &edges), "{edges:?}");
+            assert_eq!(greedy_order(n, &edges), reported(n, &edges), "{edges:?}");
         }
     }
 

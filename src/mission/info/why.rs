@@ -183,12 +183,12 @@ mod tests {
         };
         let pieces = [piece(1, "hello"), piece(2, "more"), piece(3, "hello")];
         let said = said(&pieces);
-        let told: Vec<_> = said
+        let reported: Vec<_> = said
             .iter()
             .map(|s| (s.piece.text.as_str(), s.count, s.last))
             .collect();
         assert_eq!(
-            told,
+            reported,
             [("hello", 2, Some(Stamp(3))), ("more", 1, Some(Stamp(2)))]
         );
     }

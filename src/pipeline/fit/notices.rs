@@ -9,7 +9,7 @@ use crate::pipeline::Drawing;
 
 /// The collapsed namespaces as text, each with the number of changing elements kept outside.
 pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
-    let told = |name: &Arc<str>| {
+    let reported = |name: &Arc<str>| {
         let inside = |other: &&Arc<str>| {
             let rest = other.strip_prefix(&**name);
             rest.is_some_and(|rest| rest.starts_with('/'))
@@ -20,11 +20,11 @@ pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>,
         };
         (Arc::clone(name), words)
     };
-    collapsed.iter().map(told).collect()
+    collapsed.iter().map(reported).collect()
 }
 
 /// The notices about what `--fit auto` did, and whether it was sufficient: the smallest text is `text` pixels high.
-pub(super) fn told(
+pub(super) fn reported(
     drawing: &Drawing,
     collapsed: &[(Arc<str>, String)],
     got: &PageOptions,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::counts::{Count, FleetBag};
 use super::plan::{CountDetail, PlannedBag};
 use crate::bag::{
-    self, Connection, ConnectionId, ETAG, Input, Lumps, OpenOptions, Report, Sink, Want,
+    self, ChunkCounts, Connection, ConnectionId, ETAG, Input, OpenOptions, Report, Sink, Want,
 };
 use crate::base::error::{Error, Result};
 use crate::base::name::NodeName;
@@ -134,7 +134,7 @@ impl FleetBag {
             .notices
             .iter()
             .filter(|n| n.kind.is_loss())
-            .map(told)
+            .map(reported)
             .collect();
         let etag = report.facts.iter().find(|(name, _)| name == ETAG);
         self.etag = etag.map(|(_, value)| value.clone());
@@ -148,7 +148,7 @@ impl FleetBag {
     }
 }
 
-fn told(notice: Notice) -> String {
+fn reported(notice: Notice) -> String {
     match notice.count {
         1 => notice.text,
         count => format!("{} (×{count})", notice.text),
@@ -166,13 +166,13 @@ fn read(
         (CountDetail::Auto, Input::Url(_)) => Some(FAR_CHUNKS),
         (CountDetail::Auto | CountDetail::Index, _) => None,
     };
-    let lumps = above.map(|above| Lumps {
+    let chunk_counts = above.map(|above| ChunkCounts {
         origin: planned.origin,
         period: tally.period,
         above,
     });
     let options = OpenOptions {
-        lumps,
+        chunk_counts,
         ..OpenOptions::default()
     };
     bag::open(input, &options)?.read(tally.part, taken)
@@ -187,7 +187,7 @@ struct SentMessages {
     /// The series of messages with known sizes, and of the others.
     series: Vec<SeriesId>,
     /// The number of messages counted without times, by window start.
-    lumps: BTreeMap<Stamp, u64>,
+    chunk_counts: BTreeMap<Stamp, u64>,
 }
 
 /// All facts gathered from a bag.
@@ -254,7 +254,7 @@ impl BagTally {
     /// The messages of one sender in each window, by the window's start.
     fn windows(&self, sent: &SentMessages) -> io::Result<BTreeMap<Stamp, InWindow>> {
         let mut all: BTreeMap<Stamp, InWindow> = BTreeMap::new();
-        let lumps = Lumps {
+        let chunk_counts = ChunkCounts {
             origin: self.origin,
             period: self.period,
             above: 0,
@@ -272,7 +272,7 @@ impl BagTally {
                 |start: Stamp| start > Stamp::MIN && timed.time.since(start) < self.period.nanos();
             let start = match &open {
                 Some((start, _)) if is_open(*start) => *start,
-                _ => lumps.window(timed.time),
+                _ => chunk_counts.window(timed.time),
             };
             match &mut open {
                 Some((at, window)) if *at == start => window.take(timed.time, size),
@@ -280,7 +280,7 @@ impl BagTally {
             }
         })?;
         all.extend(open);
-        for (start, count) in &sent.lumps {
+        for (start, count) in &sent.chunk_counts {
             let window = all.entry(*start).or_default();
             *window = InWindow {
                 n: window.n.saturating_add(*count),
@@ -362,13 +362,13 @@ impl Sink for BagTally {
         }
     }
 
-    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
         let source = self.sources.get(connection.0 as usize);
         let sent = source.and_then(|(sender, _)| self.senders.get_mut(sender));
         let Some(sent) = sent.filter(|_| count > 0) else {
             return;
         };
-        *sent.lumps.entry(window).or_default() += count;
+        *sent.chunk_counts.entry(window).or_default() += count;
         self.messages += count;
     }
 
@@ -384,7 +384,7 @@ mod tests {
     #[test]
     fn windows_are_whole_periods_before_and_after_the_origin() {
         let period = Period::from_nanos(10).unwrap();
-        let lumps = Lumps {
+        let chunk_counts = ChunkCounts {
             origin: Stamp(3),
             period,
             above: 0,
@@ -396,10 +396,10 @@ mod tests {
             (2, -7, -1),
             (-8, -17, -2),
         ] {
-            assert_eq!(lumps.window(Stamp(at)), Stamp(start), "{at}");
+            assert_eq!(chunk_counts.window(Stamp(at)), Stamp(start), "{at}");
             assert_eq!(place(Stamp(start), Stamp(3), period), win, "{at}");
         }
-        let far = lumps.window(Stamp::MIN);
+        let far = chunk_counts.window(Stamp::MIN);
         assert!(far <= Stamp(i64::MIN + 10), "{far:?}");
     }
 }

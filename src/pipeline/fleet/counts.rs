@@ -174,13 +174,13 @@ mod tests {
 
     #[test]
     fn unknown_values_of_a_part_are_unknown_in_the_sum() {
-        let lump = Count {
+        let chunk_count = Count {
             first: None,
             last: None,
             max_gap_ns: None,
             ..part(0, 0, 4, None)
         };
-        let merged = merge([part(0, 10, 3, Some(6)), lump]);
+        let merged = merge([part(0, 10, 3, Some(6)), chunk_count]);
         assert_eq!((merged[0].n, merged[0].first), (7, None));
         assert_eq!((merged[0].last, merged[0].max_gap_ns), (None, None));
     }

@@ -94,10 +94,10 @@ fn named(path: &Path) -> Option<PathBuf> {
         } else {
             &real
         };
-        let told = part.as_os_str().to_string_lossy();
+        let reported = part.as_os_str().to_string_lossy();
         let names = std::fs::read_dir(folder).ok()?.flatten();
         let names = names.map(|event| event.file_name());
-        let mut names = names.filter(|name| name.to_string_lossy() == told);
+        let mut names = names.filter(|name| name.to_string_lossy() == reported);
         let name = names.next().filter(|_| names.next().is_none())?;
         real.push(name);
     }

@@ -10,7 +10,7 @@ use crate::draw::figure::canvas::PX_PER_MM;
 use crate::draw::figure::groups::groups;
 use crate::draw::figure::marks::Sign;
 use crate::draw::figure::page::FigureSheet;
-use crate::draw::figure::panel::{Fate, Panel, PanelBox};
+use crate::draw::figure::panel::{BoxState, Panel, PanelBox};
 use crate::draw::figure::place::PlacedPanel;
 use crate::draw::figure::talks::Talk;
 use crate::draw::scene::Scene;
@@ -18,19 +18,19 @@ use crate::draw::scene::Scene;
 /// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that come and go together;
 /// where that is too high and the user chose no steps, without the first phase, then without the smallest steps.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
-    let mut studio = StepSource::new(sheet)?;
-    let most = studio.columns;
-    let mut chosen = studio.chosen()?;
+    let mut steps = StepSource::new(sheet)?;
+    let most = steps.columns;
+    let mut chosen = steps.chosen()?;
     let is_free = sheet.options.steps.is_empty();
     while !chosen.is_empty() {
-        let left = studio.left_out(&chosen);
+        let left = steps.left_out(&chosen);
         for (is_grouped, has_first) in [(false, true), (false, false), (true, false)] {
             let first = Some(0).filter(|_| is_free && has_first);
             let phases: Vec<usize> = first.into_iter().chain(chosen.iter().copied()).collect();
             for columns in (1..=most).rev() {
-                studio.columns = columns;
-                let panels = Union::new(&studio, &chosen, is_grouped).panels(&phases);
-                let scene = panels.map(|panels| studio.page(&panels, &[], left));
+                steps.columns = columns;
+                let panels = Union::new(&steps, &chosen, is_grouped).panels(&phases);
+                let scene = panels.map(|panels| steps.page(&panels, &[], left));
                 if let Some(scene) = scene.filter(|s| s.size.h <= MOST_HEIGHT * PX_PER_MM) {
                     return Ok((scene, Vec::new()));
                 }
@@ -39,7 +39,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         if !is_free {
             break;
         }
-        studio.drop_least(&mut chosen);
+        steps.drop_least(&mut chosen);
     }
     Err(Error::usage(
         format!("these phases are higher than {MOST_HEIGHT} mm at the same places"),
@@ -49,7 +49,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
 
 /// All that a step changes, with its neighbours, over all phases.
 struct Union<'u, 's> {
-    studio: &'u StepSource<'s>,
+    steps: &'u StepSource<'s>,
     /// The rows of each box, and whether it ever changes.
     boxes: Vec<(bool, Vec<usize>)>,
     /// The arrows of each phase: from, to, topics.
@@ -57,16 +57,16 @@ struct Union<'u, 's> {
 }
 
 impl<'u, 's> Union<'u, 's> {
-    fn new(studio: &'u StepSource<'s>, chosen: &[usize], is_grouped: bool) -> Self {
-        let source = studio.sheet.source;
+    fn new(steps: &'u StepSource<'s>, chosen: &[usize], is_grouped: bool) -> Self {
+        let source = steps.sheet.source;
         let changed: BTreeSet<usize> = chosen
             .iter()
             .flat_map(|k| {
-                let turned = [Sign::Start, Sign::End].map(|sign| studio.turned(*k, sign));
+                let turned = [Sign::Start, Sign::End].map(|sign| steps.turned(*k, sign));
                 turned.into_iter().flat_map(BTreeMap::into_keys)
             })
             .collect();
-        let all = groups(source, &studio.tracks, studio.depth);
+        let all = groups(source, &steps.tracks, steps.depth);
         let mut boxes: Vec<(bool, Vec<usize>)> = Vec::new();
         for group in &all {
             let own = group.members.iter().filter(|at| changed.contains(at));
@@ -86,7 +86,7 @@ impl<'u, 's> Union<'u, 's> {
             }
         }
         let mut union = Self {
-            studio,
+            steps,
             boxes,
             talks: Vec::new(),
         };
@@ -109,25 +109,25 @@ impl<'u, 's> Union<'u, 's> {
 
     /// Finds the arrows of every phase at the first `many` boxes.
     fn talk(&mut self, many: usize) {
-        let studio = self.studio;
-        let mut vertex = vec![None; studio.tracks.len()];
+        let steps = self.steps;
+        let mut vertex = vec![None; steps.tracks.len()];
         for (at, (_, members)) in self.boxes.iter().enumerate() {
             for member in members {
                 vertex[*member] = Some(at);
             }
         }
         let of_phase = |span| {
-            let all = studio.talks.between(&vertex, span, true);
+            let all = steps.talks.between(&vertex, span, true);
             let own = all.into_iter().filter(|t| t.from < many || t.to < many);
             own.map(|talk| ((talk.from, talk.to), talk)).collect()
         };
-        let phases = studio.sheet.source.phases.iter();
+        let phases = steps.sheet.source.phases.iter();
         self.talks = phases.map(|phase| of_phase(phase.span)).collect();
     }
 
     /// The panels of these phases; `None` where they are too wide.
     fn panels(&self, phases: &[usize]) -> Option<Vec<Panel>> {
-        let (studio, source) = (self.studio, self.studio.sheet.source);
+        let (steps, source) = (self.steps, self.steps.sheet.source);
         let mut links: BTreeMap<(usize, usize), Talk> = BTreeMap::new();
         for (key, talk) in phases.iter().flat_map(|k| &self.talks[*k]) {
             let all = links.entry(*key).or_insert_with(|| talk.clone());
@@ -138,92 +138,98 @@ impl<'u, 's> Union<'u, 's> {
             let new: Vec<_> = new.copied().collect();
             all.topics.extend(new);
         }
-        let links: Vec<(Talk, Fate)> = links
+        let links: Vec<(Talk, BoxState)> = links
             .into_values()
-            .map(|talk| (talk, Fate::Neighbour))
+            .map(|talk| (talk, BoxState::Neighbour))
             .collect();
         let looks: Vec<PanelBox> = (0..self.boxes.len())
-            .map(|at| self.look(at, Fate::Began))
+            .map(|at| self.look(at, BoxState::Began))
             .collect();
         let labels: Vec<Vec<Vec<String>>> =
             links.iter().map(|(t, _)| t.labels(source, 1)).collect();
-        let canvas = studio.sheet.canvas();
-        let placed = studio.placed(&canvas, &looks, &links, &labels)?;
+        let canvas = steps.sheet.canvas();
+        let placed = steps.placed(&canvas, &looks, &links, &labels)?;
         let panel = |k: &usize| self.panel(*k, &links, &labels, &placed);
         Some(phases.iter().map(panel).collect())
     }
 
-    fn look(&self, at: usize, fate: Fate) -> PanelBox {
+    fn look(&self, at: usize, state: BoxState) -> PanelBox {
         let (changes, members) = &self.boxes[at];
         let named = members.first().copied().filter(|_| !changes);
-        self.studio.look(fate, members, named, None)
+        self.steps.look(state, members, named, None)
     }
 
     /// Phase `k`: the elements that exist in it, and those that ended as it began.
     fn panel(
         &self,
         k: usize,
-        links: &[(Talk, Fate)],
+        links: &[(Talk, BoxState)],
         labels: &[Vec<Vec<String>>],
         placed: &PlacedPanel,
     ) -> Panel {
-        let studio = self.studio;
+        let steps = self.steps;
         let turned = |sign| match k {
             0 => BTreeMap::new(),
-            _ => studio.turned(k, sign),
+            _ => steps.turned(k, sign),
         };
         let (began, ended) = (turned(Sign::Start), turned(Sign::End));
-        let is_there = |at: &usize| studio.found[k].names.contains(&studio.tracks[*at].name);
-        let fates: Vec<Option<Fate>> = self
+        let is_there = |at: &usize| steps.found[k].names.contains(&steps.tracks[*at].name);
+        let states: Vec<Option<BoxState>> = self
             .boxes
             .iter()
             .map(|(_, members)| {
                 let any = |of: &dyn Fn(&usize) -> bool| members.iter().any(of);
                 if any(&|at| began.contains_key(at)) {
-                    Some(Fate::Began)
+                    Some(BoxState::Began)
                 } else if any(&|at| ended.contains_key(at)) {
-                    Some(Fate::Ended)
+                    Some(BoxState::Ended)
                 } else {
-                    any(&is_there).then_some(Fate::Neighbour)
+                    any(&is_there).then_some(BoxState::Neighbour)
                 }
             })
             .collect();
-        let drawn: Vec<usize> = (0..fates.len()).filter(|at| fates[*at].is_some()).collect();
-        let fate_of = |(talk, _): &(Talk, Fate)| {
-            let (key, ends) = ((talk.from, talk.to), [fates[talk.from]?, fates[talk.to]?]);
+        let drawn: Vec<usize> = (0..states.len())
+            .filter(|at| states[*at].is_some())
+            .collect();
+        let fate_of = |(talk, _): &(Talk, BoxState)| {
+            let (key, ends) = ((talk.from, talk.to), [states[talk.from]?, states[talk.to]?]);
             let before = k.checked_sub(1).map(|before| &self.talks[before]);
-            if ends.contains(&Fate::Ended) {
+            if ends.contains(&BoxState::Ended) {
                 let was = before.is_some_and(|talks| talks.contains_key(&key));
-                return was.then_some(Fate::Ended);
+                return was.then_some(BoxState::Ended);
             }
-            let is_new = ends.contains(&Fate::Began);
-            let fate = if is_new { Fate::Began } else { Fate::Neighbour };
-            self.talks[k].contains_key(&key).then_some(fate)
+            let is_new = ends.contains(&BoxState::Began);
+            let state = if is_new {
+                BoxState::Began
+            } else {
+                BoxState::Neighbour
+            };
+            self.talks[k].contains_key(&key).then_some(state)
         };
-        let arrows: Vec<(usize, Fate)> = links
+        let arrows: Vec<(usize, BoxState)> = links
             .iter()
             .enumerate()
             .filter_map(|(at, link)| Some((at, fate_of(link)?)))
             .collect();
         let shown: Vec<usize> = arrows.iter().map(|(at, _)| *at).collect();
         let looks = drawn.iter().filter_map(|at| {
-            let mut look = self.look(*at, fates[*at]?);
+            let mut look = self.look(*at, states[*at]?);
             let turned = self.boxes[*at].1.iter();
             let events = turned.flat_map(|m| began.get(m).into_iter().chain(ended.get(m)));
             look.events = events.flatten().copied().collect();
             Some(look)
         });
         let looks: Vec<PanelBox> = looks.collect();
-        let names = studio.found[k].names.len();
+        let names = steps.found[k].names.len();
         let boxed = drawn.iter().flat_map(|at| &self.boxes[*at].1);
         Panel {
             talks: arrows
                 .iter()
-                .map(|(at, fate)| (links[*at].0.clone(), *fate))
+                .map(|(at, state)| (links[*at].0.clone(), *state))
                 .collect(),
             labels: shown.iter().map(|at| labels[*at].clone()).collect(),
             undrawn: names.saturating_sub(boxed.filter(|at| is_there(at)).count()),
-            ..studio.drawn(k, (k + 1).to_string(), looks, placed.only(&drawn, &shown))
+            ..steps.drawn(k, (k + 1).to_string(), looks, placed.only(&drawn, &shown))
         }
     }
 }

@@ -151,13 +151,13 @@ fn reported_changes_are_complete() {
         let moving = words("moving", &"m".repeat(step % 7 + 1), Weight::Regular);
         let groups = still.chain([moving]).collect();
         let pixels = canvas.draw(page(groups)).unwrap().clone();
-        let mut told = 0;
+        let mut reported = 0;
         for bytes in canvas.changed() {
             copy[bytes.clone()].copy_from_slice(&pixels.rgba[bytes.clone()]);
-            told += bytes.len();
+            reported += bytes.len();
         }
         assert!(copy == pixels.rgba, "step {step}");
-        assert!(step == 0 || told < copy.len(), "step {step}");
+        assert!(step == 0 || reported < copy.len(), "step {step}");
     }
 }
 

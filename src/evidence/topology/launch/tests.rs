@@ -124,11 +124,11 @@ fn repeated_includes_are_bounded() {
     }
     std::fs::write(folder.path().join("12.launch"), "<launch/>").unwrap();
     let topology = crate::evidence::topology::read(&folder.path().join("0.launch")).unwrap();
-    let told = topology
+    let stated = topology
         .notices
         .iter()
         .filter(|n| n.text.contains("too often"));
-    assert_eq!(told.count(), 1);
+    assert_eq!(stated.count(), 1);
 }
 
 #[test]
