@@ -34,13 +34,13 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("evidence", &[
         &["clock", "message", "spread", "syntax", "texts", "times"],
         &["observation", "numbers", "topology"],
-        &["kinds", "proof", "values"],
+        &["kinds", "inference", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],
         &["conclude", "given", "offsets"],
     ]),
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
-    ("mission", &[&["ledger"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
+    ("mission", &[&["event_log"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
     ("view", &[
         &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing", "shown"],
         &["cards", "settle"],

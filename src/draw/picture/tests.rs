@@ -304,10 +304,7 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let scenes = scenes(&windows);
         let member_lists = scenes.iter().map(|scene| {
-            let member_list = scene
-                .groups
-                .iter()
-                .find(|group| group.class == "roll");
+            let member_list = scene.groups.iter().find(|group| group.class == "roll");
             let shapes = member_list
                 .into_iter()
                 .flat_map(|member_list| &member_list.pieces);

@@ -46,6 +46,7 @@ struct PageData<'a> {
     epoch: i64,
     date: String,
     /// The headlines of each window that has any.
+    #[serde(rename = "told")]
     reported: Vec<ToldData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
