@@ -94,7 +94,25 @@ impl Topic {
     pub fn is_service(&self) -> bool {
         !self.types.is_empty() && self.types.iter().all(|kind| is_service(kind))
     }
+
+    /// Whether many nodes publish to topics of its type in turn, so that a new publisher takes over nothing.
+    pub(crate) fn is_shared(&self) -> bool {
+        let mut types = self.types.iter();
+        types.any(|kind| SHARED.contains(&kind.rsplit('/').next().unwrap_or(kind)))
+    }
 }
+
+/// Types of topics that many nodes publish to in turn.
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
 
 /// A publication or a subscription, over the whole mission.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -332,6 +350,19 @@ impl Element {
     }
 }
 
+/// A value of the record of an element, of whichever kind it is; `None` for one that is not there.
+macro_rules! of_record {
+    ($elements:expr, $get:ident, $element:expr, $record:ident => $value:expr) => {{
+        let id = $element.place().1;
+        match $element {
+            Element::Node(_) => $elements.nodes.$get(id).map(|$record| $value),
+            Element::Topic(_) => $elements.topics.$get(id).map(|$record| $value),
+            Element::Publish(_) => $elements.publishes.$get(id).map(|$record| $value),
+            Element::Subscribe(_) => $elements.subscribes.$get(id).map(|$record| $value),
+        }
+    }};
+}
+
 impl Elements {
     /// Every element: nodes, topics, publications, subscriptions.
     pub(crate) fn all(&self) -> impl Iterator<Item = Element> + use<> {
@@ -392,6 +423,16 @@ impl Elements {
         EdgeId::try_from(at.ok()?).ok()
     }
 
+    /// As [`Elements::publication`], of a node and a topic.
+    pub(crate) fn published(&self, (node, topic): (NodeId, TopicId)) -> Option<Element> {
+        self.publication(node, topic).map(Element::Publish)
+    }
+
+    /// As [`Elements::subscription`], of a node and a topic.
+    pub(crate) fn subscribed(&self, (node, topic): (NodeId, TopicId)) -> Option<Element> {
+        self.subscription(topic, node).map(Element::Subscribe)
+    }
+
     /// The node and the topic of an element: both of an edge, one of the others.
     pub fn ends(&self, element: Element) -> (Option<NodeId>, Option<TopicId>) {
         let ends = |edge: Option<&Edge>| (edge.map(|e| e.node), edge.map(|e| e.topic));
@@ -411,35 +452,17 @@ impl Elements {
 
     /// The kinds of evidence for an element.
     pub fn evidence(&self, element: Element) -> Evidence {
-        match element {
-            Element::Node(id) => self.nodes.get(id as usize).map(|n| n.evidence),
-            Element::Topic(id) => self.topics.get(id as usize).map(|t| t.evidence),
-            Element::Publish(id) => self.publishes.get(id as usize).map(|e| e.evidence),
-            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| e.evidence),
-        }
-        .unwrap_or(Evidence::NONE)
+        of_record!(self, get, element, it => it.evidence).unwrap_or(Evidence::NONE)
     }
 
     /// The intervals in which an element exists, in order, half-open; empty where only windows are known.
     pub fn runs(&self, element: Element) -> &[Span] {
-        let runs = match element {
-            Element::Node(id) => self.nodes.get(id as usize).map(|n| &n.runs),
-            Element::Topic(id) => self.topics.get(id as usize).map(|t| &t.runs),
-            Element::Publish(id) => self.publishes.get(id as usize).map(|e| &e.runs),
-            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| &e.runs),
-        };
-        runs.map_or(&[], Vec::as_slice)
+        of_record!(self, get, element, it => it.runs.as_slice()).unwrap_or_default()
     }
 
     /// As [`Elements::runs`], to change them; `None` for an element that is not there.
     pub(crate) fn runs_mut(&mut self, element: Element) -> Option<&mut Vec<Span>> {
-        let id = element.place().1;
-        match element {
-            Element::Node(_) => self.nodes.get_mut(id).map(|n| &mut n.runs),
-            Element::Topic(_) => self.topics.get_mut(id).map(|t| &mut t.runs),
-            Element::Publish(_) => self.publishes.get_mut(id).map(|e| &mut e.runs),
-            Element::Subscribe(_) => self.subscribes.get_mut(id).map(|e| &mut e.runs),
-        }
+        of_record!(self, get_mut, element, it => &mut it.runs)
     }
 
     /// The only publication of each topic; `None` where none or several are known, or where the bag counts publishers
@@ -459,13 +482,7 @@ impl Elements {
 
     /// The first and the last sign of life of an element, where known.
     pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
-        match element {
-            Element::Node(id) => self.nodes.get(id as usize).map(|n| (n.first, n.last)),
-            Element::Topic(id) => self.topics.get(id as usize).map(|t| (t.first, t.last)),
-            Element::Publish(id) => self.publishes.get(id as usize).map(|e| (e.first, e.last)),
-            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| (e.first, e.last)),
-        }
-        .unwrap_or_default()
+        of_record!(self, get, element, it => (it.first, it.last)).unwrap_or_default()
     }
 }
 

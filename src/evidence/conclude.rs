@@ -98,12 +98,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     } = known;
     // Neither their headers nor what follows from these shows that they are there.
     inferences.retain(|inference| {
-        let node = match inference.what {
-            ElementKey::Topic(_) => None,
-            ElementKey::Node(node)
-            | ElementKey::Publish(node, _)
-            | ElementKey::Subscribe(_, node) => Some(node),
-        };
+        let [node, _] = inference.what.ends();
         let is_sign = !matches!(inference.when, Validity::Messages(_) | Validity::Like(_));
         is_sign || node.is_none() || !gone.contains(&node)
     });
@@ -268,7 +263,7 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
 /// Explains proofs that rest on no single message, for elements that `why` asks about.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let is_asked = |inference: &&Inference| {
-        known.facts.is_watched(inference.what.names())
+        known.facts.is_watched(inference.what.ends())
             && !known.worded.contains(&(inference.what, inference.source))
     };
     let mut pieces = Vec::new();
@@ -379,7 +374,7 @@ fn stated(
         ("topology", Confidence::Stated)
     };
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
-    if known.facts.is_watched(what.names()) {
+    if known.facts.is_watched(what.ends()) {
         known.facts.pieces.push(EvidenceLine {
             time: None,
             source: word,
@@ -415,12 +410,7 @@ fn is_run_of(node: &str, stem: &str) -> bool {
 /// The node in the same namespace as a node, or as that of an edge, that publishes for the longest time; `None` at the
 /// root.
 fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Option<Name> {
-    let node = match what {
-        ElementKey::Node(node) | ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => {
-            node
-        }
-        ElementKey::Topic(_) => return None,
-    };
+    let node = what.ends()[0]?;
     let text = known.text(node);
     let space = namespace(&text);
     let streams = known.streams.iter().filter_map(|stream| {

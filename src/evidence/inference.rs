@@ -76,11 +76,12 @@ pub(crate) enum ElementKey {
 }
 
 impl ElementKey {
-    /// The names in the key.
-    pub(crate) fn names(self) -> [Option<Name>; 2] {
+    /// The node and the topic: both of an edge, one of the others.
+    pub(crate) fn ends(self) -> [Option<Name>; 2] {
         match self {
-            Self::Node(a) | Self::Topic(a) => [Some(a), None],
-            Self::Publish(a, b) | Self::Subscribe(a, b) => [Some(a), Some(b)],
+            Self::Node(node) => [Some(node), None],
+            Self::Topic(topic) => [None, Some(topic)],
+            Self::Publish(node, topic) | Self::Subscribe(topic, node) => [Some(node), Some(topic)],
         }
     }
 
@@ -218,19 +219,16 @@ impl<'a> Conclusions<'a> {
 
     /// Adds a proof.
     pub(crate) fn add(&mut self, inference: Inference) {
+        let [node, _] = inference.what.ends();
+        self.nodes.extend(node);
         match inference.what {
-            ElementKey::Node(node) => {
-                self.nodes.insert(node);
-            }
             ElementKey::Subscribe(topic, node) => {
-                self.nodes.insert(node);
                 self.subscribers.entry(topic).or_default().insert(node);
             }
             ElementKey::Publish(node, topic) => {
-                self.nodes.insert(node);
                 self.publishers.entry(topic).or_default().insert(node);
             }
-            ElementKey::Topic(_) => {}
+            ElementKey::Node(_) | ElementKey::Topic(_) => {}
         }
         self.inferences.push(inference);
     }
@@ -242,7 +240,7 @@ impl<'a> Conclusions<'a> {
         time: Option<Stamp>,
         words: impl FnOnce(&Self) -> String,
     ) {
-        if self.facts.is_watched(inference.what.names()) {
+        if self.facts.is_watched(inference.what.ends()) {
             let text = words(self);
             self.worded.insert((inference.what, inference.source));
             self.facts.pieces.push(EvidenceLine {

@@ -34,61 +34,80 @@ worded! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Name(pub(crate) u32);
 
-/// An observation of a source. The number of a name has no meaning: order by its text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Observation {
+/// Declares the kinds of observations with the names in each.
+macro_rules! observations {
+    ($($(#[$about:meta])* $Kind:ident($($name:ident),+),)*) => {
+        /// An observation of a source. The number of a name has no meaning: order by its text.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub(crate) enum Observation {
+            $($(#[$about])* $Kind($(observations!(@$name)),+),)*
+        }
+
+        impl Observation {
+            /// The same observation with its names renumbered.
+            fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
+                match self {
+                    $(Self::$Kind($($name),+) => Self::$Kind($(to($name)),+),)*
+                }
+            }
+        }
+    };
+    (@$name:ident) => { Name };
+}
+
+observations! {
     /// This node is alive.
-    Node(Name),
+    Node(node),
     /// This node has just begun.
-    Begins(Name),
+    Begins(node),
     /// This node is gone.
-    NodeGone(Name),
+    NodeGone(node),
     /// This topic exists.
-    Topic(Name),
+    Topic(topic),
     /// A recorder of all topics has just seen this topic for the first time.
-    Appears(Name),
+    Appears(topic),
     /// This node publishes this topic.
-    Publish(Name, Name),
+    Publish(node, topic),
     /// This node subscribes this topic.
-    Subscribe(Name, Name),
+    Subscribe(node, topic),
     /// This node has just begun to subscribe this topic.
-    Joins(Name, Name),
+    Joins(node, topic),
     /// This node wanted to subscribe this topic, and was refused.
-    Refused(Name, Name),
+    Refused(node, topic),
     /// This node no longer subscribes this topic.
-    Unsubscribe(Name, Name),
+    Unsubscribe(node, topic),
     /// This node names this topic as its own, as publisher or as subscriber.
-    Lists(Name, Name),
+    Lists(node, topic),
     /// Log records of the second node come over a connection that names the first as publisher.
-    Carries(Name, Name),
+    Carries(publisher, node),
     /// A logger of this name, which is a node or a part of one, logs to this topic.
-    Logger(Name, Name),
+    Logger(logger, topic),
     /// A status on this topic (second) is named after this node (first).
-    Reports(Name, Name),
+    Reports(node, topic),
     /// This node is in this lifecycle state.
-    Lifecycle(Name, Name),
+    Lifecycle(node, state),
     /// This topic has this type.
-    Type(Name, Name),
+    Type(topic, kind),
     /// This topic is offered with this quality of service.
-    Quality(Name, Name),
+    Quality(topic, quality),
     /// According to a log text, this logger's node publishes this topic.
-    SaysPublish(Name, Name),
+    SaysPublish(logger, topic),
     /// According to a log text, this logger's node subscribes to this topic.
-    SaysSubscribe(Name, Name),
+    SaysSubscribe(logger, topic),
     /// This logger logs from this source file (its own name, no folder).
-    LogsFrom(Name, Name),
+    LogsFrom(logger, file),
     /// A log text of this logger says that a subscriber of this topic of its node gets nothing, by this policy of the
     /// quality of service.
-    Starves(Name, Name, Name),
+    Starves(logger, topic, policy),
     /// This node, or logger, gets nothing from a publisher of this topic, by this policy.
-    Starved(Name, Name, Name),
+    Starved(node, topic, policy),
     /// Two nodes have this name.
-    Duplicate(Name),
+    Duplicate(node),
     /// The recorder lost so many messages of this topic.
-    Lost(Name, Name),
+    Lost(topic, many),
     /// A snapshot was taken: observations that the source made in an earlier snapshot of the same name and not in this one
     /// have ended.
-    Snapshot(Name),
+    Snapshot(name),
 }
 
 impl Observation {
@@ -105,37 +124,6 @@ impl Observation {
             name
         });
         [first.get(), second.get()]
-    }
-
-    /// The same observation with its names renumbered.
-    fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
-        match self {
-            Self::Node(a) => Self::Node(to(a)),
-            Self::Begins(a) => Self::Begins(to(a)),
-            Self::NodeGone(a) => Self::NodeGone(to(a)),
-            Self::Topic(a) => Self::Topic(to(a)),
-            Self::Appears(a) => Self::Appears(to(a)),
-            Self::Publish(a, b) => Self::Publish(to(a), to(b)),
-            Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
-            Self::Joins(a, b) => Self::Joins(to(a), to(b)),
-            Self::Refused(a, b) => Self::Refused(to(a), to(b)),
-            Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
-            Self::Lists(a, b) => Self::Lists(to(a), to(b)),
-            Self::Carries(a, b) => Self::Carries(to(a), to(b)),
-            Self::Reports(a, b) => Self::Reports(to(a), to(b)),
-            Self::Logger(a, b) => Self::Logger(to(a), to(b)),
-            Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
-            Self::Type(a, b) => Self::Type(to(a), to(b)),
-            Self::Quality(a, b) => Self::Quality(to(a), to(b)),
-            Self::SaysPublish(a, b) => Self::SaysPublish(to(a), to(b)),
-            Self::SaysSubscribe(a, b) => Self::SaysSubscribe(to(a), to(b)),
-            Self::LogsFrom(a, b) => Self::LogsFrom(to(a), to(b)),
-            Self::Starves(a, b, c) => Self::Starves(to(a), to(b), to(c)),
-            Self::Starved(a, b, c) => Self::Starved(to(a), to(b), to(c)),
-            Self::Duplicate(a) => Self::Duplicate(to(a)),
-            Self::Lost(a, b) => Self::Lost(to(a), to(b)),
-            Self::Snapshot(a) => Self::Snapshot(to(a)),
-        }
     }
 }
 

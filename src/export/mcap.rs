@@ -61,8 +61,6 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
 struct Ends<'a> {
     /// By node: publications and subscriptions.
     of: BTreeMap<u32, [Vec<(Element, &'a Edge)>; 2]>,
-    /// Topics without a known publisher or subscriber at some time.
-    topics: Vec<(Element, &'a Topic)>,
 }
 
 impl<'a> Ends<'a> {
@@ -83,20 +81,15 @@ impl<'a> Ends<'a> {
                 ends[side].push((what, edge));
             }
         }
-        let topics = (0..).zip(&all.topics);
-        Self {
-            of,
-            topics: topics
-                .map(|(id, topic)| (Element::Topic(id), topic))
-                .collect(),
-        }
+        Self { of }
     }
 
     /// The times at which the graph changes, from the mission's start on.
     fn turns(&self, mission: &Mission) -> BTreeSet<Stamp> {
         let nodes = self.of.keys().map(|id| Element::Node(*id));
         let edges = self.of.values().flatten().flatten().map(|(what, _)| *what);
-        let topics = self.topics.iter().map(|(what, _)| *what);
+        let all = mission.elements.all();
+        let topics = all.filter(|what| matches!(what, Element::Topic(_)));
         let runs = nodes.chain(edges).chain(topics);
         let runs = runs.flat_map(|what| mission.elements.runs(what));
         let turns = runs.flat_map(|run| [run.start, run.end]);

@@ -223,6 +223,14 @@ impl<'a> Facts<'a> {
         .collect()
     }
 
+    /// The roles of the nodes of these edges, without tools and without what is only inferred.
+    pub(crate) fn sure_roles(&self, edges: &[(NodeId, u32, Confidence)]) -> BTreeSet<String> {
+        let sure = edges
+            .iter()
+            .filter(|(node, _, known)| *known <= Confidence::Stated && !self.is_tool(&[*node]));
+        sure.map(|(node, ..)| self.role(*node).to_owned()).collect()
+    }
+
     /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
     pub(crate) fn is_rewritten(&self) -> bool {
         self.is_rewritten

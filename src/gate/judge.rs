@@ -11,7 +11,7 @@ mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{Expectation, Unlisted, YamlPlace};
+use super::expectation::{At, Expectation, Unlisted, YamlPlace};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, Severity, number};
 use super::pattern::Pattern;
@@ -169,6 +169,25 @@ impl Judge<'_> {
             findings,
             is_moot: false,
         });
+    }
+
+    /// Checks a fact of these nodes or topics, if the file has it; with nothing to check it is moot.
+    fn check<S: ?Sized, T>(
+        &mut self,
+        (title, all): (&str, &S),
+        key: &str,
+        wanted: Option<&At<T>>,
+        is_moot: bool,
+        found: impl Fn(&Self, &S, &At<T>) -> Vec<Finding>,
+    ) {
+        let Some(wanted) = wanted else { return };
+        let title = format!("{title} {key}");
+        if is_moot {
+            self.moot(title, wanted.at);
+        } else {
+            let found = found(self, all, wanted);
+            self.note(title, wanted.at, found);
+        }
     }
 
     /// Adds a fact about an absent element.

@@ -157,17 +157,6 @@ impl Diff {
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
-
-    /// Whether an element was added or removed.
-    pub fn is_structural(&self) -> bool {
-        fn moved<T>(delta: &Delta<T>) -> bool {
-            !delta.added.is_empty() || !delta.removed.is_empty()
-        }
-        moved(&self.nodes)
-            || moved(&self.topics)
-            || moved(&self.publishes)
-            || moved(&self.subscribes)
-    }
 }
 
 /// The difference from `before` to `after`.

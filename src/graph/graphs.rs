@@ -22,11 +22,8 @@ pub struct Graphs {
     spans: Vec<Span>,
     /// The lifecycle states that occur; rows refer to them by place, counted from 1.
     lifecycles: Vec<Arc<str>>,
-    /// The rows of each node, by id; nodes behind the last one that ever exists may be left out.
-    nodes: Vec<Column>,
-    topics: Vec<Column>,
-    publishes: Vec<Column>,
-    subscribes: Vec<Column>,
+    /// The rows of each element; those behind the last one of a kind that ever exists may be left out.
+    columns: PerElement<Column>,
 }
 
 impl Graphs {
@@ -47,16 +44,11 @@ impl Graphs {
 
     /// The graphs in order, each built when it is needed.
     pub fn iter(&self) -> Iter<'_> {
-        fn cursors(columns: &[Column]) -> Vec<ColumnCursor<'_>> {
-            columns.iter().map(Column::cursor).collect()
-        }
+        let columns = self.columns.0.each_ref();
         Iter {
             all: self,
             next: 0,
-            nodes: cursors(&self.nodes),
-            topics: cursors(&self.topics),
-            publishes: cursors(&self.publishes),
-            subscribes: cursors(&self.subscribes),
+            cursors: columns.map(|list| list.iter().map(Column::cursor).collect()),
         }
     }
 
@@ -67,13 +59,7 @@ impl Graphs {
 
     /// The rows of an element in the windows in which it exists, in order, with the places of the windows.
     pub(crate) fn rows(&self, what: Element) -> impl Iterator<Item = (usize, Row)> + '_ {
-        let (columns, id) = match what {
-            Element::Node(id) => (&self.nodes, id),
-            Element::Topic(id) => (&self.topics, id),
-            Element::Publish(id) => (&self.publishes, id),
-            Element::Subscribe(id) => (&self.subscribes, id),
-        };
-        let mut cursor = columns.get(id as usize).map(Column::cursor);
+        let mut cursor = self.columns.of(what).map(Column::cursor);
         let row = move |at| {
             let row = cursor.as_mut().and_then(ColumnCursor::next);
             row.map(|row| (at, row))
@@ -102,7 +88,7 @@ impl Graphs {
 
     /// A walk through all windows that yields only differences from the window before.
     pub(crate) fn walk(&self) -> ColumnWalk<'_> {
-        ColumnWalk::new([&self.nodes, &self.topics, &self.publishes, &self.subscribes])
+        ColumnWalk::new(&self.columns.0)
     }
 
     /// The lifecycle state at a place, counted from 1.
@@ -126,10 +112,7 @@ impl PartialEq for Graphs {
 pub struct Iter<'a> {
     all: &'a Graphs,
     next: usize,
-    nodes: Vec<ColumnCursor<'a>>,
-    topics: Vec<ColumnCursor<'a>>,
-    publishes: Vec<ColumnCursor<'a>>,
-    subscribes: Vec<ColumnCursor<'a>>,
+    cursors: [Vec<ColumnCursor<'a>>; 4],
 }
 
 impl Iterator for Iter<'_> {
@@ -139,11 +122,12 @@ impl Iterator for Iter<'_> {
         let span = *self.all.spans.get(self.next)?;
         self.next += 1;
         let lifecycles = &self.all.lifecycles;
+        let [nodes, topics, publishes, subscribes] = &mut self.cursors;
         Some(Graph {
-            nodes: states(&mut self.nodes, |id, row| row.node(id, span, lifecycles)),
-            topics: states(&mut self.topics, |id, row| row.topic(id, span)),
-            publishes: states(&mut self.publishes, |id, row| row.edge(id, span)),
-            subscribes: states(&mut self.subscribes, |id, row| row.edge(id, span)),
+            nodes: states(nodes, |id, row| row.node(id, span, lifecycles)),
+            topics: states(topics, |id, row| row.topic(id, span)),
+            publishes: states(publishes, |id, row| row.edge(id, span)),
+            subscribes: states(subscribes, |id, row| row.edge(id, span)),
         })
     }
 
@@ -153,14 +137,8 @@ impl Iterator for Iter<'_> {
     }
 
     fn nth(&mut self, many: usize) -> Option<Graph> {
-        let columns = [
-            &mut self.nodes,
-            &mut self.topics,
-            &mut self.publishes,
-            &mut self.subscribes,
-        ];
         let passed = many.min(self.all.spans.len() - self.next);
-        for cursor in columns.into_iter().flatten() {
+        for cursor in self.cursors.iter_mut().flatten() {
             (0..passed).for_each(|_| _ = cursor.next());
         }
         self.next += passed;
@@ -193,10 +171,7 @@ fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -
 pub(crate) struct GraphsWriter {
     spans: Vec<Span>,
     lifecycles: Vec<Arc<str>>,
-    nodes: Vec<ColumnWriter>,
-    topics: Vec<ColumnWriter>,
-    publishes: Vec<ColumnWriter>,
-    subscribes: Vec<ColumnWriter>,
+    columns: PerElement<ColumnWriter>,
 }
 
 impl GraphsWriter {
@@ -224,27 +199,19 @@ impl GraphsWriter {
         self.row(Element::Topic(state.id), at, row);
     }
 
-    /// Adds the state of a publication.
-    pub(crate) fn publish(&mut self, at: usize, state: &EdgeState) {
-        let row = Row::of_edge(state, self.spans[at]);
-        self.row(Element::Publish(state.id), at, row);
-    }
-
-    /// Adds the state of a subscription.
-    pub(crate) fn subscribe(&mut self, at: usize, state: &EdgeState) {
-        let row = Row::of_edge(state, self.spans[at]);
-        self.row(Element::Subscribe(state.id), at, row);
+    /// Adds the state of an edge.
+    pub(crate) fn edge(&mut self, what: Element, at: usize, state: &EdgeState) {
+        self.row(what, at, Row::of_edge(state, self.spans[at]));
     }
 
     /// Adds the row of an element in the window at a place.
     pub(crate) fn row(&mut self, what: Element, at: usize, row: Row) {
-        let (columns, id) = match what {
-            Element::Node(id) => (&mut self.nodes, id),
-            Element::Topic(id) => (&mut self.topics, id),
-            Element::Publish(id) => (&mut self.publishes, id),
-            Element::Subscribe(id) => (&mut self.subscribes, id),
-        };
-        column(columns, id).push(at, row);
+        let (kind, id) = what.place();
+        let columns = &mut self.columns.0[kind];
+        if columns.len() <= id {
+            columns.resize_with(id + 1, ColumnWriter::default);
+        }
+        columns[id].push(at, row);
     }
 
     /// The number of a lifecycle state in rows.
@@ -256,10 +223,12 @@ impl GraphsWriter {
     pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
         graph.nodes.iter().for_each(|state| self.node(at, state));
         graph.topics.iter().for_each(|state| self.topic(at, state));
-        let publishes = graph.publishes.iter();
-        publishes.for_each(|state| self.publish(at, state));
-        let subscribes = graph.subscribes.iter();
-        subscribes.for_each(|state| self.subscribe(at, state));
+        for state in &graph.publishes {
+            self.edge(Element::Publish(state.id), at, state);
+        }
+        for state in &graph.subscribes {
+            self.edge(Element::Subscribe(state.id), at, state);
+        }
     }
 
     /// Ends the writing.
@@ -273,20 +242,9 @@ impl GraphsWriter {
         Graphs {
             spans: self.spans,
             lifecycles: self.lifecycles,
-            nodes: columns(self.nodes),
-            topics: columns(self.topics),
-            publishes: columns(self.publishes),
-            subscribes: columns(self.subscribes),
+            columns: PerElement(self.columns.0.map(columns)),
         }
     }
-}
-
-fn column(columns: &mut Vec<ColumnWriter>, id: u32) -> &mut ColumnWriter {
-    let at = id as usize;
-    if columns.len() <= at {
-        columns.resize_with(at + 1, ColumnWriter::default);
-    }
-    &mut columns[at]
 }
 
 /// The place of a word in a short list, counted from 1; adds it if it is new.

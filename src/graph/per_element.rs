@@ -4,7 +4,7 @@ use super::{Element, Elements};
 
 /// A value per element, by the element.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PerElement<T>([Vec<T>; 4]);
+pub struct PerElement<T>(pub(super) [Vec<T>; 4]);
 
 impl<T> Default for PerElement<T> {
     fn default() -> Self {

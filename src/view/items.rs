@@ -407,15 +407,19 @@ impl Viewed {
         Some((u32::try_from(at).ok()?, usize::from(is_back)))
     }
 
+    /// The node and the topic of an element: both of an edge, one of the others.
+    fn both_of(&self, what: Element) -> (Option<NodeId>, Option<TopicId>) {
+        match what {
+            Element::Node(id) => (Some(id), None),
+            Element::Topic(id) => (None, Some(id)),
+            Element::Publish(id) => self.published.get(id as usize).copied().unzip(),
+            Element::Subscribe(id) => self.subscribed.get(id as usize).copied().unzip(),
+        }
+    }
+
     /// The topic of an element: that of an edge, or itself.
     pub(crate) fn topic_of(&self, what: Element) -> Option<TopicId> {
-        let of = |edges: &[(NodeId, TopicId)], id: u32| edges.get(id as usize).map(|edge| edge.1);
-        match what {
-            Element::Node(_) => None,
-            Element::Topic(id) => Some(id),
-            Element::Publish(id) => of(&self.published, id),
-            Element::Subscribe(id) => of(&self.subscribed, id),
-        }
+        self.both_of(what).1
     }
 
     /// Notes the arrows that each topic's publications are part of.
@@ -439,12 +443,7 @@ impl Viewed {
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
         let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
-        let (node, topic) = match what {
-            Element::Node(id) => (Some(id), None),
-            Element::Topic(id) => (None, Some(id)),
-            Element::Publish(id) => self.published.get(id as usize).copied().unzip(),
-            Element::Subscribe(id) => self.subscribed.get(id as usize).copied().unzip(),
-        };
+        let (node, topic) = self.both_of(what);
         let is_node = node.is_none_or(|id| is(&self.selection.nodes, id));
         let is_topic = topic.is_none_or(|id| is(&self.selection.topics, id));
         (node.is_some() || topic.is_some()) && is_node && is_topic

@@ -4,7 +4,7 @@
 //! changes its look without an event.
 
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Edge, Element, Elements, PerElement};
+use crate::graph::{Element, Elements, PerElement};
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
 
@@ -85,7 +85,7 @@ impl<'a> ItemTurns<'a> {
                 .is_some_and(|pauses| pauses.iter().any(covers))
         };
         let mut sent: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
-        for (what, edge) in edges(&self.elements.publishes, Element::Publish) {
+        for (what, edge) in (0..).map(Element::Publish).zip(&self.elements.publishes) {
             if alive.is(what)
                 && let Some(all) = sent.get_mut(edge.topic as usize)
             {
@@ -120,8 +120,7 @@ impl<'a> ItemTurns<'a> {
             }
         });
         let mut carried: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
-        let publishes = edges(&self.elements.publishes, Element::Publish);
-        for (what, edge) in publishes.chain(edges(&self.elements.subscribes, Element::Subscribe)) {
+        for (what, edge) in self.elements.edges() {
             if let Some(carried) = carried.get_mut(edge.topic as usize) {
                 *carried = Some(carried.unwrap_or(false) || alive.is(what));
             }
@@ -136,11 +135,6 @@ impl<'a> ItemTurns<'a> {
         }
         alive
     }
-}
-
-/// Edges with their elements.
-fn edges(all: &[Edge], kind: fn(u32) -> Element) -> impl Iterator<Item = (Element, &Edge)> {
-    (0..).map(kind).zip(all)
 }
 
 /// Whether an element lives after the first `done` of its turns: before the first one, if that is not a beginning.

@@ -6,7 +6,6 @@ use super::{length, list, mapping, scalar, two_digits};
 use crate::base::rhythm::{CLOSING_NS, FEWEST, GAP_NS};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::evidence::Confidence;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::Range;
@@ -376,27 +375,13 @@ impl TopicInRun<'_> {
     /// The nodes that publish it; `None` unless all of them are known.
     fn by(&self) -> Option<BTreeSet<String>> {
         let known = self.facts.publishers(self.id);
-        let sure = known
-            .iter()
-            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
-        let names = sure
-            .map(|(node, ..)| *node)
-            .filter(|node| !self.facts.is_tool(&[*node]));
-        self.facts
-            .tells_publishers(self.id)
-            .then(|| names.map(|node| self.facts.role(node).to_owned()).collect())
+        let is_told = self.facts.tells_publishers(self.id);
+        is_told.then(|| self.facts.sure_roles(&known))
     }
 
     /// The nodes that subscribe to it, if measured or stated.
     fn to(&self) -> BTreeSet<String> {
-        let known = self.facts.subscribers(self.id);
-        let sure = known
-            .iter()
-            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
-        let names = sure
-            .map(|(node, ..)| *node)
-            .filter(|node| !self.facts.is_tool(&[*node]));
-        names.map(|node| self.facts.role(node).to_owned()).collect()
+        self.facts.sure_roles(&self.facts.subscribers(self.id))
     }
 }
 

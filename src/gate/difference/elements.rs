@@ -6,7 +6,6 @@ use super::{Difference, Where};
 use crate::base::rhythm::{CLOSING_NS, FEWEST};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::evidence::Confidence;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
@@ -159,20 +158,10 @@ fn topic(
         all.push(Difference::changed("qos", name, &*qos, &*other));
     }
     rates(name, (a, first), (b, second), rate_change, all);
-    let sure = |edges: Vec<(NodeId, u32, Confidence)>, facts: &Facts<'_>| -> BTreeSet<String> {
-        let sure = edges
-            .into_iter()
-            .filter(|(.., confidence)| *confidence <= Confidence::Stated);
-        let roles = sure.filter(|(node, ..)| !facts.is_tool(&[*node]));
-        roles
-            .map(|(node, ..)| facts.role(node).to_owned())
-            .collect()
-    };
-    let senders = (sure(a.publishers(first), a), sure(b.publishers(second), b));
-    let listeners = (
-        sure(a.subscribers(first), a),
-        sure(b.subscribers(second), b),
-    );
+    let senders = |facts: &Facts<'_>, id| facts.sure_roles(&facts.publishers(id));
+    let listeners = |facts: &Facts<'_>, id| facts.sure_roles(&facts.subscribers(id));
+    let senders = (senders(a, first), senders(b, second));
+    let listeners = (listeners(a, first), listeners(b, second));
     let tells = |side: Where, role: &str, kind: &str| {
         // Whether the edge would be observable in the mission that lacks it.
         let (facts, id) = if side == Where::First {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{TopicFacts, YamlPlace};
+use crate::gate::expectation::{At, TopicFacts};
 use crate::gate::finding::Finding;
 use crate::gate::measure::Measure;
 use crate::gate::range::Range;
@@ -17,10 +17,10 @@ impl Judge<'_> {
         &self,
         topic: TopicId,
         measure: &Measure,
-        range: Range,
+        range: &At<Range>,
         facts: &TopicFacts,
-        at: YamlPlace,
     ) -> Option<Finding> {
+        let At { at, value: range } = *range;
         let name = self.facts.topic(topic);
         let key = measure.key;
         let judged = self.judged(topic, facts);

@@ -8,16 +8,16 @@ use crate::base::words;
 use crate::gate::expectation::{At, Named, NodeFacts, YamlPlace};
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
-use crate::gate::range::During;
+use crate::gate::range::{During, Range};
 use crate::graph::NodeId;
 use crate::mission::event_log;
 
 /// The roles that a name matches.
 type Roles<'a> = [(&'a str, &'a [NodeId])];
 
-/// The position of a `may_end` time range, unless it is the whole mission, which is no restriction.
-pub(super) fn limited(may_end: &At<During>) -> Option<YamlPlace> {
-    (may_end.value != During::WHOLE).then_some(may_end.at)
+/// The times in which something may end, unless it may at any time.
+pub(super) fn limited(may_end: Option<&At<During>>) -> Option<&At<During>> {
+    may_end.filter(|may_end| may_end.value != During::WHOLE)
 }
 
 impl Judge<'_> {
@@ -43,28 +43,15 @@ impl Judge<'_> {
     /// Checks the facts of a node other than its presence. `title` begins the titles of the facts.
     pub(super) fn node_facts(&mut self, title: &str, pattern: &Pattern, facts: &NodeFacts) {
         let roles = self.facts.nodes(pattern);
-        let wanted = [
-            ("within", facts.within.as_ref().map(|w| w.at)),
-            ("may_end", facts.may_end.as_ref().and_then(limited)),
-            ("restarts", facts.restarts.as_ref().map(|r| r.at)),
-            ("lifecycle", facts.lifecycle.as_ref().map(|l| l.at)),
-        ];
-        for (key, place) in wanted {
-            let Some(place) = place else { continue };
-            let title = format!("{title} {key}");
-            let is_timed = matches!(key, "within" | "may_end");
-            if roles.is_empty() || is_timed && self.is_part {
-                self.moot(title, place);
-                continue;
-            }
-            let found = match key {
-                "within" => self.late(&roles, facts, place),
-                "may_end" => self.ended(&roles, facts, place),
-                "restarts" => self.restarted(&roles, facts, place),
-                _ => self.lifecycle(&roles, facts, place),
-            };
-            self.note(title, place, found);
-        }
+        let all = (title, &roles[..]);
+        let is_absent = roles.is_empty();
+        let is_untimed = is_absent || self.is_part;
+        let (within, may_end) = (facts.within.as_ref(), limited(facts.may_end.as_ref()));
+        let (restarts, lifecycle) = (facts.restarts.as_ref(), facts.lifecycle.as_ref());
+        self.check(all, "within", within, is_untimed, Self::late);
+        self.check(all, "may_end", may_end, is_untimed, Self::ended);
+        self.check(all, "restarts", restarts, is_absent, Self::restarted);
+        self.check(all, "lifecycle", lifecycle, is_absent, Self::lifecycle);
     }
 
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
@@ -191,16 +178,13 @@ impl Judge<'_> {
     }
 
     /// The findings on whether a node ended in the time in which it may.
-    fn ended(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(may_end) = &facts.may_end else {
-            return Vec::new();
-        };
+    fn ended(&self, roles: &Roles<'_>, may_end: &At<During>) -> Vec<Finding> {
         let allowed = may_end.value.on(self.facts.mission.span);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let found = roles.iter().filter_map(|(role, nodes)| {
             let (end, _) = self.facts.ended(nodes)?;
             let is_off = end < allowed.start || end > allowed.end;
-            is_off.then(|| self.gone(role, nodes, &expected, at))?
+            is_off.then(|| self.gone(role, nodes, &expected, may_end.at))?
         });
         found.collect()
     }
@@ -227,10 +211,7 @@ impl Judge<'_> {
         Some(finding)
     }
 
-    fn late(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(within) = &facts.within else {
-            return Vec::new();
-        };
+    fn late(&self, roles: &Roles<'_>, within: &At<During>) -> Vec<Finding> {
         let whole = self.facts.mission.span;
         let allowed = within.value.on(whole);
         let expected = format!("within {}", self.facts.stretch(allowed));
@@ -247,10 +228,15 @@ impl Judge<'_> {
                 let says = format!(
                     "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
                 );
-                return Some(Finding::unknown(FindingKind::NodeLate, role, at, says));
+                return Some(Finding::unknown(
+                    FindingKind::NodeLate,
+                    role,
+                    within.at,
+                    says,
+                ));
             }
             let says = format!("{role} appeared at {clock}, expected {expected}");
-            let finding = Finding::new(FindingKind::NodeLate, role, at, says);
+            let finding = Finding::new(FindingKind::NodeLate, role, within.at, says);
             Some(
                 finding
                     .saw(format!("at {clock}"), &expected)
@@ -260,10 +246,7 @@ impl Judge<'_> {
         late.collect()
     }
 
-    fn restarted(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(range) = &facts.restarts else {
-            return Vec::new();
-        };
+    fn restarted(&self, roles: &Roles<'_>, range: &At<Range>) -> Vec<Finding> {
         let found = roles.iter().filter_map(|(role, nodes)| {
             let events = self.facts.events(nodes, event_log::Kind::Restarted);
             if range.value.holds(events.len() as f64) {
@@ -271,7 +254,7 @@ impl Judge<'_> {
             }
             let many = words::count(events.len(), "time");
             let says = format!("{role} restarted {many}, expected {}", range.value);
-            let mut finding = Finding::new(FindingKind::NodeRestarted, role, at, says)
+            let mut finding = Finding::new(FindingKind::NodeRestarted, role, range.at, says)
                 .saw(&many, words::count_range(range.value.from, range.value.to));
             for event in events.iter().take(6) {
                 let until = event.until.unwrap_or(event.time);
@@ -291,10 +274,8 @@ impl Judge<'_> {
         found.collect()
     }
 
-    fn lifecycle(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(state) = &facts.lifecycle else {
-            return Vec::new();
-        };
+    fn lifecycle(&self, roles: &Roles<'_>, state: &At<String>) -> Vec<Finding> {
+        let at = state.at;
         let expected = state.value.as_str();
         let found = roles.iter().filter_map(|(role, nodes)| {
             match self.facts.lifecycle(nodes) {

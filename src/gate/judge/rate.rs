@@ -4,18 +4,16 @@ use super::Judge;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{TopicFacts, While, YamlPlace};
+use crate::gate::expectation::{At, TopicFacts, While, YamlPlace};
 use crate::gate::facts::{Rate, TopicSilence};
 use crate::gate::finding::{Finding, FindingKind};
-use crate::gate::range::Range;
+use crate::gate::range::{During, Range};
 use crate::graph::TopicId;
 
 impl Judge<'_> {
     /// The findings on whether a topic's rate is in its range in the required share of windows.
-    pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(range) = facts.hz.as_ref().map(|hz| hz.value) else {
-            return Vec::new();
-        };
+    pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, hz: &At<Range>) -> Vec<Finding> {
+        let At { at, value: range } = *hz;
         let rates = self.judged(topic, facts);
         if rates.is_empty() {
             return self.no_window(topic, facts, at);
@@ -45,12 +43,10 @@ impl Judge<'_> {
     }
 
     /// The findings on whether a topic's rate from its first to its last message is in its range.
-    pub(super) fn mean(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(range) = facts.mean_hz.as_ref().map(|hz| hz.value) else {
-            return Vec::new();
-        };
-        // Already reported for windows.
-        if !self.rate(topic, facts, at).is_empty() {
+    pub(super) fn mean(&self, topic: TopicId, facts: &TopicFacts, hz: &At<Range>) -> Vec<Finding> {
+        let At { at, value: range } = *hz;
+        let in_windows = facts.hz.as_ref().map(|hz| self.rate(topic, facts, hz));
+        if in_windows.is_some_and(|found| !found.is_empty()) {
             return Vec::new();
         }
         let rates = if facts.during.is_none() && facts.whilst.is_none() {
@@ -84,10 +80,14 @@ impl Judge<'_> {
     }
 
     /// The findings on whether a topic's first message was in time.
-    pub(super) fn first(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
+    pub(super) fn first(
+        &self,
+        topic: TopicId,
+        facts: &TopicFacts,
+        within: &At<During>,
+    ) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let active = self.facts.heard(topic);
-        let (Some(within), Some(active)) = (&facts.within, active) else {
+        let Some(active) = self.facts.heard(topic) else {
             return Vec::new();
         };
         let allowed = within.value.on(whole);
@@ -101,7 +101,7 @@ impl Judge<'_> {
         let clock = self.facts.clock(active.start);
         let expected = format!("within {}", self.facts.stretch(allowed));
         let says = format!("{name} began at {clock}, expected {expected}");
-        let finding = Finding::new(FindingKind::TopicLate, name, at, says);
+        let finding = Finding::new(FindingKind::TopicLate, name, within.at, says);
         let span = Span::new(whole.start, active.start);
         let mut finding = finding.saw(format!("at {clock}"), expected).at(span);
         finding.details.extend(Self::senders(facts));
@@ -109,9 +109,14 @@ impl Judge<'_> {
     }
 
     /// The findings on whether a topic ended in the time in which it may.
-    pub(super) fn last(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
+    pub(super) fn last(
+        &self,
+        topic: TopicId,
+        facts: &TopicFacts,
+        may_end: &At<During>,
+    ) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let (Some(may_end), Some(active)) = (&facts.may_end, self.facts.heard(topic)) else {
+        let Some(active) = self.facts.heard(topic) else {
             return Vec::new();
         };
         let allowed = may_end.value.on(whole);
@@ -124,7 +129,7 @@ impl Judge<'_> {
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let says = format!("{name} ended at {clock}, expected {expected}");
         let around = Span::new(active.end.plus(-CLOSING_NS), active.end.plus(CLOSING_NS));
-        let mut finding = Finding::new(FindingKind::TopicGone, name, at, says)
+        let mut finding = Finding::new(FindingKind::TopicGone, name, may_end.at, says)
             .saw(format!("ended at {clock}"), expected)
             .at(Span::new(active.end, whole.end));
         finding.details.extend(Self::senders(facts));
@@ -228,10 +233,8 @@ impl Judge<'_> {
     }
 
     /// The findings on whether a topic was never silent for too long.
-    pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(most) = facts.max_gap.as_ref().map(|gap| gap.value) else {
-            return Vec::new();
-        };
+    pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, most: &At<i64>) -> Vec<Finding> {
+        let At { at, value: most } = *most;
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));
         let silences = self.facts.silences(topic, facts.may_end.is_some(), during);

@@ -36,59 +36,63 @@ impl Judge<'_> {
     /// Checks the facts of a topic other than its presence.
     pub(super) fn topic_facts(&mut self, title: &str, pattern: &Pattern, facts: &TopicFacts) {
         let topics = self.facts.topics(pattern);
-        let wanted = [
-            ("type", facts.kinds.as_ref().map(|k| k.at)),
-            ("by", facts.by.as_ref().map(|b| b.at)),
-            ("to", facts.to.as_ref().map(|t| t.at)),
-            ("within", facts.within.as_ref().map(|w| w.at)),
-            ("may_end", facts.may_end.as_ref().and_then(limited)),
-            ("hz", facts.hz.as_ref().map(|h| h.at)),
-            ("mean_hz", facts.mean_hz.as_ref().map(|h| h.at)),
-            ("max_gap", facts.max_gap.as_ref().map(|g| g.at)),
-            ("latched", facts.latched.as_ref().map(|l| l.at)),
-            ("qos", facts.qos.as_ref().map(|q| q.at)),
-        ];
-        for (key, place) in wanted {
-            let Some(place) = place else { continue };
-            let title = format!("{title} {key}");
-            let is_of_messages = matches!(key, "within" | "may_end" | "hz" | "mean_hz" | "max_gap");
-            let is_timed = matches!(key, "within" | "may_end" | "mean_hz");
-            if topics.is_empty()
-                || is_timed && self.is_part
-                || is_of_messages && !self.is_sent(&topics)
-            {
-                self.moot(title, place);
-                continue;
-            }
-            let found = topics.iter().flat_map(|topic| match key {
-                "type" => self.kind(*topic, facts, place),
-                "by" => self.publishers(*topic, facts),
-                "to" => self.subscribers(*topic, facts),
-                "within" => self.first(*topic, facts, place),
-                "may_end" => self.last(*topic, facts, place),
-                "hz" => self.rate(*topic, facts, place),
-                "mean_hz" => self.mean(*topic, facts, place),
-                "max_gap" => self.gap(*topic, facts, place),
-                "latched" => self.latched(*topic, facts, place),
-                _ => self.qos(*topic, facts, place),
-            });
-            let found = found.collect();
-            self.note(title, place, found);
-        }
+        let all = (title, &topics[..]);
+        let is_absent = topics.is_empty();
+        let is_unsent = !self.is_sent(&topics);
+        let is_untimed = is_unsent || self.is_part;
+        let (kinds, by, to) = (facts.kinds.as_ref(), facts.by.as_ref(), facts.to.as_ref());
+        self.each(all, "type", kinds, is_absent, Self::kind);
+        self.each(all, "by", by, is_absent, Self::publishers);
+        self.each(all, "to", to, is_absent, Self::subscribers);
+        let (within, may_end) = (facts.within.as_ref(), limited(facts.may_end.as_ref()));
+        self.each(all, "within", within, is_untimed, |own, topic, within| {
+            own.first(topic, facts, within)
+        });
+        self.each(
+            all,
+            "may_end",
+            may_end,
+            is_untimed,
+            |own, topic, may_end| own.last(topic, facts, may_end),
+        );
+        let (hz, mean_hz) = (facts.hz.as_ref(), facts.mean_hz.as_ref());
+        self.each(all, "hz", hz, is_unsent, |own, topic, hz| {
+            own.rate(topic, facts, hz)
+        });
+        self.each(all, "mean_hz", mean_hz, is_untimed, |own, topic, hz| {
+            own.mean(topic, facts, hz)
+        });
+        let max_gap = facts.max_gap.as_ref();
+        self.each(all, "max_gap", max_gap, is_unsent, |own, topic, most| {
+            own.gap(topic, facts, most)
+        });
+        let (latched, qos) = (facts.latched.as_ref(), facts.qos.as_ref());
+        self.each(all, "latched", latched, is_absent, Self::latched);
+        self.each(all, "qos", qos, is_absent, Self::qos);
         for (measure, range) in MEASURES.iter().zip(&facts.measures) {
-            let Some(At { at, value }) = *range else {
-                continue;
-            };
-            let title = format!("{title} {}", measure.key);
-            if !self.is_sent(&topics) {
-                self.moot(title, at);
-                continue;
-            }
-            let found = topics.iter();
-            let found = found.filter_map(|topic| self.measured(*topic, measure, value, facts, at));
-            let found = found.collect();
-            self.note(title, at, found);
+            let (key, range) = (measure.key, range.as_ref());
+            self.each(all, key, range, is_unsent, |own, topic, range| {
+                let found = own.measured(topic, measure, range, facts);
+                found.into_iter().collect()
+            });
         }
+    }
+
+    /// Checks a fact of each of these topics.
+    fn each<T>(
+        &mut self,
+        all: (&str, &[TopicId]),
+        key: &str,
+        wanted: Option<&At<T>>,
+        is_moot: bool,
+        found: impl Fn(&Self, TopicId, &At<T>) -> Vec<Finding>,
+    ) {
+        self.check(all, key, wanted, is_moot, |own, topics, wanted| {
+            let topics = topics.iter();
+            topics
+                .flat_map(|topic| found(own, *topic, wanted))
+                .collect()
+        });
     }
 
     pub(super) fn forbidden_topics(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
@@ -166,10 +170,7 @@ impl Judge<'_> {
         topics.iter().any(|topic| self.facts.messages(*topic) > 0)
     }
 
-    fn kind(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(kinds) = &facts.kinds else {
-            return Vec::new();
-        };
+    fn kind(&self, topic: TopicId, kinds: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
         let types = &self.facts.mission.elements.topics[topic as usize].types;
         let expected: Vec<&str> = kinds.value.iter().map(|k| k.value.as_str()).collect();
         let plain = |text: &str| text.replace("/msg/", "/");
@@ -179,20 +180,22 @@ impl Judge<'_> {
         let expected = words::some_of(&expected, NAMED);
         if types.is_empty() {
             let says = format!("cannot tell whether {name} is a {expected}: its type is unknown");
-            return vec![Finding::unknown(FindingKind::TopicType, name, at, says)];
+            return vec![Finding::unknown(
+                FindingKind::TopicType,
+                name,
+                kinds.at,
+                says,
+            )];
         }
         if other.is_empty() {
             return Vec::new();
         }
         let seen = words::some_of(&other, NAMED);
         let says = format!("{name} is a {seen}, expected {expected}");
-        vec![Finding::new(FindingKind::TopicType, name, at, says).saw(seen, expected)]
+        vec![Finding::new(FindingKind::TopicType, name, kinds.at, says).saw(seen, expected)]
     }
 
-    fn publishers(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Finding> {
-        let Some(by) = &facts.by else {
-            return Vec::new();
-        };
+    fn publishers(&self, topic: TopicId, by: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
         let name = self.facts.topic(topic);
         let known = self.facts.publishers(topic);
         let expected: Vec<&str> = by.value.iter().map(|p| p.value.as_str()).collect();
@@ -265,8 +268,8 @@ impl Judge<'_> {
         finding
     }
 
-    fn subscribers(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Finding> {
-        let wanted = facts.to.iter().flat_map(|to| &to.value);
+    fn subscribers(&self, topic: TopicId, to: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
+        let wanted = to.value.iter();
         wanted
             .filter_map(|wanted| self.subscriber(topic, wanted))
             .collect()
@@ -306,10 +309,8 @@ impl Judge<'_> {
         Some(finding)
     }
 
-    fn latched(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(wanted) = &facts.latched else {
-            return Vec::new();
-        };
+    fn latched(&self, topic: TopicId, wanted: &At<bool>) -> Vec<Finding> {
+        let at = wanted.at;
         let name = self.facts.topic(topic);
         let word = |is: bool| if is { "latched" } else { "not latched" };
         let expected = word(wanted.value);
@@ -326,10 +327,8 @@ impl Judge<'_> {
         }
     }
 
-    fn qos(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
-        let Some(wanted) = &facts.qos else {
-            return Vec::new();
-        };
+    fn qos(&self, topic: TopicId, wanted: &At<String>) -> Vec<Finding> {
+        let at = wanted.at;
         let name = self.facts.topic(topic);
         let expected = &wanted.value;
         let Some(seen) = &self.facts.mission.elements.topics[topic as usize].qos else {

@@ -15,7 +15,7 @@ use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::Name;
 use crate::graph::{
-    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Element, Graphs, GraphsWriter, Measures,
+    Column, ColumnCursor, ColumnWriter, EdgeState, Element, Graphs, GraphsWriter, Measures,
     NodeState, Number, Row, State, TopicState, per_second,
 };
 
@@ -209,29 +209,25 @@ impl GraphAssembly<'_> {
                 let row = sent.as_mut().map(ColumnCursor::next);
                 let own = row.flatten();
                 let count = row.map(|row| row.and_then(|row| row.count).unwrap_or(0));
-                if self.sees(record, *window) {
-                    let state = record.state(*window, count.is_some_and(|n| n > 0));
-                    let what = Element::Publish(id);
-                    let state = EdgeState {
-                        bytes: own
-                            .and_then(|row| row.bytes)
-                            .or(self.measures.bytes(what, at)),
-                        measures: Measures {
-                            jitter_s: own
-                                .and_then(|row| row.jitter.value())
-                                .or(self.measures.of(what, at).jitter_s),
-                            ..self.measures.of(what, at)
-                        },
-                        ..edge_state(
-                            id,
-                            degree_in(record, edge.first, *window),
-                            state,
-                            *window,
-                            count,
-                        )
-                    };
-                    self.graphs.publish(at, &state);
+                if !self.sees(record, *window) {
+                    continue;
                 }
+                let what = Element::Publish(id);
+                let (bytes, measures) = (self.measures.bytes(what, at), self.measures.of(what, at));
+                let jitter = own.and_then(|row| row.jitter.value());
+                let state = EdgeState {
+                    id,
+                    state: record.state(*window, count.is_some_and(|n| n > 0)),
+                    confidence: degree_in(record, edge.first, *window),
+                    count,
+                    hz: count.and_then(|n| per_second(n, *window)),
+                    bytes: own.and_then(|row| row.bytes).or(bytes),
+                    measures: Measures {
+                        jitter_s: jitter.or(measures.jitter_s),
+                        ..measures
+                    },
+                };
+                self.graphs.edge(what, at, &state);
             }
         }
     }
@@ -256,17 +252,14 @@ impl GraphAssembly<'_> {
                 };
                 let what = Element::Subscribe(id);
                 let state = EdgeState {
+                    id,
+                    state,
+                    confidence: degree_in(record, edge.first, *window),
                     bytes: self.measures.bytes(what, at),
                     measures: self.measures.of(what, at),
-                    ..edge_state(
-                        id,
-                        degree_in(record, edge.first, *window),
-                        state,
-                        *window,
-                        None,
-                    )
+                    ..EdgeState::default()
                 };
-                self.graphs.subscribe(at, &state);
+                self.graphs.edge(what, at, &state);
             }
         }
     }
@@ -303,24 +296,6 @@ fn degree_in(record: &Record, first: Option<Stamp>, window: Span) -> Confidence 
         record.confidence.max(Confidence::Inferred)
     } else {
         record.confidence
-    }
-}
-
-fn edge_state(
-    id: EdgeId,
-    confidence: Confidence,
-    state: State,
-    window: Span,
-    count: Option<u64>,
-) -> EdgeState {
-    EdgeState {
-        id,
-        state,
-        confidence,
-        count,
-        hz: count.and_then(|n| per_second(n, window)),
-        bytes: None,
-        measures: Measures::default(),
     }
 }
 

@@ -268,19 +268,15 @@ impl Assembly<'_> {
     fn incidents(&mut self) {
         let all = &mut self.history;
         for incident in &self.findings.incidents {
-            let node = |name: &Name| all.node_ids.get(name).copied();
-            let topic = |name: &Name| all.topic_ids.get(name).copied();
+            let [node, topic] = incident.what.ends();
+            let node = node.and_then(|name| all.node_ids.get(&name).copied());
+            let topic = topic.and_then(|name| all.topic_ids.get(&name).copied());
+            let edge = node.zip(topic);
             let what = match &incident.what {
-                ElementKey::Node(name) => node(name).map(Element::Node),
-                ElementKey::Topic(name) => topic(name).map(Element::Topic),
-                ElementKey::Publish(name, of) => node(name)
-                    .zip(topic(of))
-                    .and_then(|(node, topic)| all.elements.publication(node, topic))
-                    .map(Element::Publish),
-                ElementKey::Subscribe(of, name) => node(name)
-                    .zip(topic(of))
-                    .and_then(|(node, topic)| all.elements.subscription(topic, node))
-                    .map(Element::Subscribe),
+                ElementKey::Node(_) => node.map(Element::Node),
+                ElementKey::Topic(_) => topic.map(Element::Topic),
+                ElementKey::Publish(..) => edge.and_then(|of| all.elements.published(of)),
+                ElementKey::Subscribe(..) => edge.and_then(|of| all.elements.subscribed(of)),
             };
             all.incidents.extend(what.map(|what| Incident {
                 what,

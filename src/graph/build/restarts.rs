@@ -10,7 +10,7 @@ use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
+use crate::evidence::inference::{Inference, Reliability, Validity};
 use crate::evidence::numbers::Number;
 use crate::evidence::observation::Name;
 use crate::graph::history::Stretch;
@@ -264,10 +264,7 @@ fn falls_of(
 fn said(inferences: &[Inference]) -> BTreeMap<Name, Vec<&Inference>> {
     let mut of: BTreeMap<Name, Vec<&Inference>> = BTreeMap::new();
     for inference in inferences {
-        if let ElementKey::Node(node)
-        | ElementKey::Publish(node, _)
-        | ElementKey::Subscribe(_, node) = inference.what
-        {
+        if let [Some(node), _] = inference.what.ends() {
             of.entry(node).or_default().push(inference);
         }
     }

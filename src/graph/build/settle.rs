@@ -28,7 +28,9 @@ pub(crate) fn settle(
         .collect();
     let mut edges = tracks.split_off(&FIRST_EDGE);
     for (what, track) in &edges {
-        let (node, topic) = ends(*what);
+        let [Some(node), Some(topic)] = what.ends() else {
+            continue;
+        };
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         let learner = tracks.entry(ElementKey::Node(node)).or_default();
@@ -64,7 +66,9 @@ pub(crate) fn settle(
     }
     let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
     for (what, track) in &mut edges {
-        let (node, topic) = ends(*what);
+        let [Some(node), Some(topic)] = what.ends() else {
+            continue;
+        };
         let around = tracks
             .get(&ElementKey::Node(node))
             .map_or(&[][..], |t| &t.lives);
@@ -73,8 +77,8 @@ pub(crate) fn settle(
     }
     tracks.append(&mut edges);
     for (what, lives) in live_like(tracks, inferences, false) {
-        if !matches!(what, ElementKey::Node(_)) {
-            of_topics.entry(ends(what).1).or_default().extend(lives);
+        if let [_, Some(topic)] = what.ends() {
+            of_topics.entry(topic).or_default().extend(lives);
         }
     }
     for (what, track) in tracks.iter_mut() {
@@ -106,12 +110,4 @@ fn live_like(
         }
     }
     done
-}
-
-/// The node and the topic of an edge.
-fn ends(edge: ElementKey) -> (Name, Name) {
-    match edge {
-        ElementKey::Publish(node, topic) | ElementKey::Subscribe(topic, node) => (node, topic),
-        ElementKey::Node(name) | ElementKey::Topic(name) => (name, name),
-    }
 }

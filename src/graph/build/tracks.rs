@@ -29,12 +29,7 @@ pub(crate) fn tracks(
     let sent = sent(&findings.inferences);
     let starved = starved(findings, traffic);
     for inference in &findings.inferences {
-        let node = match inference.what {
-            ElementKey::Node(node)
-            | ElementKey::Publish(node, _)
-            | ElementKey::Subscribe(_, node) => Some(node),
-            ElementKey::Topic(_) => None,
-        };
+        let [node, _] = inference.what.ends();
         let own = node.and_then(|node| restarts.get(&node));
         let own = own.map_or(&[][..], Vec::as_slice);
         let deaths: Vec<Stamp> = own.iter().map(|r| r.death).collect();

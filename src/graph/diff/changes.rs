@@ -10,18 +10,6 @@ use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, State, TopicId, 
 /// The default share by which a rate must change to count as changed.
 pub const RATE_CHANGE: f64 = 0.25;
 
-/// Types that many nodes write to in turn, so that a new writer takes over nothing.
-const SHARED: [&str; 8] = [
-    "Log",
-    "ParameterEvent",
-    "TFMessage",
-    "DiagnosticArray",
-    "Status",
-    "Clock",
-    "tfMessage",
-    "TopicStatistics",
-];
-
 /// A finder of the reconfigurations of a mission, window by window in order.
 #[derive(Debug)]
 pub struct Changes<'a> {
@@ -172,7 +160,7 @@ impl<'a> Changes<'a> {
         for (topic, to) in self.sending(after) {
             let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
             let other = !from.is_empty() && from.is_disjoint(&to);
-            if other && there(before, topic) && !self.is_shared(topic) {
+            if other && there(before, topic) && !self.elements.topics[topic as usize].is_shared() {
                 let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
                 changes.push(Change::HandedOver { topic, from, to });
             }
@@ -191,13 +179,6 @@ impl<'a> Changes<'a> {
             sending.entry(edge.topic).or_default().insert(edge.node);
         }
         sending
-    }
-
-    fn is_shared(&self, topic: TopicId) -> bool {
-        let types = &self.elements.topics[topic as usize].types;
-        types
-            .iter()
-            .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
     }
 }
 

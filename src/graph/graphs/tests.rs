@@ -179,7 +179,7 @@ fn constant_states_take_no_memory() {
         ..Graph::default()
     };
     let all: Graphs = (0..100_000).map(|n| (second(n), graph.clone())).collect();
-    assert!(all.topics[0].len() < 32, "{:?}", all.topics);
+    assert!(all.columns.0[1][0].len() < 32, "{:?}", all.columns);
 }
 
 #[test]
@@ -197,5 +197,5 @@ fn memory_is_proportional_to_the_states_of_elements() {
     };
     let span = Span::new(Stamp(0), Stamp(1));
     let all: Graphs = [(span, graph)].into_iter().collect();
-    assert_eq!(all.nodes.capacity(), 1000);
+    assert_eq!(all.columns.0[0].capacity(), 1000);
 }

@@ -14,16 +14,9 @@ pub(crate) struct ColumnWalk<'a> {
     cursors: [Vec<ColumnCursor<'a>>; 4],
 }
 
-/// The element for an id in each list.
-const KINDS: [fn(u32) -> Element; 4] = [
-    Element::Node,
-    Element::Topic,
-    Element::Publish,
-    Element::Subscribe,
-];
-
 impl<'a> ColumnWalk<'a> {
-    pub(super) fn new(columns: [&'a [Column]; 4]) -> Self {
+    pub(super) fn new(columns: &'a [Vec<Column>; 4]) -> Self {
+        let columns = columns.each_ref();
         Self {
             window: 0,
             due: columns.map(|list| vec![0; list.len()]),
@@ -34,7 +27,7 @@ impl<'a> ColumnWalk<'a> {
     /// Passes to `tell` every element that may differ in the next window, with its row there, if it exists.
     pub(crate) fn next(&mut self, mut tell: impl FnMut(Element, Option<Row>)) {
         let lists = self.due.iter_mut().zip(&mut self.cursors);
-        for ((due, cursors), kind) in lists.zip(KINDS) {
+        for ((due, cursors), kind) in lists.zip(Element::KINDS) {
             for (at, due) in due.iter_mut().enumerate() {
                 if *due > self.window {
                     continue;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Detail, Event, EventId, EventLog, Kind};
+use super::{Detail, Event, EventId, EventLog, Kind, described};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::{Change, ValueKind, diff};
 use crate::graph::{Element, Elements, Graph};
@@ -178,7 +178,8 @@ pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
     }
     let time = |id: EventId| log.events[id as usize].time;
     let place = |change: &Change, start: Stamp| {
-        let all = of.get(&kind_of(change))?;
+        let (kind, what, ..) = described(change);
+        let all = of.get(&(kind, what))?;
         let next = all.partition_point(|id| time(*id) < start);
         let near = all[next.saturating_sub(1)..].iter().take(2).copied();
         near.min_by_key(|id| time(*id).since(start).abs())
@@ -190,24 +191,4 @@ pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
             .collect()
     };
     windows.iter().map(of_window).collect()
-}
-
-/// The kind and the element of the event that explains a change.
-fn kind_of(change: &Change) -> (Kind, Element) {
-    let turn = |what: Element, node, other| match what {
-        Element::Node(_) => (node, what),
-        _ => (other, what),
-    };
-    match change {
-        Change::Added { what, .. } => turn(*what, Kind::Started, Kind::Appeared),
-        Change::Removed { what, .. } => turn(*what, Kind::Stopped, Kind::Vanished),
-        Change::Rate { what, .. } => (Kind::Rate, *what),
-        Change::HandedOver { topic, .. } => (Kind::HandedOver, Element::Topic(*topic)),
-        Change::Restarted { node, .. } => (Kind::Restarted, Element::Node(*node)),
-        Change::Value { kind, what, .. } => match kind {
-            ValueKind::Type => (Kind::Type, *what),
-            ValueKind::Qos => (Kind::Qos, *what),
-            ValueKind::Lifecycle => (Kind::Lifecycle, *what),
-        },
-    }
 }

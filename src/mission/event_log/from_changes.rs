@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::make::sorted_by;
 use super::{Detail, Event, EventId, EventLog, Kind};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
@@ -25,7 +26,7 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog 
         }
     }
     EventLog {
-        events: sorted(&events),
+        events: sorted_by(events, |event| event.what).0,
         ..EventLog::default()
     }
 }
@@ -37,30 +38,6 @@ fn whole(events: &[Event], mut at: EventId) -> usize {
         at = events[at as usize].part_of.unwrap_or(at);
     }
     at as usize
-}
-
-/// The events sorted by time, then kind, then element, i.e. by name; references of parts are updated.
-fn sorted(events: &[Event]) -> Vec<Event> {
-    let mut order: Vec<usize> = (0..events.len()).collect();
-    order.sort_by_key(|at| (events[*at].time, events[*at].kind, events[*at].what, *at));
-    let mut places = vec![0; events.len()];
-    for (new, old) in order.iter().enumerate() {
-        places[*old] = id(new);
-    }
-    let mut weights = vec![1; events.len()];
-    for whole in events.iter().filter_map(|e| e.part_of) {
-        weights[whole as usize] += 1;
-    }
-    let event = |old: &usize| {
-        let event = events[*old].clone();
-        let part_of = event.part_of.map(|at| places[at as usize]);
-        Event {
-            part_of,
-            weight: weights[*old],
-            ..event
-        }
-    };
-    order.iter().map(event).collect()
 }
 
 fn id(place: usize) -> EventId {

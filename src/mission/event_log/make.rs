@@ -74,18 +74,17 @@ pub(crate) fn make(context: &LogInput<'_>) -> Vec<Event> {
 
 /// Sorts by time, kind and name, updates the references of parts and the weights of wholes; also returns the new index
 /// of each.
-pub(crate) fn sorted(mut list: Vec<Event>, elements: &Elements) -> (Vec<Event>, Vec<EventId>) {
+pub(crate) fn sorted(list: Vec<Event>, elements: &Elements) -> (Vec<Event>, Vec<EventId>) {
+    sorted_by(list, |event| (elements.ends(event.what), event.what))
+}
+
+/// As [`sorted`], with the order of events of one time and kind.
+pub(crate) fn sorted_by<K: Ord>(
+    mut list: Vec<Event>,
+    key: impl Fn(&Event) -> K,
+) -> (Vec<Event>, Vec<EventId>) {
     let mut order: Vec<usize> = (0..list.len()).collect();
-    let key = |at: &usize| {
-        let event = &list[*at];
-        (
-            event.time,
-            event.kind,
-            elements.ends(event.what),
-            event.what,
-        )
-    };
-    order.sort_by_key(key);
+    order.sort_by_key(|at| (list[*at].time, list[*at].kind, key(&list[*at])));
     let mut new: Vec<EventId> = vec![0; list.len()];
     for (place, old) in (0..).zip(&order) {
         new[*old] = place;
@@ -146,27 +145,11 @@ impl<'a> LogInput<'a> {
 
     /// Whether a topic's rates and senders are irrelevant: housekeeping, and topics of actions.
     pub(crate) fn is_by_the_way(&self, topic: u32) -> bool {
-        let name = self.elements.topics[topic as usize].name.as_str();
-        is_quiet(name)
-            || name.ends_with("/feedback")
-            || self.elements.topics[topic as usize]
-                .types
-                .iter()
-                .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
+        let topic = &self.elements.topics[topic as usize];
+        let name = topic.name.as_str();
+        is_quiet(name) || name.ends_with("/feedback") || topic.is_shared()
     }
 }
-
-/// Types of topics that many nodes publish to in turn, so that a new publisher is not a hand-over.
-const SHARED: [&str; 8] = [
-    "Log",
-    "ParameterEvent",
-    "TFMessage",
-    "DiagnosticArray",
-    "Status",
-    "Clock",
-    "tfMessage",
-    "TopicStatistics",
-];
 
 /// Whether an element is housekeeping or the recorder's.
 pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {

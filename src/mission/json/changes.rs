@@ -2,12 +2,11 @@
 
 use serde::Serialize;
 
-use super::elements::Text;
-use super::events::ElementName;
-use crate::base::time::Stamp;
+use super::events::{DetailJson, ElementName};
+use crate::graph::Elements;
 use crate::graph::diff::Change;
-use crate::graph::{Element, Elements, NodeId};
 use crate::mission::EventId;
+use crate::mission::event_log::{Detail, described};
 
 #[derive(Serialize)]
 pub(crate) struct ChangeRow<'a> {
@@ -16,63 +15,31 @@ pub(crate) struct ChangeRow<'a> {
     #[serde(flatten)]
     named: ElementName<'a>,
     #[serde(flatten)]
-    rest: ChangeValues<'a>,
+    values: ChangeValues<'a>,
 }
 
 #[derive(Serialize)]
 #[serde(untagged)]
 enum ChangeValues<'a> {
+    /// The time of what came, went or restarted, if known.
     Time {
         time_ns: Option<i64>,
     },
-    Rate {
-        from_hz: f64,
-        to_hz: f64,
-    },
-    Hands {
-        from: Vec<&'a str>,
-        to: Vec<&'a str>,
-    },
-    Value {
-        from: Text<'a>,
-        to: Text<'a>,
-    },
+    Other(DetailJson<'a>),
 }
 
 impl<'a> ChangeRow<'a> {
-    pub(crate) fn new(change: &'a Change, event: EventId, elements: &'a Elements) -> Self {
-        let name = |id: &NodeId| elements.nodes[*id as usize].name.as_str();
-        let time = |time: Option<Stamp>| ChangeValues::Time {
-            time_ns: time.map(|at| at.0),
-        };
-        let (what, rest) = match change {
-            Change::Added { what, time: at } | Change::Removed { what, time: at } => {
-                (*what, time(*at))
-            }
-            Change::Restarted { node, time: at } => (Element::Node(*node), time(Some(*at))),
-            Change::Rate {
-                what,
-                from_hz,
-                to_hz,
-            } => {
-                let (from_hz, to_hz) = (*from_hz, *to_hz);
-                (*what, ChangeValues::Rate { from_hz, to_hz })
-            }
-            Change::HandedOver { topic, from, to } => {
-                let from = from.iter().map(name).collect();
-                let to = to.iter().map(name).collect();
-                (Element::Topic(*topic), ChangeValues::Hands { from, to })
-            }
-            Change::Value { what, from, to, .. } => {
-                let (from, to) = ((&**from).into(), (&**to).into());
-                (*what, ChangeValues::Value { from, to })
-            }
-        };
+    pub(crate) fn new(change: &Change, event: EventId, elements: &'a Elements) -> Self {
+        let (_, what, time, detail) = described(change);
+        let time_ns = time.map(|at| at.0);
         Self {
             kind: change.word(),
             event,
             named: ElementName::new(what, elements),
-            rest,
+            values: match &detail {
+                Detail::None => ChangeValues::Time { time_ns },
+                detail => ChangeValues::Other(DetailJson::new(detail, elements)),
+            },
         }
     }
 }

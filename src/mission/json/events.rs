@@ -36,18 +36,12 @@ impl<'a> ElementName<'a> {
     fn element(&self, elements: &Elements) -> Option<Element> {
         let node = |name: &Option<Text<'_>>| elements.node(name.as_deref()?);
         let topic = |name: &Option<Text<'_>>| elements.topic(name.as_deref()?);
-        let ends = || Some((node(&self.node)?, topic(&self.topic)?));
+        let ends = || node(&self.node).zip(topic(&self.topic));
         match &*self.what {
             "node" => node(&self.name).map(Element::Node),
             "topic" => topic(&self.name).map(Element::Topic),
-            "publish" => {
-                let (node, topic) = ends()?;
-                elements.publication(node, topic).map(Element::Publish)
-            }
-            "subscribe" => {
-                let (node, topic) = ends()?;
-                elements.subscription(topic, node).map(Element::Subscribe)
-            }
+            "publish" => elements.published(ends()?),
+            "subscribe" => elements.subscribed(ends()?),
             _ => None,
         }
     }
@@ -85,7 +79,7 @@ pub(crate) struct EventJson<'a> {
 
 #[derive(Deserialize, Serialize)]
 #[serde(untagged)]
-enum DetailJson<'a> {
+pub(crate) enum DetailJson<'a> {
     Rates {
         from_hz: f64,
         to_hz: f64,
@@ -105,7 +99,7 @@ enum DetailJson<'a> {
 }
 
 impl<'a> DetailJson<'a> {
-    fn new(detail: &'a Detail, elements: &'a Elements) -> Self {
+    pub(crate) fn new(detail: &Detail, elements: &'a Elements) -> Self {
         let names = |nodes: &[NodeId]| {
             let name = |id: &NodeId| elements.nodes[*id as usize].name.as_str().into();
             nodes.iter().map(name).collect()
@@ -122,8 +116,8 @@ impl<'a> DetailJson<'a> {
             },
             Detail::Count(count) => Self::Count { count: *count },
             Detail::Values { from, to } => Self::Values {
-                from: (&**from).into(),
-                to: (&**to).into(),
+                from: from.to_string().into(),
+                to: to.to_string().into(),
             },
         }
     }

@@ -187,13 +187,13 @@ fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
     }
     for edge in &raw.publishes {
         let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
-        let id = ends.and_then(|(node, topic)| all.publication(node, topic));
-        add(id.map(Element::Publish), edge.edge.columns.as_deref());
+        let what = ends.and_then(|ends| all.published(ends));
+        add(what, edge.edge.columns.as_deref());
     }
     for edge in &raw.subscribes {
-        let ends = all.topic(&edge.topic).zip(all.node(&edge.node));
-        let id = ends.and_then(|(topic, node)| all.subscription(topic, node));
-        add(id.map(Element::Subscribe), edge.edge.columns.as_deref());
+        let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
+        let what = ends.and_then(|ends| all.subscribed(ends));
+        add(what, edge.edge.columns.as_deref());
     }
     graphs.finish()
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::{Sending, Stretch, silences};
-use crate::graph::{Edge, Element, Elements, Node, Topic, TopicId};
+use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
 
 /// The longest absence, as a part of the mission (one in so many), that is ignored inside an element's lifetime: a slow
 /// topic has no message in some cells.
@@ -79,13 +79,12 @@ pub(crate) fn is_topics(present: &[Presence]) -> bool {
 /// where less than half of these have a known publisher. Housekeeping and recorders are left out.
 pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Presence> {
     let mut all: BTreeMap<PresentThing, Vec<Span>> = BTreeMap::new();
-    let subjects = Subjects::new(elements, knows_publishers(elements, sending));
-    for (what, subject) in subjects.iter() {
+    for (what, subject) in subjects(elements, knows_publishers(elements, sending)) {
         let times = match what {
             Element::Node(_) => elements.runs(what).to_vec(),
             _ => sent(elements, sending, what),
         };
-        all.entry(subject.clone()).or_default().extend(times);
+        all.entry(subject).or_default().extend(times);
     }
     let most = whole.nanos() / FILLED;
     let presence = |(subject, spans)| Presence {
@@ -129,45 +128,29 @@ fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
     times
 }
 
-/// The subject of each node, publication and topic in the activity, by id; `None` for those left out.
-struct Subjects([Vec<Option<PresentThing>>; 3]);
-
-impl Subjects {
-    /// The subjects: nodes and their publications, or topics.
-    fn new(elements: &Elements, knows_publishers: bool) -> Self {
-        let name = |topic: &Topic| Some(topic.name.shared()).filter(|name| !is_quiet(name));
-        if !knows_publishers {
-            let topics = elements.topics.iter();
-            let topics = topics.map(|topic| name(topic).map(PresentThing::Topic));
-            return Self([Vec::new(), Vec::new(), topics.collect()]);
+/// The subjects of the activity with their elements: nodes and their publications, or topics.
+fn subjects(
+    elements: &Elements,
+    knows_publishers: bool,
+) -> impl Iterator<Item = (Element, PresentThing)> {
+    let role = |id: NodeId| {
+        let node = elements.nodes.get(id as usize)?;
+        (!node.is_tool()).then(|| Arc::clone(&node.role))
+    };
+    let name = |id: TopicId| {
+        let topic = elements.topics.get(id as usize)?;
+        Some(topic.name.shared()).filter(|name| !is_quiet(name))
+    };
+    let subject = move |what| match (what, elements.ends(what)) {
+        (Element::Topic(id), _) if !knows_publishers => name(id).map(PresentThing::Topic),
+        (Element::Node(id), _) if knows_publishers => role(id).map(PresentThing::Node),
+        (Element::Publish(_), (Some(node), Some(topic))) if knows_publishers => {
+            Some(PresentThing::Publication(role(node)?, name(topic)?))
         }
-        let role = |node: &Node| (!node.is_tool()).then(|| Arc::clone(&node.role));
-        let roles: Vec<Option<Arc<str>>> = elements.nodes.iter().map(role).collect();
-        let publication = |edge: &Edge| {
-            let role = roles.get(edge.node as usize)?.clone()?;
-            let topic = elements.topics.get(edge.topic as usize)?;
-            Some(PresentThing::Publication(role, name(topic)?))
-        };
-        let publishes = elements.publishes.iter().map(publication).collect();
-        let nodes = roles
-            .iter()
-            .map(|role| role.clone().map(PresentThing::Node));
-        Self([nodes.collect(), publishes, Vec::new()])
-    }
-
-    /// The subjects with their elements.
-    fn iter(&self) -> impl Iterator<Item = (Element, &PresentThing)> {
-        let [nodes, publishes, topics] = &self.0;
-        let kinds = [
-            (Element::Node as fn(u32) -> Element, nodes),
-            (Element::Publish, publishes),
-            (Element::Topic, topics),
-        ];
-        kinds.into_iter().flat_map(|(kind, list)| {
-            let all = (0..).map(kind).zip(list);
-            all.filter_map(|(what, subject)| Some((what, subject.as_ref()?)))
-        })
-    }
+        _ => None,
+    };
+    let all = elements.all();
+    all.filter_map(move |what| Some((what, subject(what)?)))
 }
 
 /// Whether at least half of the messages are on topics with a known publisher.
