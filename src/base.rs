@@ -2,6 +2,7 @@
 //! around them.
 
 pub(crate) mod budget;
+pub(crate) mod cast;
 pub(crate) mod columns;
 pub(crate) mod csv;
 pub(crate) mod digest;

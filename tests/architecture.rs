@@ -16,7 +16,7 @@ const STATIONS: &[&str] = &[
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
-        &["budget", "columns", "leftovers", "rhythm", "words"],
+        &["budget", "cast", "columns", "leftovers", "rhythm", "words"],
         &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],
@@ -126,8 +126,6 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ),
     // Widths of texts, and the outlines and names of fonts in a PDF.
     ("skrifa", &["draw/text", "draw/paint/pdf"]),
-    // What browsers and PDF readers unpack.
-    ("flate2", &["draw/paint/pdf", "export/html"]),
     // Reads bags, writes the graph.
     ("mcap", &["bag/mcap", "export/mcap"]),
     // Launch files, and the answers of a ROS master.

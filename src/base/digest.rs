@@ -1,4 +1,4 @@
-//! Digests and base64, in the forms that a Content-Security-Policy and data inside a page need.
+//! Digests, base64 and compression, in the forms that a Content-Security-Policy, data inside a page and PDF need.
 
 use sha2::{Digest as _, Sha256};
 
@@ -37,6 +37,17 @@ impl Sum {
         let all = nibbles.map(|nibble| char::from(DIGITS[usize::from(nibble)]));
         all.take(digits).collect()
     }
+}
+
+/// Bytes compressed as a zlib stream (RFC 1950): two bytes, DEFLATE, and a checksum of four bytes.
+#[cfg(feature = "render")]
+pub(crate) fn zlib(bytes: &[u8], level: u32) -> Vec<u8> {
+    use std::io::Write as _;
+
+    let mut all = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::new(level));
+    // Writing to memory does not fail.
+    let _ = all.write_all(bytes);
+    all.finish().unwrap_or_default()
 }
 
 /// Appends `data` in base64 with padding (RFC 4648, section 4).

@@ -5,7 +5,7 @@ use std::num::NonZeroI64;
 
 use chrono::DateTime;
 
-use super::words;
+use super::{cast, words};
 
 /// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
 ///
@@ -172,8 +172,7 @@ fn parse_number(text: &str) -> Option<f64> {
 fn to_nanos(secs: f64) -> Option<i64> {
     let nanos = libm::round(secs * 1e9);
     // i64::MAX is not an f64; everything below 9.2e18 converts exactly enough.
-    #[expect(clippy::cast_possible_truncation, reason = "bounded on this line")]
-    (nanos.is_finite() && nanos < 9.2e18).then_some(nanos as i64)
+    (nanos.is_finite() && nanos < 9.2e18).then(|| cast::to_i64(nanos))
 }
 
 /// The smallest round length of time that is at least `least` nanoseconds: 1 ms, 2 ms, … 6 h, and whole days.

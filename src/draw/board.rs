@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::base::cast;
 use crate::base::geometry::{Rect, Size};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -381,8 +382,7 @@ impl<'a> Board<'a> {
 }
 
 fn between(from: i64, to: i64, phase: f64) -> Stamp {
-    #[expect(clippy::cast_possible_truncation, reason = "a part of an i64")]
-    let part = ((to.saturating_sub(from)) as f64 * phase.clamp(0.0, 1.0)) as i64;
+    let part = cast::to_i64((to.saturating_sub(from)) as f64 * phase.clamp(0.0, 1.0));
     Stamp(if phase >= 1.0 {
         to
     } else {
@@ -422,13 +422,7 @@ fn most_rows(
     let rows = lives.rows.len() as f64 * canvas.sizes.pitch();
     let others = lives.height(&canvas) - rows + BELOW;
     let free = room(&page, options).h / SCALE.0 - others;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a page has few rows"
-    )]
-    let most = (free / canvas.sizes.pitch()).max(1.0) as usize;
-    most
+    cast::to_usize((free / canvas.sizes.pitch()).max(1.0))
 }
 
 /// The places of everything in millimetres, and the number of pixels per millimetre.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, de};
 use toml::de::DeTable;
 use toml::{Spanned, Table, Value};
 
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::draw::text::Weight;
 
@@ -57,14 +58,9 @@ impl Color {
         let (Some(a), Some(b)) = (self.0, other.0) else {
             return if part < 0.5 { self } else { other };
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two bytes"
-        )]
         let mix = |at: usize| {
             let (a, b) = (f64::from(a[at]), f64::from(b[at]));
-            libm::round(a + (b - a) * part.clamp(0.0, 1.0)) as u8
+            cast::to_u8(libm::round(a + (b - a) * part.clamp(0.0, 1.0)))
         };
         Self(Some([mix(0), mix(1), mix(2)]))
     }

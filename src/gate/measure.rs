@@ -2,6 +2,7 @@
 
 use super::finding::FindingKind;
 use super::range::Range;
+use crate::base::cast;
 use crate::base::time::{Span, parse_nanos};
 use crate::base::words;
 use crate::graph::Row;
@@ -29,8 +30,7 @@ pub(crate) const MEASURES: [Measure; 3] = [
         hint: "write a range of durations: `..0.2s`",
         parse: |text| Some(parse_nanos(text)? as f64 / 1e9),
         of: |row, _| row.age.value(),
-        #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
-        shown: |seconds| words::duration((seconds * 1e9) as i64),
+        shown: |seconds| words::duration(cast::to_i64(seconds * 1e9)),
     },
     Measure {
         key: "bytes",
@@ -38,12 +38,7 @@ pub(crate) const MEASURES: [Measure; 3] = [
         hint: "write a range of bytes per second: `..5MB/s`",
         parse: bytes_per_second,
         of: |row, span| Some(row.bytes? as f64 / (span.nanos().max(1) as f64 / 1e9)),
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "casts saturate"
-        )]
-        shown: |bytes| format!("{}/s", words::bytes(bytes as u64)),
+        shown: |bytes| format!("{}/s", words::bytes(cast::to_u64(bytes))),
     },
     Measure {
         key: "drops",

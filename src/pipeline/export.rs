@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::draw::{Body, Composed, places, unplaced, unseen};
 use super::fit::compose;
 use super::{Drawing, Reading, Stage, Watch, read, unfolded};
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
@@ -329,8 +330,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     let pixels = size.w * size.h * sequence.options.scale * sequence.options.scale / 1e6;
     let cores = run::cores() as f64;
     let ms = frames as f64 * (FRAME_MS.0 + FRAME_MS.1 * pixels) / cores;
-    #[expect(clippy::cast_possible_truncation, reason = "a rough number of seconds")]
-    let about = words::duration((ms / 1000.0).ceil() as i64 * 1_000_000_000);
+    let about = words::duration(cast::to_i64((ms / 1000.0).ceil()) * 1_000_000_000);
     let windows = &sequence.mission.windows;
     let (first, last) = (windows.first()?, windows.last()?);
     let sensible = default_period(last.span.end.since(first.span.start));
@@ -350,13 +350,7 @@ const ROWS: (f64, f64) = (8.0, 78.0);
 
 /// The number of rows below a frame of this height.
 fn rows(height: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to 8"
-    )]
-    let rows = (height / ROWS.1).clamp(1.0, ROWS.0) as usize;
-    rows
+    cast::to_usize((height / ROWS.1).clamp(1.0, ROWS.0))
 }
 
 /// Writes a mission whose picture is the topic board.

@@ -11,6 +11,7 @@ use super::{Reading, Render, Unwatched, show};
 pub use crate::bag::Growth;
 use crate::bag::source::Temporary;
 use crate::bag::{self, Growing, Input, Report, Tier, file_name};
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::collector::Collector;
@@ -100,8 +101,7 @@ impl Follow {
         };
         let first = self.forgotten.unwrap_or(first);
         let share = (most as f64 / count.max(1) as f64).min(1.0);
-        #[expect(clippy::cast_possible_truncation, reason = "a part of an i64")]
-        let kept = (last.since(first) as f64 * share) as i64;
+        let kept = cast::to_i64(last.since(first) as f64 * share);
         let newest = (share < 1.0).then(|| last.plus(-kept));
         let from = newest.or(self.forgotten).unwrap_or(Stamp(i64::MIN));
         let recorded = self.collector.so_far(from)?;

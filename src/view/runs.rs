@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
+use crate::base::cast;
 use crate::base::words;
 use crate::evidence::Confidence;
 use crate::graph::State;
@@ -163,13 +164,7 @@ pub(crate) const STEPS: u8 = 6;
 /// The thickness of an arrow of this rate: a step per half a decade of 1 + Hz, 0..=[`STEPS`].
 fn width_step(hz: Option<f64>) -> u8 {
     let decades = libm::log10(1.0 + hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 0 and STEPS"
-    )]
-    let step = libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)) as u8;
-    step
+    cast::to_u8(libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)))
 }
 
 /// The width of a step's middle, in decades of 1 + Hz.

@@ -10,6 +10,7 @@ use super::signs::sign;
 use super::source::FigureSource;
 use super::tracks::Track;
 use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind, legend};
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::name::last_part;
@@ -130,12 +131,7 @@ impl<'a> FigureSheet<'a> {
             );
         }
         let high = lives.height(&canvas);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "72 rows or so"
-        )]
-        let most = ((MOST_HEIGHT - 30.0) / self.sizes.pitch()) as usize;
+        let most = cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch());
         let flag = if lives.is_of_topics() {
             "--topic-filter"
         } else {

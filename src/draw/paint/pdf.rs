@@ -2,15 +2,12 @@
 
 mod font;
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
 use pdf_writer::types::{LineCapStyle, LineJoinStyle};
 use pdf_writer::writers::Resources;
 use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect as PdfRect, Ref, TextStr};
 
-use self::font::PdfFont;
+use self::font::{Glyph, PdfFont};
+use crate::base::digest::zlib;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{self, Form, Group, Piece, Scene, Shape, Step, Text};
 use crate::draw::style::Color;
@@ -190,14 +187,6 @@ fn name(kind: char, place: usize) -> String {
     format!("{kind}{place}")
 }
 
-/// Bytes as `FlateDecode` reads them.
-fn packed(bytes: &[u8]) -> Vec<u8> {
-    let mut all = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Writing to memory does not fail.
-    let _ = all.write_all(bytes);
-    all.finish().unwrap_or_default()
-}
-
 /// A length on a page.
 #[expect(clippy::cast_possible_truncation, reason = "lengths on a page")]
 fn f(length: f64) -> f32 {
@@ -236,12 +225,12 @@ impl PdfPen<'_> {
                 .set_parameters(Name(name('G', faded.len()).as_bytes()))
                 .x_object(Name(name('X', faded.len()).as_bytes()))
                 .restore_state();
-            faded.push((f(group.fade.0.clamp(0.0, 1.0)), packed(&own.finish())));
+            faded.push((f(group.fade.0.clamp(0.0, 1.0)), zlib(&own.finish(), 6)));
         }
         DrawnPage {
             size,
             scene: PdfRect::new(0.0, 0.0, f(scene.size.w), f(scene.size.h)),
-            content: packed(&content.finish()),
+            content: zlib(&content.finish(), 6),
             faded,
             entry,
         }
@@ -259,41 +248,44 @@ impl PdfPen<'_> {
     fn text(&mut self, content: &mut Content, text: &Text) {
         let width = self.fonts.width(&text.text, text.size, text.weight);
         let start = Point::new(text.at.x - text.anchor.before(width), text.at.y);
+        let (runs, size) = (self.runs(text, start), f(text.size));
         content.save_state();
         if let Some((color, width)) = text.halo {
             let halo = scene::Stroke::solid(color, width);
             if stroke(content, &halo, LineJoinStyle::RoundJoin) {
                 // As an outline, so that the words are found once and not twice.
-                self.words(content, text, start, true);
+                for (file, run) in &runs {
+                    if let Some(Some(face)) = self.faces.get(*file) {
+                        face.outline(content, run, size);
+                    }
+                }
                 content.stroke();
             }
         }
         if fill(content, text.color) {
-            self.words(content, text, start, false);
+            for (file, run) in &runs {
+                if let Some(Some(face)) = self.faces.get_mut(*file) {
+                    face.show(content, Name(name('F', *file).as_bytes()), run, size);
+                }
+            }
         }
         content.restore_state();
     }
 
-    /// Writes a text, piece by piece where its characters are in several fonts.
-    fn words(&mut self, content: &mut Content, text: &Text, start: Point, outlined: bool) {
-        let mut at = start;
-        let mut rest = text.text.as_str();
+    /// A text piece by piece where its characters are in several fonts: the font of each piece, and its glyphs.
+    fn runs<'t>(&self, text: &'t Text, start: Point) -> Vec<(usize, Vec<Glyph<'t>>)> {
+        let (mut at, mut rest, mut runs) = (start, text.text.as_str(), Vec::new());
         while let Some(first) = rest.chars().next() {
             let file = self.fonts.file_of(first, text.weight);
             let other = |c: char| self.fonts.file_of(c, text.weight) != file;
             let (run, after) = rest.split_at(rest.find(other).unwrap_or(rest.len()));
-            let (place, size) = ((f(at.x), f(at.y)), f(text.size));
-            match self.faces.get_mut(file) {
-                Some(Some(face)) if outlined => face.outline(content, run, place, size),
-                Some(Some(face)) => {
-                    let name = name('F', file);
-                    face.show(content, Name(name.as_bytes()), run, place, size);
-                }
-                _ => {}
+            if let Some(Some(face)) = self.faces.get(file) {
+                runs.push((file, face.shape(run, (f(at.x), f(at.y)), f(text.size))));
             }
             at.x += self.fonts.width(run, text.size, text.weight);
             rest = after;
         }
+        runs
     }
 }
 

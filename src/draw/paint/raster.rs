@@ -12,6 +12,7 @@ use resvg::usvg::{self, Tree, fontdb};
 pub use self::canvas::Canvas;
 use self::drawn::Drawn;
 use self::tiles::Tiles;
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::svg;
 use crate::draw::scene::{Group, Scene};
@@ -165,12 +166,7 @@ impl PixelSheet {
                 hint,
             ));
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most 65,535, checked above"
-        )]
-        let (width, height) = (w as u32, h as u32);
+        let (width, height) = (cast::to_u32(w), cast::to_u32(h));
         let rgba = opaque(scene.background).repeat(width as usize * height as usize);
         let pixels = Pixels {
             width,

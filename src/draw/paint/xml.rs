@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Display, Write as _};
 
+use crate::base::cast;
 use crate::base::words::is_invisible;
 
 /// XML being written. Values and texts are escaped as they are written; tags close themselves in order.
@@ -162,12 +163,7 @@ pub(crate) fn units(value: f64, parts: i64) -> i64 {
     } else {
         0.0
     };
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "held below 1e9 on the line above"
-    )]
-    let units = libm::round(value * parts as f64) as i64;
-    units
+    cast::to_i64(libm::round(value * parts as f64))
 }
 
 impl Display for Decimal {

@@ -5,6 +5,7 @@ use super::PageOptions;
 use super::course::{CourseSizes, CourseStrip, names_width};
 use super::page::PageFrame;
 use super::title::whole;
+use crate::base::cast;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp, round_length};
 use crate::base::words;
@@ -82,12 +83,7 @@ impl<'a> Timeline<'a> {
         };
         let left = margin + names;
         let plot = Rect::new(left, top, (strip.w - left - margin).max(1.0), height);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a number of pixels"
-        )]
-        let most = (plot.w / NARROWEST).max(1.0) as usize;
+        let most = cast::to_usize((plot.w / NARROWEST).max(1.0));
         let per_bar = view.frames.len().div_ceil(most).max(1);
         let span = Span::new(
             view.frames.first().map_or(Stamp(0), |f| f.span.start),
@@ -215,8 +211,7 @@ impl<'a> Timeline<'a> {
         let width = |text: &str| self.fonts.width(text, size, Weight::Regular);
         let total = self.span.nanos();
         let last = words::moment(whole(total));
-        #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
-        let most = (self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
+        let most = cast::to_i64((self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0));
         let step = round_length(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
         // Counted, not added up: a span may be as long as a number can say.

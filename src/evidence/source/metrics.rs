@@ -2,6 +2,7 @@
 
 use super::SourceContext;
 use crate::bag::Encoding;
+use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
@@ -53,18 +54,9 @@ pub(crate) fn read(
         });
         let nanos = |number: f64| {
             let nanos = libm::round(number * 1e6);
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "less than 2^53 by the check"
-            )]
-            (unit == "ms" && nanos.abs() < 9e15).then_some(nanos as i64)
+            (unit == "ms" && nanos.abs() < 9e15).then(|| cast::to_i64(nanos))
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates, and NaN is 0"
-        )]
-        let count = numbers[SAMPLES] as u64;
+        let count = cast::to_u64(numbers[SAMPLES]);
         heard.measure(Measurement {
             topic: None,
             publisher: None,

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::budget::TOPOLOGY_ENTRIES;
+use crate::base::cast;
 use crate::base::csv;
 use crate::base::error::Result;
 
@@ -79,11 +80,7 @@ fn seconds(cell: &str) -> Option<Option<i64>> {
     }
     let seconds: f64 = cell.parse().ok()?;
     let sound = seconds.is_finite() && seconds.abs() < 9e9;
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "less than 2^63 by the check above"
-    )]
-    sound.then_some(Some((seconds * 1e9) as i64))
+    sound.then(|| Some(cast::to_i64(seconds * 1e9)))
 }
 
 /// The strings in `['a', "b"]`; an empty cell is an empty list, one bare name a list of one.

@@ -9,6 +9,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
+use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::name::SERVICE;
 use crate::base::yaml;
@@ -205,11 +206,7 @@ impl<'a> TopologyYaml<'a> {
             return Ok(None);
         };
         let seconds = value.as_f64().filter(|s| s.abs() < 9e9);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "less than 2^63 by the check above"
-        )]
-        let nanos = seconds.map(|s| (s * 1e9) as i64);
+        let nanos = seconds.map(|s| cast::to_i64(s * 1e9));
         nanos.map_or_else(
             || Err(self.wrong("start", &format!("`{value}` is not a number of seconds"))),
             |n| Ok(Some(n)),

@@ -1,13 +1,11 @@
 //! The data for the script of a page: names, facts and runs as JSON, deflated if long.
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 
-// A DEFLATE stream, which every browser can decompress.
-use flate2::{Compression, write::DeflateEncoder};
 use serde::Serialize;
 
 use super::{HtmlPage, PageGraph};
+use crate::base::cast;
 use crate::base::digest;
 use crate::base::geometry::Rect;
 use crate::base::time::Stamp;
@@ -341,18 +339,16 @@ pub(super) fn packed(json: &str) -> (String, &'static str) {
     if json.len() < LONG {
         return (json.to_owned(), "application/json");
     }
-    let mut deflater = DeflateEncoder::new(Vec::new(), Compression::new(7));
-    let bytes = deflater
-        .write_all(json.as_bytes())
-        .and_then(|()| deflater.finish());
+    let packed = digest::zlib(json.as_bytes(), 7);
+    // The DEFLATE stream inside, which every browser can decompress.
+    let bare = packed.get(2..packed.len() - 4).unwrap_or_default();
     let mut text = String::new();
-    digest::base64(&mut text, &bytes.unwrap_or_default());
+    digest::base64(&mut text, bare);
     (text, "deflated")
 }
 
 fn rounded(rect: Rect) -> [i64; 4] {
-    #[expect(clippy::cast_possible_truncation, reason = "pixels of a layout")]
-    let whole = |v: f64| libm::round(v.clamp(-1e7, 1e7)) as i64;
+    let whole = |v: f64| cast::to_i64(libm::round(v.clamp(-1e7, 1e7)));
     [whole(rect.x), whole(rect.y), whole(rect.w), whole(rect.h)]
 }
 

@@ -1,6 +1,7 @@
 //! The rates of topics, window by window, and their silences.
 
 use super::Facts;
+use crate::base::cast;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Row, TopicId};
@@ -208,7 +209,5 @@ fn count(row: &Row) -> u64 {
 
 /// Seconds in nanoseconds, saturating.
 fn nanos(seconds: f64) -> i64 {
-    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
-    let nanos = libm::round(seconds * 1e9) as i64;
-    nanos
+    cast::to_i64(libm::round(seconds * 1e9))
 }

@@ -6,6 +6,7 @@ use std::io;
 use super::history::History;
 use super::senders::sender;
 use super::windows::SortedWindows;
+use crate::base::cast;
 use crate::base::name::is_quiet;
 use crate::base::time::Span;
 use crate::evidence::collector::Recorded;
@@ -176,11 +177,6 @@ pub(crate) fn seconds(nanos: f64) -> f64 {
     libm::round(nanos) / 1e9
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a sum of numbers that are not negative, bounded by their type"
-)]
 fn whole(sum: f64) -> u64 {
-    libm::round(sum) as u64
+    cast::to_u64(libm::round(sum))
 }

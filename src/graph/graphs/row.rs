@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::Confidence;
 use crate::graph::{EdgeState, Measures, NodeState, State, TopicState, per_second};
@@ -23,11 +24,7 @@ impl Number {
             return Self::Unknown;
         };
         let halves = libm::round(value * 2e9);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "small enough, and compared"
-        )]
-        let exact = Self::Halves(halves as i64);
+        let exact = Self::Halves(cast::to_i64(halves));
         let is_exact =
             halves.abs() < EXACT && exact.value().map(f64::to_bits) == Some(value.to_bits());
         if is_exact {
@@ -123,12 +120,7 @@ impl Row {
         let count = state
             .hz
             .map(|hz| libm::round(hz * span.nanos() as f64 / 1e9));
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked, and its rate is compared"
-        )]
-        let count = count.filter(|n| (0.0..EXACT).contains(n)).map(|n| n as u64);
+        let count = count.filter(|n| (0.0..EXACT).contains(n)).map(cast::to_u64);
         let row = Self {
             lifecycle,
             count,

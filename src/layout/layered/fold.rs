@@ -2,6 +2,7 @@
 //! next; sources move to later layers, more of them if that suits the page.
 
 use super::rank::neighbours;
+use crate::base::cast;
 
 /// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
 ///
@@ -50,15 +51,7 @@ pub(crate) fn fold(
 /// times as wide as the distance between layers below each other.
 pub(crate) fn suitable(n: usize, aspect: f64) -> [usize; 2] {
     let n = n as f64;
-    let layers = |square: f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "the root of a small positive number"
-        )]
-        let whole = square.clamp(1.0, 1e6).sqrt().round() as usize;
-        whole
-    };
+    let layers = |square: f64| cast::to_usize(square.clamp(1.0, 1e6).sqrt().round());
     [layers(aspect * n / 5.0), layers(1.5 * n / aspect.max(0.01))]
 }
 

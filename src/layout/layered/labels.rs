@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
+use crate::base::cast;
 use crate::base::geometry::{Point, Rect, Size, on_cubic};
 use crate::layout::{Layout, Plan, Route};
 
@@ -204,12 +205,7 @@ impl Obstacles {
     /// The rectangles around a straight line, in parts if it is long.
     fn insert_line(&mut self, a: Point, b: Point, number: usize) {
         let parts = libm::ceil((b.x - a.x).abs().max((b.y - a.y).abs()) / (LONG * self.cell));
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "as many as the drawing has cells along a side"
-        )]
-        for k in 0..parts.max(1.0) as u32 {
+        for k in 0..cast::to_u32(parts.max(1.0)) {
             let (from, to) = (
                 f64::from(k) / parts.max(1.0),
                 f64::from(k + 1) / parts.max(1.0),
@@ -240,12 +236,8 @@ impl Obstacles {
             .map(|&(_, number)| number)
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "places on a drawing of at most a few million pixels"
-    )]
     fn cells_of(&self, rect: &Rect) -> Vec<(i64, i64)> {
-        let cell = |at: f64| (at / self.cell).floor() as i64;
+        let cell = |at: f64| cast::to_i64((at / self.cell).floor());
         let rows = cell(rect.y)..=cell(rect.bottom());
         rows.flat_map(|row| (cell(rect.x)..=cell(rect.right())).map(move |column| (row, column)))
             .collect()

@@ -104,9 +104,9 @@ impl Serialize for Json<'_> {
         map.serialize_entry("period_ns", &mission.period.nanos())?;
         map.serialize_entry("step_ns", &mission.step.nanos())?;
         // Under its old key, too, for one release.
-        for key in ["events", "ledger"] {
-            map.serialize_entry(key, &List(events(&mission.log, &mission.elements)))?;
-        }
+        let rows = List(events(&mission.log, &mission.elements));
+        map.serialize_entry("events", &rows)?;
+        map.serialize_entry("ledger", &rows)?;
         if !mission.log.interruptions.is_empty() {
             let all = mission.log.interruptions.iter();
             map.serialize_entry("interruptions", &List(all.map(InterruptionRow::from)))?;

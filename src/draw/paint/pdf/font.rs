@@ -12,7 +12,7 @@ use skrifa::string::StringId;
 use skrifa::{FontRef, GlyphId, MetadataProvider as _, Tag};
 use subsetter::{GlyphRemapper, subset};
 
-use super::packed;
+use crate::base::digest::zlib;
 
 /// Glyphs are named by their number in the font.
 const IDENTITY: SystemInfo<'static> = SystemInfo {
@@ -36,12 +36,11 @@ pub(super) struct PdfFont<'a> {
 }
 
 /// A shaped glyph.
-struct Glyph {
+pub(super) struct Glyph<'t> {
     id: u16,
-    /// Its distance from the end of the glyph before, in em.
-    offset: (f32, f32),
-    /// The distance to the next glyph, in em.
-    advance: f32,
+    at: (f32, f32),
+    /// The part of the text that it shows first.
+    shown: &'t str,
     /// Whether a reader places it where it belongs by the widths alone.
     is_regular: bool,
 }
@@ -67,8 +66,8 @@ impl<'a> PdfFont<'a> {
         !self.texts.is_empty()
     }
 
-    /// The glyphs of a text from left to right, with the part of the text that each shows first.
-    fn shape<'t>(&self, text: &'t str) -> Vec<(Glyph, &'t str)> {
+    /// The glyphs of a text from left to right, from a point on its baseline.
+    pub(super) fn shape<'t>(&self, text: &'t str, at: (f32, f32), size: f32) -> Vec<Glyph<'t>> {
         let mut buffer = UnicodeBuffer::new();
         buffer.push_str(text);
         buffer.guess_segment_properties();
@@ -76,13 +75,15 @@ impl<'a> PdfFont<'a> {
         let shaper = self.shaper.shaper(&self.font).build();
         let out = shaper.shape(buffer, ShapeOptions::new());
         let (infos, positions) = (out.glyph_infos(), out.glyph_positions());
-        let mut before = None;
+        let (mut before, mut x) = (None, at.0);
         let glyphs = infos
             .iter()
             .zip(positions)
             .enumerate()
-            .map(|(at, (info, to))| {
-                let later = infos[at..].iter().find(|next| next.cluster > info.cluster);
+            .map(|(place, (info, to))| {
+                let later = infos[place..]
+                    .iter()
+                    .find(|next| next.cluster > info.cluster);
                 let end = later.map_or(text.len(), |next| next.cluster as usize);
                 let is_first = before.replace(info.cluster) != Some(info.cluster);
                 let shown = text.get(info.cluster as usize..end).filter(|_| is_first);
@@ -92,13 +93,14 @@ impl<'a> PdfFont<'a> {
                     to.x_offset as f32 / self.units,
                     to.y_offset as f32 / self.units,
                 );
-                let glyph = Glyph {
+                let from = x;
+                x += advance * size;
+                Glyph {
                     id,
-                    offset,
-                    advance,
+                    at: (from + offset.0 * size, at.1 - offset.1 * size),
+                    shown: shown.unwrap_or_default(),
                     is_regular: offset == (0.0, 0.0) && (advance - self.width(id)).abs() < 1e-6,
-                };
-                (glyph, shown.unwrap_or_default())
+                }
             });
         glyphs.collect()
     }
@@ -109,16 +111,15 @@ impl<'a> PdfFont<'a> {
         width.unwrap_or_default() / self.units
     }
 
-    /// Writes a text from a point on its baseline, in runs whose glyphs stand at their natural places.
+    /// Writes a text in runs whose glyphs stand at their natural places.
     pub(super) fn show(
         &mut self,
         content: &mut Content,
         name: Name<'_>,
-        text: &str,
-        at: (f32, f32),
+        text: &[Glyph<'_>],
         size: f32,
     ) {
-        let (mut x, mut run, mut start) = (at.0, Vec::new(), at);
+        let (mut run, mut start) = (Vec::new(), (0.0, 0.0));
         content.begin_text();
         content.set_font(name, size);
         let mut flush = |run: &mut Vec<u8>, start: (f32, f32)| {
@@ -128,18 +129,17 @@ impl<'a> PdfFont<'a> {
                 run.clear();
             }
         };
-        for (glyph, shown) in self.shape(text) {
+        for glyph in text {
             let id = self.used.remap(glyph.id);
-            self.learn(id, shown);
+            self.learn(id, glyph.shown);
             if run.is_empty() || !glyph.is_regular {
                 flush(&mut run, start);
-                start = (x + glyph.offset.0 * size, at.1 - glyph.offset.1 * size);
+                start = glyph.at;
             }
             run.extend(id.to_be_bytes());
             if !glyph.is_regular {
                 flush(&mut run, start);
             }
-            x += glyph.advance * size;
         }
         flush(&mut run, start);
         content.end_text();
@@ -154,12 +154,12 @@ impl<'a> PdfFont<'a> {
     }
 
     /// Adds the outlines of a text to the path.
-    pub(super) fn outline(&self, content: &mut Content, text: &str, at: (f32, f32), size: f32) {
-        let (mut x, outlines) = (at.0, self.font.outline_glyphs());
-        for (glyph, _) in self.shape(text) {
+    pub(super) fn outline(&self, content: &mut Content, text: &[Glyph<'_>], size: f32) {
+        let outlines = self.font.outline_glyphs();
+        for glyph in text {
             let mut pen = PathPen {
                 content,
-                origin: (x + glyph.offset.0 * size, at.1 - glyph.offset.1 * size),
+                origin: glyph.at,
                 scale: size / self.units,
                 last: (0.0, 0.0),
             };
@@ -168,7 +168,6 @@ impl<'a> PdfFont<'a> {
                 // A glyph that cannot be read has no outline.
                 let _ = outline.draw(settings, &mut pen);
             }
-            x += glyph.advance * size;
         }
     }
 
@@ -207,7 +206,7 @@ impl<'a> PdfFont<'a> {
         font.finish();
         self.describe(pdf, described, name, stream, cff.is_some());
 
-        let data = packed(cff.map_or(&*subset, |table| table.as_bytes()));
+        let data = zlib(cff.map_or(&*subset, |table| table.as_bytes()), 6);
         let mut file = pdf.stream(stream, &data);
         file.filter(Filter::FlateDecode);
         if cff.is_some() {
@@ -218,7 +217,7 @@ impl<'a> PdfFont<'a> {
         for (glyph, text) in self.texts.iter().filter(|(_, text)| !text.is_empty()) {
             texts.pair_with_multiple(*glyph, text.chars());
         }
-        let texts = packed(&texts.finish());
+        let texts = zlib(&texts.finish(), 6);
         pdf.cmap(cmap, &texts).filter(Filter::FlateDecode);
         Ok(())
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::tiles::{SIDE, Tiles};
 use super::{Painter, PixelSheet, Pixels, RasterGroup, fill};
+use crate::base::cast;
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
@@ -152,13 +153,7 @@ impl PixelSheet {
         let (width, height) = (self.pixels.width as usize, self.pixels.height as usize);
         let scale = self.scale;
         let edge = move |tile: usize, most: usize| {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "held below the size of the picture"
-            )]
-            let pixel = libm::floor(tile as f64 * SIDE * scale).min(most as f64) as usize;
-            pixel
+            cast::to_usize(libm::floor(tile as f64 * SIDE * scale).min(most as f64))
         };
         tiles.spans().into_iter().flat_map(move |(columns, row)| {
             let (left, right) = (edge(columns.start, width), edge(columns.end, width));

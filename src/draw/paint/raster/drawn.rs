@@ -4,6 +4,7 @@ use resvg::usvg::Tree;
 use tiny_skia::{Pixmap, PixmapMut, Transform};
 
 use super::Pixels;
+use crate::base::cast;
 
 /// The largest number of pixels around a group of which pixels are kept: a box with its words has about ten thousand.
 const MOST_PIXELS: f64 = 65_536.0;
@@ -78,12 +79,7 @@ impl GroupPixels {
         if width * height > MOST_PIXELS {
             return None;
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "whole numbers inside the page"
-        )]
-        let (left, top, width, height) = (left as u32, top as u32, width as u32, height as u32);
+        let [left, top, width, height] = [left, top, width, height].map(cast::to_u32);
         let mut map = Pixmap::new(width, height)?;
         #[expect(clippy::cast_precision_loss, reason = "at most 65,535")]
         let moved = scaled(scale).post_translate(-(left as f32), -(top as f32));

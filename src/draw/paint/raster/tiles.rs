@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::base::cast;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Form, Group, Piece, Shape, Step, Text};
 use crate::draw::style::Color;
@@ -153,13 +154,7 @@ impl Tiles {
 
 /// The place of a coordinate among the tiles; those before the page count as the first.
 fn tile(at: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "held in range on this line"
-    )]
-    let tile = (at / SIDE).clamp(0.0, 1e6) as usize;
-    tile
+    cast::to_usize((at / SIDE).clamp(0.0, 1e6))
 }
 
 fn between(a: Point, b: Point) -> Point {
