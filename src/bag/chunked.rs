@@ -377,11 +377,8 @@ fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compressi
         format: G::NAME.to_owned(),
         compression: compression.iter().map(|c| c.word().to_owned()).collect(),
         tier,
-        tier_reason: None,
         complete: true,
-        bytes_read: 0,
-        file_bytes: 0,
-        facts: Vec::new(),
+        ..Report::default()
     }
 }
 

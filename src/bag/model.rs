@@ -11,9 +11,10 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::base::words::worded;
 
 /// The serialisation of a payload.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Encoding {
     /// ROS 1 serialisation: little-endian, packed.
+    #[default]
     Ros1,
     /// ROS 2 serialisation: CDR after a header of four bytes.
     Cdr,
@@ -22,11 +23,11 @@ pub enum Encoding {
 }
 
 /// The index of a connection among those that a reader has announced, from 0 without gaps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConnectionId(pub u32);
 
 /// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connection {
     /// The index among the reader's connections.
     pub id: ConnectionId,
@@ -148,9 +149,10 @@ pub trait Sink {
 
 worded! {
     /// The way a bag was read; `reading.md` calls them tiers.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
     pub enum Tier {
         /// By its index: only wanted payloads are read.
+        #[default]
         Index = "index",
         /// By the message counts per chunk in its tail; by the index only if a chunk spans several windows.
         Chunks = "chunks",
@@ -165,7 +167,7 @@ worded! {
 pub(crate) const ETAG: &str = "etag";
 
 /// A reader's report about its bag after reading.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
     /// The file's or folder's own name, without a path.
     pub name: String,

@@ -312,18 +312,13 @@ impl<'a> PartsAdapter<'a> {
             }
             let key = (Arc::from(name.as_str()), Arc::clone(&topic.type_name), None);
             let connection = Connection {
-                id: ConnectionId(0),
                 topic: name.as_str().into(),
                 type_name: Arc::clone(&topic.type_name),
-                definition: None,
-                type_hash: None,
-                publisher: None,
-                latching: false,
-                qos: None,
                 encoding: match topic.encoding.as_str() {
                     "" | "cdr" => Encoding::Cdr,
                     other => Encoding::Other(other.to_owned()),
                 },
+                ..Connection::default()
             };
             self.announce(key, connection);
         }

@@ -61,7 +61,7 @@ impl fmt::Display for Stamp {
 }
 
 /// A half-open interval `[start, end)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Span {
     /// The start, inclusive.
     pub start: Stamp,

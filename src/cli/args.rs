@@ -229,7 +229,7 @@ pub(super) enum EventsFormat {
     Markdown,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct Inputs {
     /// Bags (`.bag`, `.bag.active`, `.db3`, `.mcap`, a rosbag2 folder, `-` for standard input) or a mission's `.json`;
     /// several are read as one mission.

@@ -75,9 +75,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let what = live.as_ref().map_or(args.what.as_path(), Live::path);
     let inputs = Inputs {
         bags: vec![what.to_owned()],
-        offset: Vec::new(),
-        ns: Vec::new(),
-        verify: false,
+        ..Inputs::default()
     };
     let time = TimeArgs {
         period: args.period,

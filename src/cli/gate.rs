@@ -289,9 +289,7 @@ fn unknown_kind(word: &str) -> Error {
 fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
     let inputs = Inputs {
         bags: bags.to_vec(),
-        offset: Vec::new(),
-        ns: Vec::new(),
-        verify: false,
+        ..Inputs::default()
     };
     let time = TimeArgs {
         period: time.period,

@@ -165,7 +165,7 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
 }
 
 /// Everything known about a mission once all bags are read, and the conclusions so far.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Observations,
@@ -205,15 +205,7 @@ impl<'a> Conclusions<'a> {
             offers: offers(&facts.offers, streams),
             streams,
             facts,
-            inferences: Vec::new(),
-            incidents: Vec::new(),
-            worded: BTreeSet::new(),
-            copies: BTreeSet::new(),
-            failed: None,
-            publishers: BTreeMap::new(),
-            subscribers: BTreeMap::new(),
-            nodes: BTreeSet::new(),
-            closed: None,
+            ..Self::default()
         }
     }
 

@@ -140,14 +140,9 @@ impl Follow {
     fn report(&self) -> Report {
         Report {
             name: file_name(self.growing.path()),
-            format: String::new(),
-            compression: Vec::new(),
             tier: Tier::Forward,
-            tier_reason: None,
             complete: true,
-            bytes_read: 0,
-            file_bytes: 0,
-            facts: Vec::new(),
+            ..Report::default()
         }
     }
 }

@@ -65,7 +65,7 @@ impl Phrase {
 }
 
 /// One window of the picture; the items and arrows in it are in [`View::seen`](super::View::seen).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
     /// The window's index, counted from 0.
     pub index: usize,
@@ -101,16 +101,7 @@ impl Frame {
         Self {
             index,
             span,
-            partial: false,
-            messages: 0,
-            member_lists: Vec::new(),
-            headlines: Vec::new(),
-            lasting: Vec::new(),
-            counts: Counts::default(),
-            caption: Vec::new(),
-            crowds: Vec::new(),
-            empty: None,
-            note: String::new(),
+            ..Self::default()
         }
     }
 

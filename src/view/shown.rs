@@ -69,7 +69,7 @@ impl Mark {
 }
 
 /// The look of an item or arrow in one window.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
     /// Its place in `View::items` or `View::arrows`.
     pub id: u32,
@@ -137,20 +137,7 @@ impl Shown {
             id,
             state,
             confidence,
-            mark: None,
-            hz: None,
-            steady_hz: None,
-            held: None,
-            rates: None,
-            is_paused: false,
-            is_starved: false,
-            events: Vec::new(),
-            topics: Vec::new(),
-            each: 0,
-            members: Members::default(),
-            inside: None,
-            count: None,
-            lifecycle: None,
+            ..Self::default()
         }
     }
 

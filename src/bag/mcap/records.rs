@@ -12,7 +12,7 @@ use super::{Described, Mcap};
 use crate::bag::checksum::Checksum;
 use crate::bag::chunked::{ChunkHead, Connections, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Connection, ConnectionId, Encoding};
+use crate::bag::model::{Connection, Encoding};
 use crate::bag::source::ByteStream;
 use crate::base::budget::DEFINITIONS;
 use crate::base::time::Stamp;
@@ -339,19 +339,15 @@ pub(super) fn channel(
     }
     let schema = grammar.schemas.get(&schema);
     let mut connection = Connection {
-        id: ConnectionId(0),
         topic: topic.into(),
         type_name: schema.map_or_else(|| "".into(), |s| Arc::clone(&s.name)),
         definition: schema.and_then(|s| s.definition.clone()),
-        type_hash: None,
-        publisher: None,
-        latching: false,
-        qos: None,
         encoding: match encoding.as_str() {
             "ros1" => Encoding::Ros1,
             "cdr" => Encoding::Cdr,
             _ => Encoding::Other(encoding),
         },
+        ..Connection::default()
     };
     describe(&mut connection, cursor.bytes().unwrap_or_default());
     Ok(Some((id, connection)))

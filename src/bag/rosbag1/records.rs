@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::{Described, Rosbag1};
 use crate::bag::chunked::{ChunkHead, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Connection, ConnectionId, Encoding};
+use crate::bag::model::Connection;
 use crate::bag::source::ByteStream;
 use crate::base::budget::DEFINITIONS;
-use crate::base::name::{NodeName, TopicName};
+use crate::base::name::NodeName;
 use crate::base::time::Stamp;
 
 /// The header of a record, as far as it is used.
@@ -239,7 +239,10 @@ fn text(bytes: &[u8]) -> String {
 
 /// The connection that a record describes, with the fields before the first damaged one.
 pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -> Connection {
-    let mut connection = blank(text(topic).into());
+    let mut connection = Connection {
+        topic: text(topic).into(),
+        ..Connection::default()
+    };
     while let Some((name, value, rest)) = field(data) {
         data = rest;
         match name {
@@ -269,21 +272,6 @@ fn definition(grammar: &mut Rosbag1, value: &[u8]) -> Option<Arc<str>> {
     let new: Arc<str> = text.into();
     grammar.definitions.insert(Arc::clone(&new));
     Some(new)
-}
-
-/// A connection of which only the topic is known.
-fn blank(topic: TopicName) -> Connection {
-    Connection {
-        id: ConnectionId(0),
-        topic,
-        type_name: "".into(),
-        definition: None,
-        type_hash: None,
-        publisher: None,
-        latching: false,
-        qos: None,
-        encoding: Encoding::Ros1,
-    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use super::xml::Xml;
 use crate::draw::scene::{Group, Scene};
 
 /// Scenes as a film.
+#[derive(Default)]
 pub(crate) struct AnimatedScenes {
     slots: Vec<Slot>,
     /// The slots in the order in which they are painted.
@@ -30,13 +31,7 @@ impl AnimatedScenes {
     /// The scenes with the times for which they are shown, in milliseconds. All have one size; tooltips, which tell
     /// numbers that differ from scene to scene, are left out.
     pub(crate) fn new(scenes: impl Iterator<Item = (Scene, u32)>) -> Self {
-        let mut all = Self {
-            slots: Vec::new(),
-            order: Vec::new(),
-            of: BTreeMap::new(),
-            first: Scene::default(),
-            times: Vec::new(),
-        };
+        let mut all = Self::default();
         for (mut scene, ms) in scenes {
             let groups = std::mem::take(&mut scene.groups);
             if all.times.is_empty() {

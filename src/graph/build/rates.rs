@@ -61,6 +61,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
 }
 
 /// A window that may still get messages.
+#[derive(Default)]
 struct OpenWindow {
     window: usize,
     count: u64,
@@ -114,13 +115,9 @@ impl OpenWindow {
     fn new(window: usize, streams: usize) -> Self {
         Self {
             window,
-            count: 0,
-            bytes: 0,
-            before: None,
-            longest: None,
-            gaps: Vec::new(),
             streams: vec![0; streams],
             stream_bytes: vec![0; streams],
+            ..Self::default()
         }
     }
 

@@ -47,7 +47,7 @@ impl Number {
 const EXACT: f64 = 9e15;
 
 /// The state of one element in one window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Row {
     pub(crate) state: State,
     pub(crate) confidence: Confidence,
@@ -70,15 +70,7 @@ impl Row {
         Self {
             state,
             confidence,
-            lifecycle: 0,
-            count: None,
-            bytes: None,
-            median: Number::Unknown,
-            gap: Number::Unknown,
-            drops: None,
-            jitter: Number::Unknown,
-            age: Number::Unknown,
-            rate: None,
+            ..Self::default()
         }
     }
 

@@ -36,7 +36,7 @@ pub enum OnError {
 }
 
 /// The whole job of `bagreel tables`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct FleetJob {
     /// Bags; folders with bags below them; URLs; prefixes of stores, which end in a slash.
@@ -62,13 +62,8 @@ impl FleetJob {
     pub fn new(sources: Vec<String>, folder: PathBuf) -> Self {
         Self {
             sources,
-            planning: Planning::default(),
-            detail: CountDetail::default(),
-            shard: None,
-            skip_existing: false,
-            on_error: OnError::default(),
-            jobs: None,
             folder,
+            ..Self::default()
         }
     }
 }
