@@ -219,6 +219,15 @@ fn gallery_shows_what_its_commands_draw() {
     assert!(bytes <= MOST_BYTES, "{bytes} bytes of pictures");
 }
 
+/// The anchor that mdBook and GitHub give to a heading.
+fn heading_id(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = text
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.collect::<String>().replace(' ', "-")
+}
+
 #[test]
 fn links_in_readme_and_docs_are_valid() {
     let mut seen = 0;
@@ -243,6 +252,17 @@ fn links_in_readme_and_docs_are_valid() {
         for target in targets.filter(|target| !target.starts_with("https://")) {
             let file = target.split('#').next().unwrap();
             assert!(folder.join(file).exists(), "{}: {target}", path.display());
+            if let Some((_, anchor)) = target.split_once('#') {
+                let file = if file.is_empty() {
+                    path.clone()
+                } else {
+                    folder.join(file)
+                };
+                let text = fs::read_to_string(file).unwrap();
+                let mut headings = text.lines().filter_map(|l| l.strip_prefix('#'));
+                let is_known = headings.any(|heading| heading_id(heading) == anchor);
+                assert!(is_known, "{}: {target}", path.display());
+            }
             seen += 1;
         }
     }
@@ -256,30 +276,82 @@ fn links_in_readme_and_docs_are_valid() {
     assert!(seen > 40, "{seen} links");
 }
 
+fn help(args: &[&str]) -> String {
+    let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args(args)
+        .output()
+        .unwrap();
+    String::from_utf8(run.stdout).unwrap()
+}
+
+/// The commands that `bagreel --help` lists, without `help` itself.
+fn help_commands() -> Vec<String> {
+    let list = help(&["--help"]);
+    let commands = list.lines().skip_while(|l| *l != "Commands:").skip(1);
+    commands
+        .take_while(|l| !l.is_empty())
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The number of lines of a screen of help.
+const SCREEN: usize = 50;
+
+#[test]
+fn short_help_fits_a_screen_and_its_examples_run() {
+    let dir = folder();
+    for command in &help_commands() {
+        let short = help(&[command, "-h"]);
+        assert!(short.lines().count() <= SCREEN, "{short}");
+        let examples = short.split("Examples:\n").nth(1).unwrap();
+        let examples = examples.lines().map(str::trim_start);
+        let examples: Vec<&str> = examples.filter(|l| l.starts_with("bagreel ")).collect();
+        assert_eq!(examples.len(), 3, "{short}");
+        for example in examples {
+            let end = example.find("  ").unwrap_or(example.len());
+            let example = example[..end].split(['>', '|']).next().unwrap().trim();
+            // Following waits for a recording that grows.
+            if example.starts_with("bagreel follow") {
+                continue;
+            }
+            let output = run(example, dir.path());
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{example}: {said}");
+        }
+    }
+}
+
+#[test]
+fn long_help_lists_every_option_under_a_heading() {
+    let general = ["--quiet", "--verbose", "--color", "--help"];
+    for command in &help_commands() {
+        let long = help(&[command, "--help"]);
+        let plain = long.split("\nOptions:\n").nth(1).unwrap();
+        // The next heading begins a line.
+        let plain = plain
+            .lines()
+            .take_while(|l| l.is_empty() || l.starts_with(' '));
+        let plain = plain.filter(|l| l.trim_start().starts_with('-'));
+        for line in plain {
+            assert!(
+                general.iter().any(|o| line.contains(o)),
+                "{command}: {line}"
+            );
+        }
+    }
+}
+
 #[test]
 fn docs_describe_every_option() {
     let docs: String = pages().into_iter().map(|(_, text)| text).collect();
-    let help = |command: &[&str]| {
-        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-            .args(command)
-            .arg("--help")
-            .output()
-            .unwrap();
-        String::from_utf8(run.stdout).unwrap()
-    };
-    let list = help(&[]);
-    let commands = list.lines().skip_while(|l| *l != "Commands:").skip(1);
-    let commands = commands
-        .take_while(|l| !l.is_empty())
-        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
-        .filter_map(|l| l.split_whitespace().next());
+    let help = |command: &str| help(&[command, "--help"]);
     let mut options = BTreeSet::new();
-    for command in commands {
-        assert!(
-            docs.contains(&format!("bagreel {command}")) || command == "help",
-            "{command}"
-        );
-        let text = help(&[command]);
+    for command in &help_commands() {
+        assert!(docs.contains(&format!("bagreel {command}")), "{command}");
+        let text = help(command);
         let words = text
             .lines()
             .map(str::trim_start)

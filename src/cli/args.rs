@@ -3,6 +3,7 @@
 pub(super) mod figure;
 pub(super) mod follow;
 pub(super) mod gate;
+mod help;
 pub(super) mod render;
 #[cfg(feature = "parquet")]
 pub(super) mod tables;
@@ -10,7 +11,7 @@ mod values;
 
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::base::time::{Moment, Period};
 use crate::export::tables::TableFormat;
@@ -37,10 +38,17 @@ pub(super) struct Typed {
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub(super) quiet: bool,
     /// Print every note, not a summary of what was left out or chosen.
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, hide_short_help = true)]
     pub(super) verbose: bool,
     /// When to use colors. `auto`: on a terminal, unless `NO_COLOR` is set.
-    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        value_name = "WHEN",
+        hide_short_help = true
+    )]
     pub(super) color: Colour,
 }
 
@@ -56,19 +64,18 @@ pub(super) enum Colour {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Draw a mission: animations, frames, pages, figures and data, from one pass over the bag.
-    #[command(after_help = render::EXAMPLES, after_long_help = render::outputs_help())]
+    #[command(after_long_help = render::outputs_help())]
     Render(Box<render::RenderArgs>),
-    /// Draw a figure for a paper: what was alive when, who talks to whom, or the reconfigurations one by one.
-    #[command(after_help = figure::HELP)]
+    /// Draw a figure for a paper: what was alive when, who publishes to whom, or the reconfigurations one by one.
     Figure(Box<figure::FigureArgs>),
     /// Summarize a bag: contents, evidence, and what it cannot tell you; for a folder, one row per bag.
     Info(Box<InfoArgs>),
     /// Export messages as tables: a row per message, or a table per topic with every field.
-    #[command(after_help = EXTRACT_HELP)]
+    #[command(after_long_help = EXTRACT_HELP)]
     Extract(Box<ExtractArgs>),
     /// Count the messages of many bags into two Parquet tables: bags, and counts per publisher and window.
     #[cfg(feature = "parquet")]
-    #[command(after_help = tables::HELP)]
+    #[command(after_long_help = tables::HELP)]
     Tables(Box<tables::TablesArgs>),
     /// Write a bundle for replication: digests, commands, a survey, how much each recording reconfigures, and figures.
     #[cfg(feature = "pdf")]
@@ -76,16 +83,16 @@ pub(super) enum Command {
     /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when.
     Events(Box<EventsArgs>),
     /// Compare two missions: nodes, topics, connections, rates and events.
-    #[command(after_help = gate::DIFF_HELP)]
+    #[command(after_long_help = gate::DIFF_HELP)]
     Diff(Box<gate::DiffArgs>),
     /// Generate an expectations file from healthy runs.
-    #[command(after_help = gate::BASELINE_HELP)]
+    #[command(after_long_help = gate::BASELINE_HELP)]
     Baseline(Box<gate::BaselineArgs>),
     /// Check a mission against an expectations file: what is missing, new, late or slow.
-    #[command(after_help = gate::check_help())]
+    #[command(after_long_help = gate::check_help())]
     Check(Box<gate::CheckArgs>),
-    /// Follow a recording while it is made: print each event as soon as it is known, without ROS and without locks.
-    #[command(after_help = follow::FOLLOW_HELP)]
+    /// Follow a recording while it grows: print each event as soon as it is known, without ROS and without locks.
+    #[command(after_long_help = follow::FOLLOW_HELP)]
     Follow(Box<follow::FollowArgs>),
     /// List the built-in styles, or print one as a starting point for your own.
     Styles {
@@ -235,19 +242,18 @@ pub(super) struct Inputs {
     /// several are read as one mission.
     #[arg(required = true, value_name = "BAG")]
     pub(super) bags: Vec<PathBuf>,
-    /// Correct the clock of the computer that recorded a bag: `robot2.bag=+0.35s`; once per bag.
-    #[arg(long, value_name = "BAG=TIME", value_parser = offset, help_heading = "Time")]
-    pub(super) offset: Vec<(PathBuf, i64)>,
     /// Put the names of a bag in a namespace: `robot2.bag=/robot2`; once per bag.
     #[arg(long, value_name = "BAG=NAMESPACE", value_parser = namespace)]
     pub(super) ns: Vec<(PathBuf, String)>,
     /// Read everything again with a second, independent reader and compare.
     #[arg(long)]
     pub(super) verify: bool,
+    /// Correct the clock of the computer that recorded a bag: `robot2.bag=+0.35s`; once per bag.
+    #[arg(long, value_name = "BAG=TIME", value_parser = offset)]
+    pub(super) offset: Vec<(PathBuf, i64)>,
 }
 
 #[derive(Debug, Default, Args)]
-#[command(next_help_heading = "Time")]
 pub(super) struct TimeArgs {
     /// Length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s, shorter for bags below
     /// five minutes, longer above ten hours]
@@ -274,7 +280,6 @@ pub(super) struct TimeArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Time")]
 pub(super) struct ChangeArgs {
     /// Report rates that change by more than this fraction.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
@@ -294,10 +299,9 @@ impl Default for ChangeArgs {
 }
 
 #[derive(Clone, Debug, Default, Args)]
-#[command(next_help_heading = "Evidence")]
 pub(super) struct GraphArgs {
     /// Compare nodes by role: ignore the suffixes of anonymous names.
-    #[arg(long, help_heading = "Filter")]
+    #[arg(long)]
     pub(super) roles: bool,
     /// Add nodes and edges from a CSV, YAML, MCAP (`/rosgraph`) or launch file, or from DOT saved by rqt_graph.
     #[arg(long, value_name = "FILE")]
@@ -318,24 +322,6 @@ pub(super) struct GraphArgs {
 #[derive(Debug, Default, Args)]
 pub(super) struct SizeArgs {
     /// Read the size of every message, even if the index does not contain it.
-    #[arg(long, help_heading = "Performance")]
+    #[arg(long)]
     pub(super) bytes: bool,
-}
-
-/// The options of `render` that `-h` lists; `--help` lists all of them.
-const RENDER_ESSENTIALS: &str =
-    "bags outputs period start end mode ns_filter topic_filter style size for";
-
-impl Typed {
-    /// The command line's grammar. Its short help fits one screen.
-    pub(super) fn grammar() -> clap::Command {
-        Self::command().mut_subcommand("render", |render| {
-            render.mut_args(|arg| {
-                let id = arg.get_id().as_str();
-                let is_essential = RENDER_ESSENTIALS.split(' ').any(|known| known == id);
-                let is_of_figures = ["figure", "rows", "steps", "text"].contains(&id);
-                arg.hide_short_help(!is_essential).hide(is_of_figures)
-            })
-        })
-    }
 }

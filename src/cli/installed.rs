@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use clap::CommandFactory as _;
-
 use crate::base::error::Error;
 use crate::base::nearest::suggestion;
 use crate::cli::args::Typed;
@@ -23,7 +21,7 @@ pub(super) fn completions(
 pub(super) fn manual(name: Option<&str>, terminal: &mut Terminal) -> Result<(), Error> {
     // Not the grammar, whose short help omits options. Building it gives the commands their full names, such as
     // `bagreel-render`.
-    let mut command = Typed::command().disable_help_subcommand(true);
+    let mut command = Typed::documented().disable_help_subcommand(true);
     command.build();
     if let Some(name) = name {
         command = command.find_subcommand(name).cloned().ok_or_else(|| {

@@ -16,11 +16,11 @@ use crate::graph::diff::RATE_CHANGE;
 pub(crate) struct FigureArgs {
     #[command(flatten)]
     pub(crate) inputs: Inputs,
-    /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable; without it,
-    /// `out/<bag name>.pdf`.
+    /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable. [default:
+    /// out/<bag name>.pdf]
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Life lines, a map of who talks to whom, or the reconfigurations one by one.
+    /// Life lines, a map of who publishes to whom, or the reconfigurations one by one.
     #[arg(long, default_value = "lives", value_parser = kinds())]
     pub(crate) kind: String,
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]
@@ -36,19 +36,19 @@ pub(crate) struct FigureArgs {
     /// Font file for characters that the bundled font lacks.
     #[arg(long, value_name = "FILE")]
     pub(crate) font: Option<PathBuf>,
-    /// Start: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) start: Option<Moment>,
-    /// End, written like `--start`.
+    /// End time, in the same forms as `--start`.
     #[arg(long, value_parser = moment, allow_hyphen_values = true)]
     pub(crate) end: Option<Moment>,
-    /// Smallest relative change of a rate to report.
+    /// Report rates that change by more than this fraction.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(crate) rate_change: f64,
-    /// Nodes to draw, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
+    /// Nodes to draw, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(crate) ns_filter: Option<String>,
-    /// Topics to draw, written like `--ns-filter`.
+    /// Topics to draw, in the same form as `--ns-filter`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(crate) topic_filter: Option<String>,
     #[command(flatten)]
@@ -75,11 +75,6 @@ pub(crate) struct PhaseArgs {
     #[arg(long, value_name = "FILE|auto|none", default_value = "auto")]
     pub(crate) phases: String,
 }
-
-pub(super) const HELP: &str = "\
-Examples:
-  bagreel figure run.bag -o fig.pdf                      life lines, as wide as a column
-  bagreel figure run.bag --kind map --width 181mm -o map.pdf -o map.tex";
 
 /// The kinds of figures.
 pub(super) fn kinds() -> PossibleValuesParser {

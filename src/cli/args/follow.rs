@@ -16,33 +16,33 @@ pub(crate) struct FollowArgs {
     /// followed, or a live system: `ros1://HOST:11311` (a ROS 1 master), `ws://HOST:8765` (`foxglove_bridge`).
     #[arg(value_name = "WHAT")]
     pub(crate) what: PathBuf,
-    /// How to print events.
+    /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) format: FollowFormat,
-    /// Check the recording against this expectations file: findings are printed when they are sure, and the exit code is
-    /// that of `check`.
+    /// Check the recording against this expectations file: print findings when they are certain, and exit
+    /// as `check` does.
     #[arg(long, value_name = "FILE")]
     pub(crate) expect: Option<PathBuf>,
-    /// A file to write at the end, as `render` writes it from the closed recording. May be given many times.
+    /// Output file, written at the end as `render` writes it from the closed recording. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// The length of a window in outputs, on the page, and for rules about rates.
+    /// Length of a window in outputs, on the page, and for rules about rates.
     #[arg(long, short, value_parser = length)]
     pub(crate) period: Option<Length>,
-    /// End when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
+    /// Stop when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) idle: Option<Period>,
-    /// How much of the recording is kept in mind for events, findings and the page; outputs hold all of it.
+    /// Keep this much of the recording in memory for events, findings and the page; outputs cover all of it.
     #[arg(long, value_name = "TIME", default_value = "1h", value_parser = period)]
     pub(crate) keep: Period,
-    /// Topics of a live system (`ws://`) whose messages are recorded, so that their rates are known, separated by
-    /// commas. [default: none, the graph only]
+    /// Topics of a live system (`ws://`) to subscribe to, so that their rates are known. [default: none, the graph
+    /// only]
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',')]
     pub(crate) rates: Vec<String>,
-    /// Show the mission as a page at this address, which grows with the recording: `127.0.0.1:8723`.
+    /// Serve a page at this address that shows the mission as it grows: `127.0.0.1:8723`.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) serve: Option<SocketAddr>,
-    /// Let other machines see the page: allow an address that is not this machine's own.
+    /// Allow an address that other machines can reach.
     #[arg(long, requires = "serve")]
     pub(crate) bind: bool,
 }
@@ -57,5 +57,5 @@ pub(crate) enum FollowFormat {
     Ndjson,
 }
 
-pub(crate) const FOLLOW_HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is sure.\n\n\
-    Exit codes: 0 done, 1 failed or a rule is broken, 2 usage, 3 done but data was skipped (damaged bag).";
+pub(crate) const FOLLOW_HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is certain.\n\n\
+    Exit codes: 0 done, 1 failed or a rule is broken, 2 usage error, 3 done but data was skipped (damaged bag).";

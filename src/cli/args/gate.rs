@@ -70,7 +70,7 @@ pub(crate) struct BaselineArgs {
         conflicts_with = "update"
     )]
     pub(crate) output: OsString,
-    /// Update this expectations file: rewrite only what no longer holds and keep comments.
+    /// Update this expectations file: rewrite only what no longer matches and keep comments.
     #[arg(long, value_name = "FILE")]
     pub(crate) update: Option<PathBuf>,
     /// Update only these nodes and topics.
@@ -127,7 +127,6 @@ pub(crate) enum Undecidable {
 
 /// Which part of a mission is judged, and in which windows.
 #[derive(Debug, Default, Args)]
-#[command(next_help_heading = "Time")]
 pub(crate) struct GateTime {
     /// Length of the windows in which rates are checked: `60`, `30s`, `500ms`. [default: the file's `period`]
     #[arg(long, short, value_parser = length)]

@@ -14,10 +14,10 @@ use crate::export::FORMATS;
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) inputs: Inputs,
-    #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT), help_heading = "Output")]
+    #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT))]
     pub(crate) outputs: Vec<OsString>,
     /// Format of outputs without a known extension, such as `-`.
-    #[arg(long, value_name = "WORD", help_heading = "Output")]
+    #[arg(long, value_name = "WORD")]
     pub(crate) format: Option<String>,
     #[command(flatten)]
     pub(crate) time: TimeArgs,
@@ -44,21 +44,20 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
     /// Write what is only inferred to `nodl/`, too.
-    #[arg(long, value_name = "inferred", value_parser = ["inferred"], help_heading = "Output")]
+    #[arg(long, value_name = "inferred", value_parser = ["inferred"])]
     pub(crate) include: Option<String>,
     /// Print the time spent in each step.
-    #[arg(long, help_heading = "Performance")]
+    #[arg(long)]
     pub(crate) timings: bool,
     /// Redraw whenever the style file changes, until interrupted.
-    #[arg(long, help_heading = "Picture")]
+    #[arg(long)]
     pub(crate) watch: bool,
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Filter")]
 pub(crate) struct ViewArgs {
     /// Draw the graph, or a timeline of topics. [default: graph; board if most publishers are unknown]
-    #[arg(long, help_heading = "Picture", value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
+    #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
     pub(crate) view: Option<String>,
     /// Draw nodes only, nodes with one line per pair, nodes and active topics, or all topics.
     #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
@@ -93,7 +92,6 @@ pub(crate) struct ViewArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Picture")]
 pub(crate) struct LookArgs {
     /// Built-in style or style file; see `bagreel styles`.
     #[arg(long, default_value = "light", value_name = "NAME|FILE")]
@@ -138,7 +136,6 @@ pub(crate) struct LookArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Output")]
 pub(crate) struct SequenceArgs {
     /// Duration of a frame in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=600_000))]
@@ -179,14 +176,6 @@ impl SequenceArgs {
     }
 }
 
-pub(super) const EXAMPLES: &str = "\
-Examples:
-  bagreel render run.bag                              an animation of the mission, out/run.gif
-  bagreel render run/ -o run.html --period 10         a page to step through, ten seconds per window
-  bagreel render run.mcap --for readme -o run.gif     as wide and legible as a README needs it
-
-`bagreel render --help` lists all options and output formats.";
-
 const OUTPUT: &str = "Output file; the extension selects the format, `{n}` writes one file per window, `-` is standard \
     output. Repeatable. [default: out/<bag name>.gif; .png if nothing changes, and for a topic timeline]";
 
@@ -199,8 +188,8 @@ pub(super) fn outputs_help() -> String {
     shown(&format!("Outputs, by extension:\n{}", rows.join("\n")))
 }
 
-/// A help text in which `{n}` stands as it is: clap would make a new line of it, so a style that changes nothing, and
-/// that is left out where there is no terminal, comes in between.
+/// A help text that shows `{n}` literally: clap would replace it by a line break, so an escape sequence that has no effect
+/// is put inside; clap removes it where there is no terminal.
 fn shown(text: &str) -> String {
     text.replace("{n}", "{\u{1b}[0mn}")
 }

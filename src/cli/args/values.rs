@@ -1,4 +1,4 @@
-//! Values of options, parsed from text; each error says what to write instead.
+//! Values of options, parsed from text; each error suggests what to write instead.
 
 use std::path::PathBuf;
 
