@@ -234,7 +234,7 @@ pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
     }
 }
 
-/// Options that say how bags are read and windows cut: a mission's JSON holds windows already.
+/// Options for how bags are read and windows cut: a mission's JSON contains windows already.
 const OF_BAGS: &str = "offset ns verify period step start end align skip-unchanged cut grace roles topology source infer bytes";
 
 /// Refuses options about bags if the input is a mission's JSON.

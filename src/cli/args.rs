@@ -38,17 +38,10 @@ pub(super) struct Typed {
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub(super) quiet: bool,
     /// Print every note, not a summary of what was left out or chosen.
-    #[arg(long, short, global = true, hide_short_help = true)]
+    #[arg(long, short, global = true)]
     pub(super) verbose: bool,
     /// When to use colors. `auto`: on a terminal, unless `NO_COLOR` is set.
-    #[arg(
-        long,
-        global = true,
-        value_enum,
-        default_value_t,
-        value_name = "WHEN",
-        hide_short_help = true
-    )]
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
     pub(super) color: Colour,
 }
 

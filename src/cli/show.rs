@@ -1,4 +1,4 @@
-//! The commands that tell what is in bags: `info`, `events`, `paper`.
+//! The commands that describe the contents of bags: `info`, `events`, `paper`.
 
 use super::applies::{self, Given};
 #[cfg(feature = "pdf")]

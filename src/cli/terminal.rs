@@ -284,7 +284,7 @@ fn summary(notices: &[Notice]) -> String {
     let parts: Vec<String> = parts
         .map(|(count, what, how)| words::count(*count, what) + how)
         .collect();
-    format!("{}; `-v` tells which", parts.join(", "))
+    format!("{}; `-v` lists them", parts.join(", "))
 }
 
 impl Watch for Terminal {

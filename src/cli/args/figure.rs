@@ -55,7 +55,7 @@ pub(crate) struct FigureArgs {
     pub(crate) graph: GraphArgs,
 }
 
-/// The form of a figure, whatever its kind; hidden where `render` takes it.
+/// The options of every kind of figure; hidden in `render`.
 #[derive(Debug, Default, Args)]
 pub(crate) struct FigureForm {
     /// What a row or box represents. [default: the finest that fits]

@@ -87,7 +87,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
         "format parts all phases period start end rate_change",
         "
   bagreel events run.bag                              one line per event
-  bagreel events run.bag --parts --start 60 --end 120 one minute, with the affected topics and connections
+  bagreel events run.bag --parts --end 1:00           the first minute, with affected topics
   bagreel events run.bag --format csv                 for a spreadsheet",
     ),
     (
@@ -157,7 +157,10 @@ const FIRST: &str = "
 impl Typed {
     /// The command line's grammar with its complete help; `-h` of a command fits one screen.
     pub(crate) fn grammar() -> Command {
-        Self::documented().mut_subcommands(|command| {
+        let hide = |arg: clap::Arg| arg.hide_short_help(true);
+        let command = Self::documented().mut_arg("verbose", hide);
+        let command = command.mut_arg("color", hide);
+        command.mut_subcommands(|command| {
             let known = SCREENS.iter().find(|known| known.0 == command.get_name());
             let essential = known.map_or("", |known| known.1);
             command.mut_args(|arg| {

@@ -43,7 +43,7 @@ pub(crate) struct RenderArgs {
     pub(crate) form: FigureForm,
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
-    /// Write what is only inferred to `nodl/`, too.
+    /// Write inferred endpoints to `nodl/`, too.
     #[arg(long, value_name = "inferred", value_parser = ["inferred"])]
     pub(crate) include: Option<String>,
     /// Print the time spent in each step.
