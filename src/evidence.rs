@@ -1,6 +1,6 @@
-//! Evidence of who talks to whom: one file per kind of proof below `source/`, one row each in [`SOURCES`].
+//! Evidence of who publishes and subscribes to what: one file per kind of evidence in `source/`, one row each in [`SOURCES`].
 //!
-//! A source reads messages whose layout it knows, or the announcement of a connection, or draws a conclusion from the
+//! A source reads messages whose layout it knows, or the announcement of a connection, or draws conclusions from the
 //! whole mission; what it finds are observations.
 
 pub(crate) mod clock;
@@ -39,7 +39,7 @@ use source::{
     statistics, tf_pair, topic_statistics,
 };
 
-/// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
+/// All kinds of evidence; a set of them ([`Evidence`]) has at most 64 members.
 pub const SOURCES: &[Source] = &[
     Source {
         word: "connection",

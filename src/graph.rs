@@ -1,6 +1,6 @@
 //! The computation graph of one window: its nodes, topics and edges, with their states and rates.
 //!
-//! A graph holds numbers only; names stand once, in the [`Elements`] of the whole mission, sorted, so that an index
+//! A graph contains numbers only; names are stored once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
 
 mod build;

@@ -67,7 +67,7 @@ pub struct Vertex {
     pub size: Size,
     /// The outline at which routes meet it.
     pub outline: Outline,
-    /// The innermost cluster it stands in: a place in [`Plan::clusters`].
+    /// The innermost cluster that contains it: a place in [`Plan::clusters`].
     pub cluster: Option<usize>,
 }
 
@@ -83,7 +83,7 @@ pub struct Link {
     /// The number of its fork: edges with the same one begin at the same vertex and part after their label, as far as
     /// labels have room of their own and no cycle is broken among them.
     pub fork: Option<usize>,
-    /// Whether it leaves the clusters around its ends as soon as it can, so that its label stands outside of them.
+    /// Whether it leaves the clusters around its ends as soon as it can, so that its label is outside of them.
     pub is_outside: bool,
 }
 
@@ -92,9 +92,9 @@ pub struct Link {
 pub struct Cluster {
     /// The cluster around it: a place in [`Plan::clusters`], smaller than its own.
     pub parent: Option<usize>,
-    /// The size of its title, which stands at the top left inside.
+    /// The size of its title, which is at the top left inside.
     pub title: Size,
-    /// The size of the words that stand at the bottom left inside.
+    /// The size of the words at the bottom left inside.
     pub footer: Size,
 }
 
@@ -209,7 +209,7 @@ pub fn lay_out(plan: &Plan, options: &LayoutOptions, engine: &dyn Engine) -> Lay
 }
 
 /// The layout of this plan with the boxes of an earlier one where they were: `known` has a place per vertex, `None` for
-/// a new one. New boxes stand near what they are linked to; frames and routes are found anew.
+/// a new one. New boxes are placed near those that they are linked to; frames and routes are recomputed.
 ///
 /// Where nothing moved and nothing is new, this is the layout of [`lay_out`].
 pub fn extend(
@@ -241,7 +241,7 @@ pub fn extend(
 }
 
 impl Plan {
-    /// This plan with every size finite and every reference valid; a link that names nothing gets a route without pieces.
+    /// This plan with every size finite and every reference valid; a link with invalid ends gets an empty route.
     fn sane(&self) -> Self {
         let mut plan = self.clone();
         for (at, cluster) in plan.clusters.iter_mut().enumerate() {
@@ -290,7 +290,7 @@ impl Plan {
         plan
     }
 
-    /// The places of the links of which both ends exist.
+    /// The places of the links with two existing ends.
     fn valid_links(&self) -> impl Iterator<Item = usize> {
         let n = self.vertices.len();
         (0..self.links.len()).filter(move |&i| self.links[i].from < n && self.links[i].to < n)
@@ -315,13 +315,13 @@ impl Layout {
     }
 }
 
-/// Grows what is around several rectangles by one more.
+/// Enlarges the bounds of several rectangles by one more.
 fn include(around: &mut Option<Rect>, rect: Rect) {
     *around = Some(around.map_or(rect, |all| all.union(&rect)));
 }
 
 impl Cluster {
-    /// Its frame around what stands in it: the title stands at the top left.
+    /// Its frame around its contents, with the title at the top left.
     fn frame(&self, inside: Rect, padding: f64) -> Rect {
         let around = inside.grown(padding);
         Rect::new(
@@ -375,7 +375,7 @@ pub(crate) struct Component {
     pieces: Vec<usize>,
 }
 
-/// The kind of thing that an item of a layer stands for.
+/// The kind of thing that an item of a layer represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LayerItem {
     /// A vertex of the plan.
@@ -448,7 +448,7 @@ impl Layers {
         }
     }
 
-    /// The cluster of `item` that is a child of `around`; `None` if the item stands directly in it.
+    /// The cluster of `item` that is a child of `around`; `None` if the item is directly in it.
     fn child(&self, around: usize, item: usize) -> Option<usize> {
         let mut cluster = self.home[item];
         if cluster == around {

@@ -23,7 +23,7 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! The [`EventLog`] of a mission holds its events, the same for all windows; `examples/story.rs` prints it.
+//! The [`EventLog`] of a mission contains its events, the same for all windows; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
@@ -49,9 +49,9 @@
 //! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
 //! *window* one half-open interval `[start, end)`. A *claim* is a statement of one source about the graph, with the
 //! times at which it said so; a *proof* is a fact that follows from claims; a *confidence* is the strength of the evidence
-//! for something. The *graph* of a window holds the *states* of nodes, topics, publications and subscriptions, its
+//! for something. The *graph* of a window contains the *states* of nodes, topics, publications and subscriptions, its
 //! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
-//! every run. The *view* holds *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
+//! every run. The *view* contains *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
 //! every place and colour decided; a *painter* writes it down; an *encoder* makes a file of it.
 //!
 //! Versions. Before 1.0 a minor version (0.2) may change this library: names, fields and signatures may move, and each such
@@ -164,7 +164,7 @@ pub mod internals;
 /// Reads bags, or a mission's own JSON, into a mission.
 ///
 /// # Errors
-/// Where an input cannot be read at all or none holds a message, and for times that make no sense. Damaged data is left
+/// If an input cannot be read at all, if no input contains a message, and for times that make no sense. Damaged data is left
 /// out and reported in [`Mission::notices`].
 pub fn read(reading: &Reading) -> Result<Mission> {
     pipeline::read(reading, &mut pipeline::Unwatched)

@@ -142,7 +142,7 @@ impl Mission {
     }
 
     /// Determines the changes from each window to the next, and derives lifetimes, sending and log from them: for
-    /// missions of which only the windows are known. A rate must change by more than the fraction `threshold`;
+    /// missions with known windows only. A rate must change by more than the fraction `threshold`;
     /// `restarts` are nodes that restarted under the same name, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);

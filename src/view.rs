@@ -125,7 +125,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
     }
 }
 
-/// The kind of thing that a box of the picture stands for.
+/// The kind of thing that a box of the picture represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ItemKind {
     /// A node: drawn as an ellipse.
@@ -151,19 +151,19 @@ impl ItemKind {
 /// A box of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// The kind of thing it stands for.
+    /// The kind of thing it represents.
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
     /// The name as it is drawn, in full: that of a node without the part that is new in every run.
     pub label: Arc<str>,
-    /// The nodes and topics it stands for, sorted; one for a plain node or topic.
+    /// The nodes and topics it represents, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
     /// Whether its members are the same thing in several equal namespaces.
     pub is_replica: bool,
     /// Whether it is a service: its clients write to it, and its server reads it.
     pub is_service: bool,
-    /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
+    /// The innermost namespace whose box contains it: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
 }
 
@@ -185,11 +185,11 @@ pub struct Namespace {
     pub name: Arc<str>,
     /// The namespace around it: a place in [`View::namespaces`], smaller than its own.
     pub parent: Option<usize>,
-    /// The indices of the equal namespaces drawn as this one: `01`, `02`; empty where it stands for itself alone.
+    /// The indices of the equal namespaces drawn as this one: `01`, `02`; empty where it represents only itself.
     pub replicas: Vec<Arc<str>>,
 }
 
-/// Nodes and topics that stand as words in a namespace, because no line leads to them.
+/// Nodes and topics that are listed as words in a namespace, because no line leads to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AlsoHere {
     /// The innermost namespace with a box around them: a place in [`View::namespaces`].
@@ -220,7 +220,7 @@ impl Attendance {
     }
 }
 
-/// The kind of connection that an arrow of the picture stands for.
+/// The kind of connection that an arrow of the picture represents.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ArrowKind {
     /// From a node to a topic that it publishes.
@@ -252,14 +252,14 @@ pub struct Arrow {
     pub from: u32,
     /// The item it ends at: a place in [`View::items`].
     pub to: u32,
-    /// The kind of connection it stands for.
+    /// The kind of connection it represents.
     pub kind: ArrowKind,
-    /// The edges it stands for, sorted.
+    /// The edges it represents, sorted.
     pub members: Vec<Element>,
     /// The names of the topics of a bundle, sorted, with those of an action or a family of images as one; empty for all
     /// else.
     pub topics: Vec<Arc<str>>,
-    /// Whether it stands for calls of services only.
+    /// Whether it represents only calls of services.
     pub is_service: bool,
     /// The mean payload of its messages in kilobytes, 0 where unknown, if its thickness shows bytes per second.
     pub kilobytes: Option<f64>,
@@ -352,9 +352,9 @@ pub struct View {
     pub arrows: Vec<Arrow>,
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
-    /// The topics that stand as rows in boxes.
+    /// The topics that are rows in boxes.
     pub rows: Vec<CardRow>,
-    /// The nodes and topics that stand as words, by namespace.
+    /// The nodes and topics that are listed as words, by namespace.
     pub also: Vec<AlsoHere>,
     /// The windows.
     pub frames: Vec<Frame>,
@@ -441,7 +441,7 @@ impl View {
         best.0
     }
 
-    /// Whether something of it stands for several that could be drawn one by one: a namespace, a fleet, a bundle.
+    /// Whether a part of it represents several things that could be drawn one by one: a namespace, a fleet, a bundle.
     pub(crate) fn is_folded(&self) -> bool {
         let is_one = |i: &Item| i.kind == ItemKind::Namespace || i.is_replica;
         let is_bundle = |a: &Arrow| a.kind == ArrowKind::Bundle;

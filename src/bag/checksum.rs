@@ -1,4 +1,4 @@
-//! CRC-32 checksums: of bytes as they are read, and of what follows bytes whose checksum is known.
+//! CRC-32 checksums: of bytes as they are read, and of bytes after a part with a known checksum.
 
 use std::io::{self, Read};
 

@@ -81,7 +81,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Reads the tail.
     fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
 
-    /// Whether the end of the data may state a checksum of all of it; `None` for a pipe, whose end is unknown yet.
+    /// Whether the end of the data may state a checksum of all of it; `None` for a pipe, because its end is not known yet.
     fn is_summed(_source: Option<&FileSource>) -> bool {
         false
     }

@@ -132,7 +132,7 @@ pub(crate) enum BagPlace {
 /// The number of first bytes needed to recognize a format.
 pub(crate) const HEAD: usize = 512;
 
-/// Opens an input and reads nothing but its kind.
+/// Opens an input and only determines its kind.
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,

@@ -114,7 +114,7 @@ pub trait Sink {
     }
 
     /// Takes log times of messages of one connection, in file order. `sizes`, if the reader knows them (always if
-    /// wanted), holds each payload's size in bytes and is as long as `stamps`.
+    /// wanted), contains each payload's size in bytes and is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
     /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is

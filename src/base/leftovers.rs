@@ -34,7 +34,7 @@ impl Drop for Leftover {
 /// Removes all registered paths just before the process ends.
 pub(crate) fn remove() {
     for path in all().iter() {
-        // Nothing can be done about a path that cannot be removed.
+        // A path that cannot be removed is left.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
 }

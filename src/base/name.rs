@@ -11,7 +11,7 @@ pub(crate) const HEARTBEAT: &str = "/_bagreel/connected";
 /// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
 pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
 
-/// The type of a service whose type is unknown.
+/// The type of a service of unknown type.
 pub(crate) const SERVICE: &str = "service";
 
 /// Whether this is the type of a service.
@@ -88,7 +88,7 @@ pub fn last_part(name: &str) -> &str {
     }
 }
 
-/// Whether a node stands for publishers that nothing names: `/scan ?`, `/scan ? ×2`. No name of ROS holds a blank.
+/// Whether a node represents unnamed publishers: `/scan ?`, `/scan ? ×2`. Names in ROS contain no spaces.
 pub(crate) fn is_unnamed(node: &str) -> bool {
     node.contains(" ?")
 }

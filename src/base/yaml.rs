@@ -1,4 +1,4 @@
-//! YAML text as plain data, protected against documents whose aliases expand to far more than their size.
+//! YAML text as plain data, protected against documents with aliases that expand to far more than their size.
 
 #[cfg(feature = "cli")]
 mod placed;

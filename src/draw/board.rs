@@ -298,7 +298,7 @@ impl<'a> Board<'a> {
         }
     }
 
-    /// Draws the known nodes as pills in a row as far as there is room; those for which `is_there` holds stand out.
+    /// Draws the known nodes as pills in a row as far as there is room; those for which `is_there` is true are emphasized.
     fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {

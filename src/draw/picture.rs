@@ -180,7 +180,7 @@ pub struct Picture<'a> {
     tracks: Vec<ArrowPath>,
     /// The lines of namespaces that are drawn as one.
     gates: Vec<(Gate, ArrowPath)>,
-    /// How far the title of each namespace stands from the left of its frame, to be clear of lines.
+    /// The distance of each namespace's title from the left of its frame, to be clear of lines.
     shifts: Vec<f64>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
@@ -408,15 +408,15 @@ fn places(
 }
 
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
-    let tells = measured::tells(measured.view);
+    let shown_rates = measured::shown_rates(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
     let labels = measured.graph.labels.iter().zip(&measured.graph.cards);
     items
-        .zip(labels.zip(tells))
-        .map(|((item, place), ((label, card), tells))| ItemBox {
+        .zip(labels.zip(shown_rates))
+        .map(|((item, place), ((label, card), shown_rates))| ItemBox {
             id: item_id(item),
             label: label.clone(),
-            tells,
+            shown_rates,
             card: Some(card).filter(|card| card.head > 0.0).cloned(),
             place: fit.rect(*place),
             badge: Point::default(),

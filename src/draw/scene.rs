@@ -104,7 +104,7 @@ pub struct Stroke {
     pub dash: Vec<f64>,
 }
 
-/// The part of a text that stands at its point.
+/// The part of a text that is placed at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     /// Its beginning.
@@ -120,7 +120,7 @@ pub enum Anchor {
 pub struct Text {
     /// A point on its baseline.
     pub at: Point,
-    /// The part of the text that stands at that point.
+    /// The part of the text that is placed at that point.
     pub anchor: Anchor,
     /// The font size in pixels.
     pub size: f64,
@@ -157,7 +157,7 @@ impl Step {
 }
 
 impl Anchor {
-    /// The part of a text of this width that stands before its point.
+    /// The part of a text of this width that lies before its point.
     pub fn before(self, width: f64) -> f64 {
         match self {
             Self::Start => 0.0,

@@ -1,4 +1,4 @@
-//! Styles: every colour, stroke and font size, read from `styles/*.toml`; no colour literal stands anywhere else.
+//! Styles: every colour, stroke and font size, read from `styles/*.toml`; there are no colour literals anywhere else.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -1,6 +1,6 @@
 //! Declarations in the robot's source code: names come from the bag, edges from the code. Nothing is executed.
 //!
-//! A node's topics are almost always literal in its code, but the code does not tell which nodes ran. So a node named
+//! A node's topics are almost always literal in its code, but the code does not show which nodes ran. So a node named
 //! in the bag gets the publishers and subscribers that its code declares, if topic and type are recorded under exactly
 //! these names. Evaluated on 182 public repositories and 242 bags; `matching` states the precision.
 

@@ -32,7 +32,7 @@ pub struct CollectOptions {
     /// Whether to infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
     pub infer_stamps: bool,
     /// The number of payload bytes to compare with each other and with log texts, from the beginnings of payloads; 0:
-    /// none, and none is read for it. [`u64::MAX`]: all, even of bags of which nothing else is read.
+    /// none, and none is read for it. [`u64::MAX`]: all, even in bags that are not read otherwise.
     pub payload_bytes: u64,
     /// The topic of strings whose texts are kept ([`Recorded::texts`]).
     pub texts_of: Option<String>,
@@ -84,7 +84,7 @@ impl Default for CollectOptions {
 /// The default number of payload bytes that are compared, of all topics together: at most the first 16 KiB of each
 /// message, and 64 for each message besides. A tenth of a second of work, at most a fifth of all, and enough for an hour
 /// of a small robot without cameras. Bags that are larger on disk are not compared unless that is asked for: most of
-/// them are known by their index, of which nothing would be left if every payload were read.
+/// them are known by their index, an advantage that would be lost if every payload were read.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
 /// The most texts that are kept of a topic.
 const MOST_TEXTS: usize = 10_000;
@@ -120,7 +120,7 @@ pub struct Collector {
     bags: Vec<Vec<usize>>,
     /// The namespace of the names in the last bag.
     space: String,
-    /// The bags of which payloads are read for more than comparisons.
+    /// The bags with payloads that are read for more than comparisons.
     read: BTreeSet<usize>,
 }
 
@@ -223,7 +223,7 @@ impl Collector {
         }
         let stream = &self.streams[place];
         if self.stamped[place] {
-            let mut heard = SourceContext {
+            let mut context = SourceContext {
                 facts: &mut self.facts,
                 space: &self.space,
                 stream,
@@ -231,13 +231,13 @@ impl Collector {
                 source: 0,
                 time: Some(message.time),
             };
-            equal_stamps::hear(&mut heard, message.data);
+            equal_stamps::collect(&mut context, message.data);
         }
         self.compare(place, message);
         self.keep_text(place, message);
         let stream = &self.streams[place];
         for (source, read) in &self.readers[place] {
-            let mut heard = SourceContext {
+            let mut context = SourceContext {
                 facts: &mut self.facts,
                 space: &self.space,
                 stream,
@@ -246,7 +246,7 @@ impl Collector {
                 time: Some(message.time),
             };
             let done = PayloadCursor::new(&stream.connection.encoding, message.data)
-                .and_then(|mut payload| read(&mut heard, &mut payload));
+                .and_then(|mut payload| read(&mut context, &mut payload));
             if done.is_err() {
                 self.notices
                     .add(undecodable(stream, "some messages do not have its layout"));
@@ -276,7 +276,7 @@ impl Collector {
         if self.compared > self.options.payload_bytes {
             return;
         }
-        let mut heard = SourceContext {
+        let mut context = SourceContext {
             facts: &mut self.facts,
             space: &self.space,
             stream: &self.streams[place],
@@ -290,20 +290,20 @@ impl Collector {
         } else {
             0
         };
-        let content = beginning.get(own..).unwrap_or_default();
-        payload::hear(&mut heard, content, message.size);
+        let compared = beginning.get(own..).unwrap_or_default();
+        payload::collect(&mut context, compared, message.size);
         if self.aged[place] {
-            equal_stamps::age(&mut heard, beginning);
+            equal_stamps::age(&mut context, beginning);
         }
         if let Some(schema) = &self.schemas[place]
             && beginning.len() == message.size as usize
         {
-            echo::hear(&mut heard, schema, beginning);
+            echo::keep(&mut context, schema, beginning);
         }
     }
 
-    /// Forgets the payloads of bags of which nothing else was read. Where such a bag has an index, none was compared;
-    /// what a bag tells must not depend on the way in which it is read.
+    /// Forgets the payloads of bags that were not read otherwise. Where such a bag has an index, none was compared;
+    /// the evidence of a bag must not depend on the way in which it is read.
     fn forget_payloads(&mut self) {
         if !self.options.compares_all() {
             let (streams, read) = (&self.streams, &self.read);
@@ -356,7 +356,7 @@ impl Collector {
 }
 
 /// Whether the last message keeps its meaning after its time (latched). The logs of rospy and ROS 2 are latched too,
-/// and yet their last record says nothing about the life of the node.
+/// but their last record is no evidence of when the node ended.
 fn is_held(connection: &Connection) -> bool {
     let qos = connection.qos.as_deref().unwrap_or_default();
     let kept = connection.latching || source::qos::is_transient_local(qos);

@@ -46,11 +46,11 @@ pub struct Findings {
     pub(crate) streams: Vec<Stream>,
     /// Every proof of an element.
     pub(crate) inferences: Vec<Inference>,
-    /// Statements besides who is in the graph.
+    /// Statements other than about which elements exist.
     pub(crate) incidents: Vec<Incident>,
     /// Publications, as node and topic, whose messages are byte-for-byte copies of another topic's.
     pub(crate) copies: BTreeSet<(Name, Name)>,
-    /// What statistics say of the messages of topics and edges.
+    /// Statistics of the messages of topics and edges.
     pub(crate) measured: Vec<Measurement>,
     /// Stated values of elements: types, states, quality of service.
     pub(crate) values: StatedValues,
@@ -96,7 +96,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         gone,
         ..
     } = known;
-    // Neither their headers nor what follows from these shows that they are there.
+    // Neither their headers nor conclusions from these show that they exist.
     inferences.retain(|inference| {
         let [node, _] = inference.what.ends();
         let is_sign = !matches!(inference.when, Validity::Messages(_) | Validity::Like(_));
@@ -198,7 +198,7 @@ fn concluded<'a>(
     (known, notices, undrawn)
 }
 
-/// The conclusions from source code; returns what it offers and was not drawn.
+/// The conclusions from source code; returns the declarations that were not used.
 #[cfg(feature = "source")]
 fn declared(
     known: &mut Conclusions<'_>,
@@ -304,7 +304,7 @@ fn explained(
             Some((first(*at), format!("{what}: {many}")))
         }
         Validity::First(at) => {
-            let why = "the first message is from it; the header says nothing of the others";
+            let why = "the first message is from it; the header does not identify the others";
             Some((first(*at), format!("{what}: {why}")))
         }
         Validity::Like(other) => {
@@ -389,7 +389,7 @@ fn stated(
         when,
     };
     known.add(inference(when));
-    // Nobody knows when it was launched: while others in its namespace live.
+    // The time of its launch is unknown: assume that it exists while others in its namespace do.
     if entry.declared
         && let Some(neighbour) = neighbour(known, what, messages)
     {

@@ -106,7 +106,7 @@ impl ElementKey {
     }
 }
 
-/// The times during which a proof holds.
+/// The times during which an inference is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Validity {
     /// While there are messages of this stream.
@@ -170,7 +170,7 @@ pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Observations,
     pub(crate) inferences: Vec<Inference>,
-    /// Statements besides who is in the graph, by time for each element.
+    /// Statements other than about which elements exist, by time for each element.
     pub(crate) incidents: Vec<Incident>,
     /// Proofs that were explained by their source, while `why` asks for them.
     pub(crate) worded: BTreeSet<(ElementKey, SourceId)>,
@@ -396,7 +396,7 @@ impl<'a> Conclusions<'a> {
         topics.into_iter().map(|(_, topic)| topic).collect()
     }
 
-    /// Adds `what` by a convention: it lives as long as `basis`, unless a complete list leaves it out. Headers do not
+    /// Adds `what` by a convention: it exists as long as `basis`, unless a complete list leaves it out. Headers do not
     /// contradict it: a topic published by convention is often silent.
     pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
@@ -425,7 +425,7 @@ impl<'a> Conclusions<'a> {
         );
     }
 
-    /// The node of a name without its namespace: the only known one that ends so, else one of this name.
+    /// The node of a name without its namespace: the only known one with this ending, otherwise one of this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
         let loggers = self

@@ -14,7 +14,7 @@ pub(crate) const HEAD: usize = 12;
 /// The most places per stream at which numbers are kept: no node restarts more often.
 const MOST: usize = 4096;
 
-/// The number in a header, with the stamp beside it as the message holds it: only copies have both in common.
+/// The number in a header, with the stamp beside it as in the message: only copies have both in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Number {
     pub(crate) number: u32,

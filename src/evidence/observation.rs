@@ -96,10 +96,10 @@ observations! {
     SaysSubscribe(logger, topic),
     /// This logger logs from this source file (its own name, no folder).
     LogsFrom(logger, file),
-    /// A log text of this logger says that a subscriber of this topic of its node gets nothing, by this policy of the
+    /// A log text of this logger reports that a subscriber of this topic of its node gets nothing, by this policy of the
     /// quality of service.
     Starves(logger, topic, policy),
-    /// This node, or logger, gets nothing from a publisher of this topic, by this policy.
+    /// This node, or logger, receives nothing from a publisher of this topic because of this policy.
     Starved(node, topic, policy),
     /// Two nodes have this name.
     Duplicate(node),
@@ -145,7 +145,7 @@ pub(crate) struct ObservationRecord {
 /// A piece of evidence, kept for `why`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EvidenceLine {
-    /// The time; `None` for evidence that holds for the whole mission.
+    /// The time; `None` for evidence that applies to the whole mission.
     pub time: Option<Stamp>,
     /// The word of the source.
     pub source: &'static str,
@@ -155,7 +155,7 @@ pub struct EvidenceLine {
     pub text: String,
 }
 
-/// What statistics say of the messages of a topic in an interval: over one connection, or at one end of it.
+/// Statistics of the messages of a topic in an interval: over one connection, or at one end of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measurement {
     /// The topic; `None`: the only one that the subscriber subscribes to.
@@ -184,14 +184,14 @@ pub(crate) struct Observations {
     pub(crate) headers: BTreeMap<usize, SeriesId>,
     /// The ages of messages by their header stamps, by the streams' places; kept as if they were sizes ([`age_of`]).
     pub(crate) ages: BTreeMap<usize, SeriesId>,
-    /// What statistics say, in the order in which it was read.
+    /// Statistics, in the order in which they were read.
     pub(crate) measured: Vec<Measurement>,
     /// The hashes of payloads, by the streams' places; kept as if they were sizes.
     pub(crate) payloads: BTreeMap<usize, SeriesId>,
     /// The number of publishers that each stream was offered by, by the streams' places.
     pub(crate) offers: BTreeMap<usize, u32>,
     /// Texts that nodes log, and texts in messages.
-    pub(crate) spoken: LoggedTexts,
+    pub(crate) logged: LoggedTexts,
     /// The namespaces of recordings; empty for one without.
     pub(crate) spaces: BTreeSet<String>,
     /// Nodes of which some log record comes from a file of Python, until their lists are settled.
@@ -204,7 +204,7 @@ pub(crate) struct Observations {
     pub(crate) list: Vec<ObservationRecord>,
     /// All times, which are added until this is shared.
     pub(crate) times: Arc<Stamps>,
-    /// The name that stands for all texts that found no room.
+    /// The name that replaces all texts beyond the limit.
     overflow: Option<Name>,
     /// The number of observations that found no room.
     pub(crate) dropped: u64,
@@ -242,7 +242,7 @@ impl Observations {
         name
     }
 
-    /// The name that stands for all texts that find no room; no observation about it is kept.
+    /// The name that replaces all texts beyond the limit; no observation about it is kept.
     fn overflow(&mut self) -> Name {
         let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         let texts = &mut self.texts;
@@ -405,7 +405,7 @@ impl Observations {
     }
 }
 
-/// The number that stands for an age of 0, in microseconds: clocks may differ either way.
+/// The number that means an age of 0, in microseconds: clocks may differ either way.
 const AGE_0: i64 = 1 << 31;
 
 /// The age of a number that [`Observations::age`] kept, in nanoseconds.

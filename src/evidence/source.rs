@@ -56,7 +56,7 @@ pub struct Source {
     pub(crate) reads: &'static [(MessageLayout, Read)],
     /// Whether nodes make these observations about themselves, so that the node was there at that time.
     pub(crate) own: bool,
-    /// Whether each of its snapshots holds until the next one: they are made whenever something changes.
+    /// Whether each of its snapshots is valid until the next one: they are made whenever something changes.
     pub(crate) holds: bool,
     /// Reads the announcement of a connection.
     pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
@@ -125,11 +125,11 @@ impl SourceContext<'_> {
             confidence,
             snapshot: None,
         };
-        self.say(said, words);
+        self.observe(said, words);
     }
 
     /// Adds an observation that may belong to a snapshot.
-    pub(crate) fn say(&mut self, said: Statement, words: impl FnOnce() -> String) {
+    pub(crate) fn observe(&mut self, said: Statement, words: impl FnOnce() -> String) {
         let word = SOURCES.get(self.source).map_or("", |s| s.word);
         self.facts.explain(said, word, self.time, words);
         self.facts.add(self.source, said, self.time);

@@ -35,12 +35,12 @@ pub(crate) struct LoggedTexts {
 
 /// The most bytes that are kept of log texts, and of values.
 const MOST: usize = 2 << 20;
-/// The number of bytes that a short text takes besides its own.
+/// The overhead of a short text in bytes.
 const ENTRY: usize = 48;
 
 impl LoggedTexts {
     /// Adds a log text.
-    pub(crate) fn say(&mut self, time: Stamp, logger: &str, text: &str) {
+    pub(crate) fn add(&mut self, time: Stamp, logger: &str, text: &str) {
         self.bytes[0] += text.len() + ENTRY;
         if self.bytes[0] <= MOST {
             self.said.push(LoggedText {
@@ -97,7 +97,7 @@ mod tests {
     fn either_side_is_bounded() {
         let mut texts = LoggedTexts::default();
         let long = "x".repeat(1 << 20);
-        (0..9).for_each(|n| texts.say(Stamp(n), "/a", &long));
+        (0..9).for_each(|n| texts.add(Stamp(n), "/a", &long));
         texts.show(Stamp(0), (0, 0), "kept");
         let (said, shown) = texts.sorted();
         assert_eq!((said.len(), shown.len()), (1, 1));

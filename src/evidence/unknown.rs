@@ -1,8 +1,8 @@
-//! Publishers that the bag counts but nothing names. ROS 2 stores with each topic the number of its publishers, so that
-//! a separate box stands for the remaining ones, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known
+//! Publishers that the bag counts but does not name. ROS 2 stores with each topic the number of its publishers, so that
+//! a separate box represents the remaining ones, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known
 //! program alone publishes messages of the topic's type, the box bears its name: `/turtlesim ?`.
 //!
-//! Runs after all other sources, for such a box only stands in for unknown nodes.
+//! Runs after all other sources, since such a box only replaces unknown nodes.
 
 use crate::base::name::is_quiet;
 use crate::base::words::count;
@@ -100,7 +100,7 @@ fn add(
     let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
         return;
     };
-    // It appears and vanishes with its topic, about whose life it says nothing.
+    // It appears and vanishes with its topic, and is no evidence of the topic.
     let topics = || Validity::Like(ElementKey::Topic(topic));
     let life = if word == "unknown" {
         topics()

@@ -60,7 +60,7 @@ fn column<'a>(from: &'a RecordBatch, name: &str, kind: ColumnKind) -> Result<&'a
     })
 }
 
-/// Whether a column holds texts, in any of Arrow's three layouts.
+/// Whether a column contains texts, in any of Arrow's three layouts.
 fn is_text(column: &ArrayRef) -> bool {
     column.as_string_opt::<i32>().is_some()
         || column.as_string_opt::<i64>().is_some()

@@ -1,6 +1,6 @@
 //! The mission as one self-contained page: the graph drawn once, its history as runs, and a player.
 //!
-//! `player/` holds the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
+//! `player/` contains the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
 //! joined in order. [`data`] defines the data for the script.
 
 mod data;

@@ -114,7 +114,7 @@ fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>
     (documents.collect(), untyped)
 }
 
-/// Whether a topic is housekeeping of the framework, or a part of an action that its feedback stands for.
+/// Whether a topic is housekeeping of the framework, or a part of an action that its feedback represents.
 fn is_part(topic: &Topic) -> bool {
     let name = topic.name.as_str();
     FRAMEWORK.contains(&name) || name.contains("/_action/") && !name.ends_with("/_action/feedback")

@@ -83,12 +83,12 @@ impl<W: Write + Send> Rows<W> {
         Ok(())
     }
 
-    /// The number of bytes of rows that it holds in memory.
+    /// The number of bytes of rows in memory.
     pub(crate) fn held(&self) -> usize {
         self.waiting.iter().map(Batch::bytes).sum()
     }
 
-    /// Writes the rows that it holds in memory as one group.
+    /// Writes the rows in memory as one group.
     pub(crate) fn unload(&mut self) -> io::Result<()> {
         let batches = std::mem::take(&mut self.waiting);
         if batches.is_empty() {

@@ -122,7 +122,7 @@ impl Sending {
         of.get(at)
     }
 
-    /// The sending of a mission of which only the windows are known: in each window with messages a stretch of its rate.
+    /// The sending of a mission with known windows only: in each window with messages a stretch of its rate.
     pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
         let mut published: BTreeMap<TopicId, Vec<(EdgeId, NodeId)>> = BTreeMap::new();
         for (id, edge) in (0..).zip(&elements.publishes) {
@@ -249,7 +249,7 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
     found
 }
 
-/// The times at which all of several senders are silent, of which at least one has a rhythm that broke.
+/// The times at which all of several senders are silent, if at least one has a rhythm that broke.
 pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for sender in senders {

@@ -11,7 +11,7 @@ const PADDING: f64 = 8.0;
 /// The layout with all boxes packed, clusters around their members; it uses its siblings that pack and route.
 pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let (n, k) = (plan.vertices.len(), plan.clusters.len());
-    // Places `n..` stand for clusters; the last group holds what is in none.
+    // Places `n..` are clusters; the last group contains what is in none.
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); k + 1];
     for (v, vertex) in plan.vertices.iter().enumerate() {
         members[vertex.cluster.unwrap_or(k)].push(v);

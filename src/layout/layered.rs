@@ -127,7 +127,7 @@ struct Ordering {
 fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Ordering> {
     let mut ways = rankings(part, options);
     if plan.is_labelled {
-        // Labels stand in layers between those of the boxes.
+        // Labels are placed in layers between those of the boxes.
         ways.iter_mut().flatten().for_each(|rank| *rank *= 2);
     }
     ways.retain(|rank| items(part, rank) <= MOST);
@@ -365,7 +365,7 @@ fn block(
     placed.on_page(orientation)
 }
 
-/// The boxes and the routes of a part whose layers stand at these places, x along and y across.
+/// The boxes and the routes of a part with layers at these places, x along and y across.
 pub(crate) fn routed(
     plan: &Plan,
     part: &Component,

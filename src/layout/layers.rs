@@ -10,7 +10,7 @@ use crate::layout::{Component, LayerItem, Layers, Plan, first_bend};
 pub(crate) enum Lane {
     /// No other.
     Outside,
-    /// The one that it comes to, or else the one that it came from, if that spans the layer.
+    /// The one at its end, or else the one at its start, if that spans the layer.
     Inside,
 }
 

@@ -45,18 +45,18 @@ impl Engine for LayoutRs {
             ));
         }
         let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
-        // It states what it expects with `assert!`.
+        // It checks its preconditions with `assert!`.
         let attempt = unheard(|| lay_out(plan, options, orientation));
         attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs gave up on this graph", hint)))
     }
 }
 
 thread_local! {
-    /// Whether a panic of this thread is caught, so that nothing of it is printed.
+    /// Whether a panic of this thread is caught and must not be printed.
     static IS_EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The result of `work`, or its panic, of which nothing is printed.
+/// The result of `work`, or its panic, which is not printed.
 fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {

@@ -129,7 +129,7 @@ impl PinnedBoxes<'_> {
         after <= before
     }
 
-    /// The number of boxes and frames that stand in clusters that are not theirs.
+    /// The number of boxes and frames that are inside foreign clusters.
     fn foreign(&self) -> usize {
         let frames = self.frames();
         let mut count = 0;

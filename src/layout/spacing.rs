@@ -28,7 +28,7 @@ const ASIDE: f64 = 4.0;
 /// The room that edges need to bend where they bend twice, as a part of the room for once.
 const TWICE: f64 = 0.45;
 
-/// The bend beside which the label of an edge stands: about the middle one, in a layer without boxes; of an edge of a
+/// The bend beside which the label of an edge is placed: about the middle one, in a layer without boxes; of an edge of a
 /// fork the first one, which all of them pass.
 fn label_bend(
     plan: &Plan,
@@ -55,15 +55,15 @@ pub(crate) struct Spacing<'a> {
     pub(crate) size: Vec<Size>,
     /// The number of self loops of each vertex.
     loops: Vec<usize>,
-    /// The longest label along that stands between a layer and the next.
+    /// The longest label, along the edges, between a layer and the next.
     label: Vec<f64>,
-    /// The size of the label that stands beside each bend, if there is one.
+    /// The size of the label beside each bend, if there is one.
     worded: BTreeMap<usize, Size>,
-    /// The size of each cluster's title; the first stands for the outside.
+    /// The size of each cluster's title; the first is that of the outside.
     title: Vec<Size>,
     /// The room for the words at the end of each cluster: along, across.
     footer: Vec<(f64, f64)>,
-    /// The room below a title that stands across the edges.
+    /// The room below a title across the edges.
     below_title: f64,
 }
 
@@ -159,7 +159,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// Whether labels stand on the later side of their edges: to the right of upright ones, and above level ones.
+    /// Whether labels are on the later side of their edges: to the right of upright ones, and above level ones.
     fn is_label_onwards(&self) -> bool {
         self.orientation == Orientation::TopBottom
     }

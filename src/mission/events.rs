@@ -100,7 +100,7 @@ pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -
     rows.iter().map(text).collect()
 }
 
-/// The rows with a row before each switch to another mode, which is no event of its own.
+/// The rows with an additional row before each mode switch, which is not an event of its own.
 fn with_switches<'a>(mission: &Mission, rows: Vec<LogRow<'a>>) -> Vec<LogRow<'a>> {
     let mut switches = mission.log.switches().into_iter().peekable();
     let mut all = Vec::with_capacity(rows.len());

@@ -1,7 +1,7 @@
 //! How much a mission reconfigures: changes per minute, lifetimes of nodes, and the distance between the graphs of
 //! consecutive windows.
 //!
-//! Only the robot counts: no recorder, no housekeeping, nothing that is only guessed.
+//! Only the robot counts: recorders, housekeeping and whatever is only inferred or declared are left out.
 
 use std::collections::BTreeSet;
 
@@ -66,11 +66,15 @@ impl Reconfiguration {
                 .publishes
                 .iter()
                 .map(|state| Element::Publish(state.id));
-            let heard = graph
+            let subscribed = graph
                 .subscribes
                 .iter()
                 .map(|state| Element::Subscribe(state.id));
-            let own: BTreeSet<Element> = nodes.chain(sent).chain(heard).filter(is_robot).collect();
+            let own: BTreeSet<Element> = nodes
+                .chain(sent)
+                .chain(subscribed)
+                .filter(is_robot)
+                .collect();
             let is_node = |what: &&Element| matches!(what, Element::Node(_));
             let nodes = own.iter().filter(is_node).count();
             let split = |some: Vec<&Element>| {

@@ -180,7 +180,7 @@ impl Bundle<'_> {
             .map_err(Error::io("write", &self.path.join(name)))
     }
 
-    /// A name for the figures of a recording: that of its file, with a number where another has it.
+    /// A name for the figures of a recording: that of its file, with a number if it is taken.
     fn stem(&self, run: &str) -> String {
         let name = Path::new(run).file_stem().unwrap_or_default();
         let name = file_stem(&name.to_string_lossy()).replace('%', "_");

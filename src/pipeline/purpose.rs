@@ -1,4 +1,4 @@
-//! The medium of a picture, and a page whose text is legible there.
+//! The medium of a picture, and a page with legible text for it.
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;

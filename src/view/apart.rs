@@ -11,7 +11,7 @@ use crate::graph::{Element, Elements, TopicId};
 use crate::mission::Mission;
 
 impl Viewed {
-    /// Finds the topics that stand in words: those without a known end, and in bundles those that something is reported of
+    /// Finds the topics to list as words: those without a known end, and in bundles those about which something is reported
     /// although no line carries them; but of these, such as have one known end get a box beside it.
     pub(super) fn set_apart(
         &mut self,
@@ -58,7 +58,7 @@ impl Viewed {
         }
     }
 
-    /// Finds the nodes that stand in words: those without a connection of which nothing is reported, where most have one.
+    /// Finds the nodes to list as words: those without a connection and without an event, if most nodes have a connection.
     fn set_nodes_apart(&mut self, mission: &Mission) {
         let mut is_busy = vec![false; mission.elements.nodes.len()];
         for (_, edge) in mission.elements.edges() {

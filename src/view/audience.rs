@@ -1,4 +1,4 @@
-//! Who misses something while a node is away: the subscribers of what only that node publishes.
+//! The nodes that miss something while a node is away: the subscribers of topics that only that node publishes.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! The choices of bundles: the topics that draw no line, the names of the others, and the nodes that stand in words.
+//! The choices of bundles: the topics that draw no line, the names of the others, and the nodes that are listed as words.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -54,7 +54,7 @@ pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     drawn
 }
 
-/// Whether each node has no line to another, or, if leaves stand in words, only one, where neither end of it changes;
+/// Whether each node has no line to another, or, if leaves are listed as words, only one, where neither end of it changes;
 /// none where fewer than half of the nodes have a line.
 pub(crate) fn nodes_in_words(
     mission: &Mission,
@@ -165,7 +165,7 @@ pub(super) fn also_here(
             let rest = item.name.strip_prefix(&*space.name);
             rest.is_some_and(|rest| rest.starts_with('/'))
         };
-        // Children stand behind their parents.
+        // Children come after their parents.
         let cluster = namespaces.iter().rposition(is_around);
         let also = also.entry(cluster).or_default();
         also.cluster = cluster;

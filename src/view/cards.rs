@@ -1,4 +1,4 @@
-//! Cards: a topic that only one box is connected to is a row of that box, so that no leaves stand around it; the
+//! Cards: a topic that only one box is connected to is a row of that box, so that there are no leaves around it; the
 //! plumbing is a row in every box that is connected to it, so that no lines lead there from everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ use super::showing::{Showing, ShowingWriter};
 use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
 
-/// A topic that is a row in a box: of which no other end is known, or one of the plumbing.
+/// A topic that is a row in a box: one without another known end, or one of the plumbing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardRow {
     /// The box that it is a row of: a place in [`View::items`](super::View::items).
@@ -171,7 +171,7 @@ impl Drawn {
         }
     }
 
-    /// Hides a box that stands for publishers without a name in the windows in which none of its topics is there, those of
+    /// Hides a box of unnamed publishers in the windows in which none of its topics is there, those of
     /// the plumbing aside: it would be an empty box. Returns those that are never there.
     fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<u32> {
         let mut never = BTreeSet::new();
@@ -240,7 +240,7 @@ impl Drawn {
         }
     }
 
-    /// Takes the topics of these rows and the boxes that are never there out of the boxes, and numbers everything anew.
+    /// Takes the topics of these rows and the boxes that are never there out of the boxes, and renumbers everything.
     fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
         let gone: BTreeSet<_> = rows
             .iter()

@@ -1,18 +1,18 @@
-//! The namespaces that stand as boxes around their members.
+//! The namespaces that are drawn as boxes around their members.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Item, ItemKind, Namespace};
 
-/// The largest depth of nested boxes; a name of nothing but slashes must not make thousands of boxes in each other.
+/// The largest depth of nested boxes; a name consisting of slashes must not create thousands of nested boxes.
 const DEEPEST: usize = 16;
 
 /// The namespaces of these items, sorted by name, parents before children, and each item's innermost one set.
 ///
-/// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
+/// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item is in the box of its first N parts, or of
 /// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
-/// namespace around a single thing is left out, unless it is one of `kept`; a thing called like one of those stands in
+/// namespace around a single thing is left out, unless it is one of `kept`; a thing with the name of one of those is in
 /// it.
 pub(crate) fn clusters(
     items: &mut [Item],
@@ -88,7 +88,7 @@ fn parent(space: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// Drops namespaces around a single thing, which then stands in the one around them.
+/// Drops namespaces around a single thing, which then belongs to the one around them.
 fn fold(spaces: &mut BTreeSet<&str>, homes: &[String], always: &BTreeSet<&str>) {
     let mut things: BTreeMap<&str, usize> = BTreeMap::new();
     for home in homes {

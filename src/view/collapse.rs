@@ -23,7 +23,7 @@ impl<'a> Collapse<'a> {
         }
     }
 
-    /// The collapsed namespace that swallows an element of this name: the outermost one that holds no namespace to
+    /// The collapsed namespace that swallows an element of this name: the outermost one that contains no namespace to
     /// keep open on the way to the name. A node that is called like the namespace itself goes inside too.
     pub(crate) fn of(&self, name: &str) -> Option<&'a str> {
         let mut found = None;
@@ -39,7 +39,7 @@ impl<'a> Collapse<'a> {
     }
 
     /// Opens the namespaces that would fold fewer than two of these names, and those in which a single node would be
-    /// left beside what is kept open: a box that stands for one thing has the name of that.
+    /// left beside what is kept open: a box of a single thing gets the name of that thing.
     pub(crate) fn open_single(&mut self, nodes: &BTreeSet<&str>, topics: &BTreeSet<&str>) {
         let mut folded: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
         for (at, names) in [nodes, topics].into_iter().enumerate() {
@@ -93,7 +93,7 @@ pub(crate) fn swallows<'a>(
 pub struct Collapsible {
     /// The namespace: `/robot1/nav`.
     pub name: Arc<str>,
-    /// The number of boxes it holds now.
+    /// The number of boxes it contains now.
     pub items: usize,
     /// The number of headlines about elements in it.
     pub headlines: usize,

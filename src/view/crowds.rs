@@ -1,4 +1,4 @@
-//! Windows in which more changes than a reader can follow: those of one kind in one namespace are one coloured frame
+//! Windows with more changes than a reader can follow: those of one kind in one namespace are one coloured frame
 //! with their number, and as few words in the headline.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,7 +10,7 @@ use crate::mission::event_log::{EventId, Kind};
 
 /// The most things that have a colour, and a word in the headline, each on its own.
 const MOST: usize = 5;
-/// The event of words that stand for several.
+/// The event of a phrase that describes several.
 const FOLDED: EventId = EventId::MAX;
 
 /// Changes of one kind in one namespace that are one coloured frame.
@@ -151,8 +151,8 @@ fn fold(
 }
 
 impl View {
-    /// The looks in window `k` with the colours of crowds on their frames alone: their members stand as if nothing
-    /// happened, and those that are gone do not stand, unless a line to them changed itself.
+    /// The looks in window `k` with the colours of crowds on their frames alone: their members are drawn as if nothing
+    /// happened, and those that are gone are not drawn, unless a line to them changed itself.
     pub(crate) fn calm(&self, k: usize) -> SeenWindow {
         let seen = self.seen(k);
         let Some(frame) = self.frames.get(k).filter(|frame| !frame.crowds.is_empty()) else {

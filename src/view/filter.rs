@@ -8,7 +8,7 @@ use crate::base::error::{Error, Result};
 ///
 /// The rules are those of `matches_any` and `_split_filter_string` in `rqt_graph/dotcode.py`: tokens are split at
 /// commas and stripped; one that begins with `-` excludes; a lone `/` or nothing includes everything. A token matches
-/// a name that it equals, and, if it holds a character outside `[A-Za-z0-9_/]`, as a pattern at the name's beginning.
+/// a name that it equals, and, if it contains a character outside `[A-Za-z0-9_/]`, as a pattern at the name's beginning.
 #[derive(Clone, Debug, Default)]
 pub struct NameFilter {
     includes: Vec<FilterToken>,
@@ -25,7 +25,7 @@ impl NameFilter {
     /// The filter of this text.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a pattern that is not a regular expression, or one that needs what only Python has.
+    /// [`Error::Usage`] for a pattern that is not a regular expression, or one that needs features that only Python has.
     pub fn parse(text: &str) -> Result<Self> {
         let tokens: Vec<&str> = text.split(',').map(str::trim).collect();
         let excludes = tokens.iter().filter_map(|t| t.strip_prefix('-'));

@@ -34,7 +34,7 @@ impl Headline {
 /// Elements with the same change in a window: `+ planner, costmap start`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Phrase {
-    /// `+` for what came, `−` for what went, a blank for all else.
+    /// `+` for a beginning, `−` for an end, a space for everything else.
     pub sign: char,
     /// The words before the names: `controller subscribes to`.
     pub lead: String,
@@ -75,7 +75,7 @@ pub struct Frame {
     pub partial: bool,
     /// The number of all messages of the bag in the window, hidden topics included.
     pub messages: u64,
-    /// For each namespace that stands for several, in the order of [`View::namespaces`](super::View::namespaces), the
+    /// For each namespace that represents several, in the order of [`View::namespaces`](super::View::namespaces), the
     /// presence of each of them.
     pub member_lists: Vec<Vec<Attendance>>,
     /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
@@ -85,7 +85,7 @@ pub struct Frame {
     pub lasting: Vec<Lasting>,
     /// The number of headlines of each kind.
     pub counts: Counts,
-    /// What changed in words, the most important first; empty exactly if nothing is marked.
+    /// The changes in words, the most important first; empty exactly if nothing is marked.
     pub caption: Vec<Phrase>,
     /// The changes that are one coloured frame, because there are too many.
     pub crowds: Vec<Crowd>,

@@ -31,7 +31,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     let mut list = Vec::with_capacity(mission.windows.len());
     let turns = turns(mission);
     for ((at, window), has_turn) in (0..).zip(&mission.windows).zip(turns) {
-        walk.next(|what, row| windows.hear(what, row));
+        walk.next(|what, row| windows.apply(what, row));
         let hides = windows.now.hides_the_silent() && windows.is_touched();
         if has_turn || hides || windows.now.is_other_length(window.span) {
             windows.turn(at, window);
@@ -179,8 +179,8 @@ impl<'a> ShownWindows<'a> {
         }
     }
 
-    fn hear(&mut self, what: Element, row: Option<crate::graph::Row>) {
-        self.now.hear(what, row);
+    fn apply(&mut self, what: Element, row: Option<crate::graph::Row>) {
+        self.now.apply(what, row);
         let (item, arrows) = self.now.shown_by(what);
         if let Some(item) = item {
             self.items.touch(item);

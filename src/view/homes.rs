@@ -1,4 +1,4 @@
-//! The boxes that topics stand in: that of their group, or the collapsed namespace that they are part of.
+//! The boxes that contain topics: that of their group, or the collapsed namespace that they are part of.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -56,7 +56,7 @@ pub(crate) struct Viewed {
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
     /// Per topic, whether bundles draw it.
     pub(super) drawn: Vec<bool>,
-    /// The number of items at the end of the list that stand in words, because no line leads to them.
+    /// The number of items at the end of the list that are listed as words, because no line leads to them.
     pub(crate) in_words: usize,
     /// Whether each node is in one of these, and whether each topic is.
     pub(super) is_in_words: [Vec<bool>; 2],

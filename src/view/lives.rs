@@ -59,7 +59,7 @@ impl<'a> ItemTurns<'a> {
         lives
     }
 
-    /// The elements that live just before a moment.
+    /// The elements that exist just before a moment.
     pub(crate) fn before(&self, at: Stamp) -> Alive {
         self.alive(at, |turns| {
             lives_at(turns, turns.partition_point(|t| t.0 < at))
@@ -137,7 +137,7 @@ impl<'a> ItemTurns<'a> {
     }
 }
 
-/// Whether an element lives after the first `done` of its turns: before the first one, if that is not a beginning.
+/// Whether an element exists after the first `done` of its turns: before the first one, if that is not a beginning.
 fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
     match done.checked_sub(1).and_then(|last| turns.get(last)) {
         Some((_, begins)) => *begins,

@@ -12,7 +12,7 @@ use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
 /// The changes of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Told {
+pub(crate) struct Changed {
     /// Whether something of it began, or ended.
     pub(crate) came: bool,
     pub(crate) went: bool,
@@ -32,8 +32,8 @@ pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
     pub(crate) lasting: Vec<Lasting>,
-    pub(crate) items: BTreeMap<u32, Told>,
-    pub(crate) arrows: BTreeMap<u32, Told>,
+    pub(crate) items: BTreeMap<u32, Changed>,
+    pub(crate) arrows: BTreeMap<u32, Changed>,
 }
 
 impl News {
@@ -218,8 +218,8 @@ impl EventSign {
         }
     }
 
-    /// Notes the event for an item or arrow; of several marks on the same one, the more telling one stays.
-    fn keep(&self, all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach) {
+    /// Notes the event for an item or arrow; of several marks on the same one, the most informative one stays.
+    fn keep(&self, all: &mut BTreeMap<u32, Changed>, id: u32, reach: Reach) {
         let reported = all.entry(id).or_default();
         reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
         reported.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);

@@ -66,7 +66,7 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
     for (flag, what, unused, names) in options {
         for text in unused {
             let meant = meant(&[text.trim_start_matches('-')], names);
-            // What a filter takes is of no use where namespaces are named.
+            // A filter's syntax is not accepted for namespaces.
             let meant = meant.split(": ").next().unwrap_or_default();
             let text = format!("`{flag} {text}` matches no {what}; {meant}");
             notices.push(Notice::new(NoticeKind::Note, text));

@@ -77,7 +77,7 @@ pub struct Hide {
 }
 
 impl Hide {
-    /// The choice that leaves nothing out.
+    /// The choice that omits nothing.
     pub const NONE: Self = Self {
         quiet: false,
         debug: false,

@@ -51,7 +51,7 @@ pub(crate) struct Fleets {
     drawn: BTreeMap<Arc<str>, usize>,
 }
 
-/// A hash for each thing that a namespace holds or is linked to, without the name of the namespace.
+/// A hash for each thing that a namespace contains or is linked to, without the name of the namespace.
 type Inside = BTreeSet<u64>;
 
 impl Fleets {
@@ -113,7 +113,7 @@ impl Fleets {
         });
     }
 
-    /// The name under which something of a fleet is drawn; `None` for all else.
+    /// The name under which a member of a fleet is drawn; `None` for everything else.
     pub(crate) fn stand_in(&self, name: &str) -> Option<Arc<str>> {
         let space = space_of(name)?;
         let fleet = self.all.get(*self.place.get(space)?)?;
@@ -271,7 +271,7 @@ fn seen<'a>(name: &'a str, space: &str) -> Seen<'a> {
     }
 }
 
-/// The namespaces that are nothing but one name.
+/// The namespaces that consist of one name.
 fn single_names(elements: &Elements) -> BTreeSet<&str> {
     let mut single: BTreeSet<&str> = BTreeSet::new();
     single.extend(names(elements).map(|(name, _)| name));

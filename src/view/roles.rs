@@ -50,7 +50,7 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
     }
 }
 
-/// Gives each box that stands for publishers without a name its question mark as a label: `?`, `? ×3`.
+/// Labels each box of unnamed publishers with its question mark as a label: `?`, `? ×3`.
 pub(crate) fn label_unknown(items: &mut [Item], elements: &Elements) {
     for item in items {
         let node = single_node(item, elements);

@@ -12,7 +12,7 @@ use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, Mark, Showing, Shown, TopicRow, View};
 
-/// A value of a table that holds from a window on, until the next run of the same list.
+/// A value of a table that applies from a window on, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
     /// The first window: a place in [`View::frames`].
@@ -32,7 +32,7 @@ pub(crate) struct ElementRuns {
     /// Its lifecycle state: places in [`Runs::labels`]. While it is not there, the last value stays.
     pub lifecycles: Vec<Run>,
     /// Windows in which its rate changed, each with the old and the new rate: places in [`Runs::labels`]. Such a value
-    /// holds for one window.
+    /// applies to one window.
     pub turns: Vec<Run>,
 }
 

@@ -11,7 +11,7 @@ use crate::graph::{Elements, Topic};
 pub(crate) enum Reason {
     NsFilter,
     TopicFilter,
-    /// A topic all of whose nodes are filtered out.
+    /// A topic with all of its nodes filtered out.
     Orphan,
     Leaf,
     Dead,
@@ -93,7 +93,7 @@ fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Ve
     all
 }
 
-/// Whether nothing is known of a topic but that a hidden recorder waits for it: no other end, no message.
+/// Whether only a hidden recorder waits for a topic: it has no other end and no message.
 fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
     let connected = topic.evidence.words().any(|word| word == "connection");
     ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
@@ -125,8 +125,8 @@ fn topic_reason(
     }
 }
 
-/// The last steps, after the grouping: topics of their own whose nodes are all filtered out, then "Debug". `grouped`
-/// tells of each topic whether it stands in a group, which these steps leave alone.
+/// The last steps, after the grouping: separate topics with all of their nodes filtered out, then "Debug". `grouped`
+/// marks topics that are in a group, which these steps leave alone.
 pub(crate) fn finish(
     selection: &mut Selection,
     elements: &Elements,

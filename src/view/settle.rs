@@ -55,7 +55,7 @@ struct LookRun<'a> {
     held: Option<(f64, Option<u64>)>,
 }
 
-/// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest confidence, and its average rate
+/// Gives an item or arrow, for as long as it exists, its liveliest state and its strongest confidence, and its average rate
 /// between two changes of it.
 ///
 /// A topic with a message per minute is equally alive in the seconds in between; only a pause
@@ -139,7 +139,7 @@ impl PresentLife {
         if !run.shown.is_paused {
             self.look = self.look.or(Some(run.look));
         }
-        // `sent` holds the rate from here to the next change of it.
+        // `sent` contains the rate from here to its next change.
         if self.is_measured {
             run.steady_hz = Some(self.sent.0);
         }
@@ -220,7 +220,7 @@ fn is_ghost(shown: &Shown) -> bool {
     shown.mark == Some(Mark::Removed)
 }
 
-/// The livelier of two states. Alive by a latched message counts most, since it says more than messages do.
+/// The livelier of two states. Alive by a latched message counts most, since it means more than messages do.
 fn livelier(a: State, b: State) -> State {
     let rank = |state| match state {
         State::Latched => 0,

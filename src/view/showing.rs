@@ -17,7 +17,7 @@ pub struct TopicRow {
     pub ways: [bool; 2],
     /// Whether it is a service.
     pub is_service: bool,
-    /// Whether the receiver gets nothing, as the qualities of service do not match.
+    /// Whether the receiver gets nothing because the qualities of service do not match.
     pub is_starved: bool,
     /// Its state.
     pub state: State,
@@ -69,7 +69,7 @@ pub struct Showing {
     runs: Vec<(u32, u32)>,
 }
 
-/// The place that stands for not being there.
+/// The place that means absence.
 const AWAY: u32 = u32::MAX;
 
 impl Showing {
@@ -85,7 +85,7 @@ impl Showing {
         &self.looks
     }
 
-    /// Its looks with the window from which each holds, in order; `None` where it is not there, as before the first of
+    /// Its looks with the window from which each applies, in order; `None` where it is not there, as before the first of
     /// these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
         let look = |place: u32| self.looks.get(place as usize);

@@ -91,15 +91,15 @@ pub struct Shown {
     /// Whether it is silent or away all through the window, with a beginning and an end in the event log, or no message
     /// came yet.
     pub is_paused: bool,
-    /// Whether the receiver gets nothing, as the qualities of service do not match.
+    /// Whether the receiver gets nothing because the qualities of service do not match.
     pub is_starved: bool,
     /// The headlines behind `mark`, sorted: places in the event log.
     pub events: Vec<EventId>,
-    /// The topics that a bundle carries, sorted by their places; empty for all else.
+    /// The topics that a bundle carries, sorted by their places; empty for everything else.
     pub topics: Vec<TopicRow>,
-    /// The number of equal namespaces it stands for in the window; 0 for all else.
+    /// The number of equal namespaces it represents in the window; 0 for everything else.
     pub each: usize,
-    /// The nodes and topics in a folded namespace in the graph of the window; none for all else.
+    /// The nodes and topics in a folded namespace in the graph of the window; none for everything else.
     pub members: Members,
     /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
@@ -131,7 +131,7 @@ impl Members {
 }
 
 impl Shown {
-    /// An element of which nothing more is known.
+    /// An element about which nothing else is known.
     pub fn plain(id: u32, state: State, confidence: Confidence) -> Self {
         Self {
             id,
@@ -141,7 +141,7 @@ impl Shown {
         }
     }
 
-    /// Makes it the look of a service, which is not silent for having no messages.
+    /// Makes it the look of a service, for which no messages do not mean silence.
     pub(super) fn is_called(&mut self) {
         (self.state, self.is_paused) = (self.state.min(State::Active), false);
     }

@@ -20,7 +20,7 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
         is_starved: true,
         ..Shown::plain(id, state, confidence)
     });
-    // Those that are there and send nothing would water down the rate of each.
+    // Those that exist without sending would dilute the rate of each.
     shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
     shown.is_paused &= one.is_paused;
     shown.is_starved &= one.is_starved;
@@ -43,7 +43,7 @@ struct One {
 
 impl One {
     /// An element that is alive without a message in the window.
-    const UNHEARD: Self = Self {
+    const WITHOUT_MESSAGES: Self = Self {
         state: State::Silent,
         confidence: Confidence::Declared,
         hz: None,
@@ -56,7 +56,7 @@ impl One {
         Self {
             state,
             confidence,
-            ..Self::UNHEARD
+            ..Self::WITHOUT_MESSAGES
         }
     }
 }
@@ -160,7 +160,7 @@ impl<'a> Now<'a> {
     }
 
     /// Sets the row of the graph for an element from now on; `None` where it has none.
-    pub(crate) fn hear(&mut self, what: Element, row: Option<Row>) {
+    pub(crate) fn apply(&mut self, what: Element, row: Option<Row>) {
         if let Some(slot) = self.rows.of_mut(what) {
             *slot = row;
         }
@@ -176,17 +176,17 @@ impl<'a> Now<'a> {
         window.nanos() != self.span.nanos()
     }
 
-    /// The state of an element, `None` if it does not exist; [`One::UNHEARD`] if it exists without messages.
+    /// The state of an element, `None` if it does not exist; [`One::WITHOUT_MESSAGES`] if it exists without messages.
     fn one(&self, what: Element) -> Option<One> {
         let (alive, paused) = &self.lives;
-        let heard = |row: &Row| One {
+        let known = |row: &Row| One {
             hz: row.hz(self.span),
             count: row.count,
             ..One::new(row.state, row.confidence)
         };
         alive.is(what).then(|| {
             let row = self.rows.of(what).and_then(Option::as_ref);
-            let mut one = row.map_or(One::UNHEARD, heard);
+            let mut one = row.map_or(One::WITHOUT_MESSAGES, known);
             if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
                 (one.hz, one.count) = (row.hz(self.span), row.count);
             }
@@ -229,7 +229,7 @@ impl<'a> Now<'a> {
         topic.filter(|_| !is_latched && first.is_some_and(|first| first >= self.span.end))
     }
 
-    /// The state of a topic before its first message: wished for only, where nothing is known to publish it.
+    /// The state of a topic before its first message: only subscribed to, if no publisher is known.
     fn state_of_waiting(&self, topic: TopicId) -> State {
         let mut senders = self.senders.get(topic as usize).into_iter().flatten();
         if senders.any(|id| self.lives.0.is(Element::Publish(*id))) {

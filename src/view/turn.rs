@@ -1,7 +1,7 @@
 //! A window in which something changes: the marks of its items and arrows.
 
 use super::items::Viewed;
-use super::marks::{News, Told};
+use super::marks::{Changed, News};
 use super::state::{LivingItems, Now};
 use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
@@ -133,12 +133,12 @@ fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
     }
 }
 
-/// The changes of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
+/// The changes of an arrow that follows from the marks of its ends and their events; `there` is whether it was there
 /// before and is there after.
 pub(super) fn with_ends(
     there: (bool, bool),
     ends: [Option<(Option<Mark>, &[EventId])>; 2],
-) -> Option<Told> {
+) -> Option<Changed> {
     let marks: &[Mark] = match there {
         (false, true) => &[Mark::Added],
         (_, false) => &[Mark::Removed],
@@ -148,18 +148,22 @@ pub(super) fn with_ends(
     let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
     let mut ends = ends.into_iter().flatten();
     let (mark, events) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
-    Some(Told {
+    Some(Changed {
         came: mark == Mark::Added,
         went: mark == Mark::Removed,
         mark: Some(mark).filter(|_| there == (true, true)),
         events: events.to_vec(),
-        ..Told::default()
+        ..Changed::default()
     })
 }
 
 /// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
 /// event.
-pub(super) fn marked(shown: Shown, there: (bool, bool), reported: Option<&Told>) -> Option<Shown> {
+pub(super) fn marked(
+    shown: Shown,
+    there: (bool, bool),
+    reported: Option<&Changed>,
+) -> Option<Shown> {
     let Some(reported) = reported else {
         return there.1.then_some(shown);
     };

@@ -45,7 +45,7 @@ fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
     })
 }
 
-/// Adds a look that holds in `windows` windows, `length` nanoseconds together; rates become sums over time.
+/// Adds a look that applies to `windows` windows, `length` nanoseconds together; rates become sums over time.
 fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
     let count = shown.count.map(|count| count.saturating_mul(windows));
     let rows = shown.topics.iter().map(|row| TopicRow {

@@ -90,7 +90,7 @@ impl<G: Grammar> GrowingChunks<G> {
             G::begin(&mut stream);
         }
         let mut gather = Gather::default();
-        // No record follows because it is not complete yet; damage is reported when the closed bag is read.
+        // No complete record follows yet; damage is reported when the closed bag is read.
         let _ = walk(&mut stream, u64::MAX, |stream| {
             let mut records = Records {
                 bag: self,

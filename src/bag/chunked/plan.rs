@@ -41,7 +41,7 @@ pub(crate) struct ChunkPlan {
     pub(crate) chunks: Vec<Chunk>,
     /// The stated message count per connection, by its number in the bag, chunk after chunk.
     pub(crate) counts: Vec<(u32, u32)>,
-    /// The part of the file that holds the chunks.
+    /// The part of the file that contains the chunks.
     pub(crate) body: Range<u64>,
     /// Notices about the bag as a whole.
     pub(crate) notices: Vec<Notice>,

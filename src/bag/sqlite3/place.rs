@@ -40,7 +40,7 @@ impl Ready {
 /// The largest database that is copied, in bytes: 16 GiB.
 const LARGEST_COPY: u64 = 16 << 30;
 
-/// Copies a database whose newest rows are in a log or journal beside it that was never merged.
+/// Copies a database with its newest rows in a log or journal beside it that was never merged.
 pub(super) fn ready(path: &Path) -> Result<Ready> {
     let beside: Vec<PathBuf> = ["-wal", "-journal"]
         .iter()

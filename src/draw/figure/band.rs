@@ -145,7 +145,7 @@ pub(crate) fn names(
     flow(canvas, width, y, &items)
 }
 
-/// Draws the titles of the phases, set from the right: one stands a line lower than every later one that it overlaps,
+/// Draws the titles of the phases, set from the right: each is placed a line lower than every later one that it overlaps,
 /// so that no leader crosses a text. Returns the y at which they end; `None` where that takes more than three lines.
 fn staircase(
     canvas: &mut PaperCanvas<'_>,

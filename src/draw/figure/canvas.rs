@@ -99,12 +99,12 @@ impl<'a> PaperCanvas<'a> {
         }
     }
 
-    /// Begins a group, which holds everything drawn next.
+    /// Begins a group, which contains everything drawn next.
     pub(crate) fn begin(&mut self, id: &str) {
         self.groups.push(Group::named(id));
     }
 
-    /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about
+    /// Begins the group of a mark: its class, and the events of the log that it shows. The log's sentence about
     /// them is its title.
     pub(crate) fn begin_mark(&mut self, class: &str, events: &[EventId], title: String) {
         let id = format!("{class}-{}", self.groups.len());
@@ -306,7 +306,7 @@ impl<'a> PaperCanvas<'a> {
     }
 }
 
-/// The attribute of a mark that names the events of the log it stands for: `data-entry` for one, `data-entries` for
+/// The attribute of a mark that names the events of the log that it shows: `data-entry` for one, `data-entries` for
 /// several.
 pub(crate) fn event_data(events: &[EventId]) -> Vec<(&'static str, String)> {
     match events {

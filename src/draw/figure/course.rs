@@ -185,7 +185,7 @@ fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
                 let sign: String = count.chars().take(1).collect();
                 shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
             }
-            // The same nodes as before: its number says as much.
+            // The same nodes as before: its number is enough.
             None if !source.is_named && name.starts_with("same ") => Vec::new(),
             None => vec![name],
         };
@@ -239,7 +239,7 @@ pub struct LifeLines {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LifeLine {
     pub(crate) label: String,
-    /// Whether it stands below the title of its namespace.
+    /// Whether it is below the title of its namespace.
     pub(crate) is_inside: bool,
     /// The node or topic of the row; `None` for a title.
     pub(crate) what: Option<Element>,

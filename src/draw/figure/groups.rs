@@ -20,7 +20,7 @@ pub(crate) struct NodeGroup {
     pub(crate) members: Vec<usize>,
 }
 
-/// The phases that each of these roles lives in: those whose configuration holds it, else the one it is first seen in.
+/// The phases that each of these roles belongs to: those whose configuration contains it, otherwise the one in which it is first seen.
 pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTreeSet<usize>> {
     let found = configurations(source.mission, source.phases);
     let of = |track: &Track| {

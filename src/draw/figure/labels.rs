@@ -59,7 +59,7 @@ impl Room<'_> {
         Rect::around(middle, self.labels[at][which])
     }
 
-    /// Whether a label stands on or near an arrow that is not its own.
+    /// Whether a label is on or near another arrow than its own.
     pub(crate) fn is_unclear(&self, at: usize, spot: Spot) -> bool {
         self.crossed(at, &self.rect(at, spot).grown(NEAR)) > 0
     }

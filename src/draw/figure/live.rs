@@ -75,7 +75,7 @@ impl LivesFigure<'_> {
         rows.filter_map(line).collect()
     }
 
-    /// Draws the names of the rows; those for which `is_now` holds stand out.
+    /// Draws the names of the rows; those for which `is_now` is true are emphasized.
     pub(crate) fn names(
         &self,
         canvas: &mut PaperCanvas<'_>,

@@ -9,7 +9,7 @@ use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::groups::{NodeGroup, depths, groups, phases_of};
 use super::marks::Marks;
 use super::notes::{flow, sentence};
-use super::page::{FITTING, FigureSheet, TOLD, filter_that_fits, nothing};
+use super::page::{FITTING, FigureSheet, MOST_NAMED, filter_that_fits, nothing};
 use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
@@ -191,7 +191,7 @@ fn below(
         text.push_str("Arrow: topics, thicker = more Hz, dashed = inferred. ");
     }
     if !alone.is_empty() {
-        let names = words::some_of(alone, TOLD);
+        let names = words::some_of(alone, MOST_NAMED);
         let _ = write!(text, "Without a known partner: {names}. ");
     }
     if left_out > 0 {

@@ -38,7 +38,7 @@ pub(crate) struct RowMark {
 }
 
 impl RowMark {
-    /// The same on the row that stands for its track; `None` where none does.
+    /// The same on the row of its track; `None` if it has no row.
     pub(crate) fn on(&self, row: impl Fn(usize) -> Option<usize>) -> Option<Self> {
         let track = row(self.track)?;
         Some(Self {

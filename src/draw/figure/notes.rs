@@ -114,7 +114,7 @@ impl NotePlace {
         let fits = |at: &usize| canvas.width(text[..*at].trim_end(), of) <= room;
         let at = breaks.clone().take_while(fits).last();
         // A first word that is too long for the rest of the line goes to the next one; one that is too long for any
-        // line stands out.
+        // line is conspicuous.
         let at = at.or_else(|| (self.x > 0.0).then_some(0));
         let at = at.or_else(|| breaks.clone().next()).unwrap_or(text.len());
         (&text[..at], &text[at..])

@@ -22,7 +22,7 @@ use crate::draw::text::Fonts;
 const SHORTEST_AXIS: f64 = 15.0;
 
 /// The most names of one kind that are reported in a note; the others are counted.
-pub(crate) const TOLD: usize = 60;
+pub(crate) const MOST_NAMED: usize = 60;
 
 /// The number of boxes that fit on a page, about.
 pub(crate) const FITTING: usize = 40;
@@ -228,7 +228,7 @@ fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     lives.marks.letters.iter().enumerate().map(item).collect()
 }
 
-/// The notes below the legend: the members of folded rows where no column tells them, and the number of events
+/// The notes below the legend: the members of folded rows where no column lists them, and the number of events
 /// without a letter.
 fn lives_notes(lives: &LivesFigure<'_>, is_reported: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
@@ -238,7 +238,10 @@ fn lives_notes(lives: &LivesFigure<'_>, is_reported: bool) -> Vec<Unbroken> {
                 .iter()
                 .map(|at| last_part(&lives.tracks[*at].name))
                 .collect();
-            let text = format!("Throughout in {space}: {}.", words::some_of(&names, TOLD));
+            let text = format!(
+                "Throughout in {space}: {}.",
+                words::some_of(&names, MOST_NAMED)
+            );
             items.push(sentence(ink::QUIET, text));
         }
     }

@@ -41,7 +41,7 @@ pub(crate) struct PlacedPanel {
 }
 
 /// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all
-/// are wider. Parts without links between them are laid out each by itself and put side by side. `labels` holds, per
+/// are wider. Parts without links between them are laid out each by itself and put side by side. `labels` contains, per
 /// link, the sizes of the texts that may be written on it, the best first.
 pub(crate) fn place(
     canvas: &PaperCanvas<'_>,
@@ -218,7 +218,7 @@ fn scaled(plan: &Plan, by: f64) -> Plan {
 }
 
 impl PlacedPanel {
-    /// Room for a whole plan, in which nothing stands yet.
+    /// Room for a whole plan, still empty.
     fn empty(plan: &Plan, labels: usize, size: Size) -> Self {
         Self {
             size,

@@ -29,7 +29,7 @@ pub(crate) enum FigureRow {
 }
 
 impl FigureRow {
-    /// Whether it stands for this track.
+    /// Whether it represents this track.
     pub(crate) fn holds(&self, track: usize) -> bool {
         match self {
             Self::Space(_) => false,

@@ -116,7 +116,7 @@ impl<'a> FigureSource<'a> {
     }
 
     /// The messages of some publications; of the only one of its topic, all that are not known to come from others. One
-    /// that is latched stands for its node by its message, and is not busy.
+    /// that is latched represents its node by its message, and is not busy.
     pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
         let edges = edges
             .iter()

@@ -177,7 +177,7 @@ impl<'s> StepSource<'s> {
             .each_ref()
             .map(|t| t.keys().copied().collect::<BTreeSet<_>>());
         let handed = self.handed(k);
-        // One that ended long ago stands in the note alone.
+        // An element that ended long ago is mentioned only in the note.
         let partners = handed.iter().flat_map(|(_, from, to, _)| [from, to]);
         let partners = partners.filter(|name| before.contains(*name) || after.contains(*name));
         let partners: BTreeSet<usize> = partners
@@ -377,7 +377,7 @@ impl<'s> StepSource<'s> {
         all
     }
 
-    /// The namespace that most boxes are in, which the panel then says once; `None` if it is the root, or that of one
+    /// The namespace that most boxes are in, which the panel then names once; `None` if it is the root, or that of one
     /// box.
     fn home(&self, boxes: &[(BoxState, Vec<usize>)]) -> Option<&str> {
         let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();

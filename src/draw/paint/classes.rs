@@ -26,7 +26,7 @@ pub(crate) trait ElementLook {
     fn class(&self) -> String;
     /// The words of its live text.
     fn text(&self) -> String;
-    /// Writes its live text at a place, as one element or more; `tells_changes` where it stands only in windows in
+    /// Writes its live text at a place, as one element or more; `tells_changes` where it is shown only in windows in
     /// which its rate changed.
     fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
         xml.open("text")

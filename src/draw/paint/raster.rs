@@ -35,9 +35,9 @@ const MOST_SIDE: f64 = 65_535.0;
 /// The most pixels in a picture: 256 MB of memory.
 const MOST_PIXELS: f64 = 64e6;
 /// The number of drawn groups that are kept twice over, so that a later frame need not draw them again: more than
-/// a page holds, few enough for 20 MB.
+/// a page contains, few enough for 20 MB.
 const MOST_KEPT: usize = 1000;
-/// The bytes of their pixels that are kept twice over: about what a page holds.
+/// The bytes of their pixels that are kept twice over: about one page of them.
 const MOST_BYTES: usize = 10 << 20;
 
 /// A group, drawn once, and the tiles of the page that it may touch.

@@ -34,7 +34,7 @@ pub(super) fn ground(xml: &mut Xml, scene: &Scene) {
     }
 }
 
-/// A document of the scene's size that holds this one group and no background, for painters that keep groups apart.
+/// A document of the scene's size with this group alone and no background, for painters that keep groups apart.
 pub(crate) fn write_alone(scene: &Scene, group: &Group) -> String {
     let mut xml = Xml::with_capacity(1024);
     open(&mut xml, scene);

@@ -70,7 +70,7 @@ impl Xml {
         self
     }
 
-    /// Closes the innermost tag, which holds nothing: `<rect/>`.
+    /// Closes the innermost tag, which is empty: `<rect/>`.
     pub(crate) fn close_empty(&mut self) -> &mut Self {
         if !self.is_start {
             return self.close();

@@ -29,7 +29,7 @@ pub(crate) struct ArrowPath {
     pub(crate) id: String,
     /// The names of its ends.
     pub(crate) ends: [String; 2],
-    /// The names of its topics as they are drawn, where it stands for several.
+    /// The names of its topics as they are drawn, where it represents several.
     pub(crate) topics: Vec<String>,
     start: Point,
     curves: Vec<[Point; 3]>,

@@ -1,7 +1,7 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
 use super::card::Card;
-use super::measured::{LINE, Label, Tells, rate_label, second_line};
+use super::measured::{LINE, Label, ShownRates, rate_label, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::spaces::Space;
@@ -28,7 +28,7 @@ pub(crate) struct Boxes<'a> {
 pub(crate) struct ItemBox {
     pub(crate) id: String,
     pub(crate) label: Label,
-    pub(crate) tells: Tells,
+    pub(crate) shown_rates: ShownRates,
     /// Its rows, if it has any.
     pub(crate) card: Option<Card>,
     /// Its box on the page.
@@ -186,10 +186,11 @@ impl Boxes<'_> {
         {
             self.latch(&mut group, inner, body);
         }
-        let second = second_line(shown, card.tells);
-        let second = second.unwrap_or_else(|| card.label.silence(shown, card.tells).to_owned());
+        let second = second_line(shown, card.shown_rates);
+        let second =
+            second.unwrap_or_else(|| card.label.silence(shown, card.shown_rates).to_owned());
         self.lines(&mut group, &card.label, &second, inner, body, &look);
-        if let Some(text) = rate_label(shown, card.tells) {
+        if let Some(text) = rate_label(shown, card.shown_rates) {
             let (below, size) = self.below(place);
             let paint = (look.stroke.color, style.badge.sign);
             badge::pill(&mut group, self.fonts, paint, &text, below, size);
@@ -224,7 +225,7 @@ impl Boxes<'_> {
         }
     }
 
-    /// The outline, and the part inside it that the label stands in.
+    /// The outline, and the part inside it for the label.
     fn outline(
         &self,
         group: &mut Group,

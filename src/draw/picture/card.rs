@@ -3,7 +3,7 @@
 use super::badge;
 use super::boxes::{Boxes, ItemBox, class, data, title};
 use super::item_id;
-use super::measured::{Tells, second_line, short_name};
+use super::measured::{ShownRates, second_line, short_name};
 use super::options::{self, BoxLook};
 use super::topics::{called, fitted};
 use crate::base::geometry::{Point, Rect, Size};
@@ -82,7 +82,7 @@ fn is_quiet(row: &CardRow) -> bool {
     })
 }
 
-/// The name of a topic as it is drawn: relative to the frame that the node stands in.
+/// The name of a topic as it is drawn: relative to the frame around the node.
 fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
     let space = view.items[row.owner as usize].cluster;
     let inside = space.map_or("", |at| &*view.namespaces[at].name);
@@ -124,7 +124,7 @@ impl Line {
 /// The rate of a topic as its row has it.
 fn rate(shown: &Shown) -> Option<String> {
     let latched = || (shown.state == State::Latched).then(|| "latched".to_owned());
-    second_line(shown, Tells::Rates).or_else(latched)
+    second_line(shown, ShownRates::Rates).or_else(latched)
 }
 
 impl Boxes<'_> {
@@ -190,7 +190,7 @@ impl Boxes<'_> {
         let (style, size) = (self.style, self.style.topic.size * self.fit.scale);
         let look = options::of_box(style, &style.topic, shown);
         let middle = place.centre().y;
-        // The colour of the whole card says it already.
+        // The colour of the whole card shows it already.
         let owner = view.items_shown.get(row.owner as usize);
         let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
         let is_new = |mark: &Mark| owner.map(Mark::class) != Some(mark.class());

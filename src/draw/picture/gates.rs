@@ -182,7 +182,7 @@ impl Gate {
         Some((shown, quiet))
     }
 
-    /// The way of the one line outside of the frame; `None` where its label stands inside.
+    /// The way of the one line outside of the frame; `None` where its label is inside.
     pub(crate) fn path(
         &self,
         view: &View,

@@ -34,7 +34,7 @@ const FLAT: f64 = 0.7;
 pub(crate) struct Label {
     /// The name as it is drawn.
     pub(crate) name: String,
-    /// Whether a smaller line stands below it in some window.
+    /// Whether a smaller line is drawn below it in some window.
     pub(crate) second: bool,
     /// The name as it is, where the font lacks some of its characters.
     pub(crate) unshown: Option<String>,
@@ -42,10 +42,10 @@ pub(crate) struct Label {
 
 impl Label {
     /// The smaller line of a topic in a window without a message.
-    pub(crate) fn silence(&self, shown: &Shown, tells: Tells) -> &'static str {
+    pub(crate) fn silence(&self, shown: &Shown, shown_rates: ShownRates) -> &'static str {
         match (shown.mark, shown.state) {
             (Some(Mark::Removed), _) => "",
-            _ if !self.second || tells != Tells::Rates => "",
+            _ if !self.second || shown_rates != ShownRates::Rates => "",
             (_, State::Latched) => "latched",
             _ => NO_MESSAGE,
         }
@@ -251,14 +251,14 @@ impl Measurer<'_> {
 
     /// The width of the widest smaller line that each box shows in some window: lifecycle states and rates.
     fn second_lines(&self) -> Vec<Option<f64>> {
-        let tells = tells(self.view);
+        let shown_rates = shown_rates(self.view);
         let mut widest = vec![None; self.view.items.len()];
         for shown in self.view.items_shown.iter().flat_map(Showing::looks) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(at) else {
                 continue;
             };
-            if let Some(line) = second_line(shown, tells[at]) {
+            if let Some(line) = second_line(shown, shown_rates[at]) {
                 let size = self.body(item).small;
                 let width = |text: &str| self.fonts.width(text, size, Weight::SemiBold);
                 widen(&mut widest[at], width(&line).max(width(NO_MESSAGE)));
@@ -324,10 +324,10 @@ fn widen(most: &mut Option<f64>, width: f64) {
 
 /// The rates that a box shows because no arrow does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Tells {
+pub(crate) enum ShownRates {
     /// None: it is not a topic.
     Nothing,
-    /// Those of the whole topic that changed: several publish it, whose arrows tell the rest.
+    /// Those of the whole topic that changed: several publish it, whose arrows show the rest.
     Changes,
     /// All: at most one is ever known to publish it.
     Rates,
@@ -335,31 +335,32 @@ pub(crate) enum Tells {
 
 /// The rates that each item shows: all those of a topic, unless several publishers share it; then only those that
 /// changed.
-pub(crate) fn tells(view: &View) -> Vec<Tells> {
+pub(crate) fn shown_rates(view: &View) -> Vec<ShownRates> {
     let mut senders = vec![0_usize; view.items.len()];
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
         if let Some(senders) = senders.get_mut(arrow.to as usize) {
             *senders += 1;
         }
     }
-    let tells = |(item, senders): (&Item, usize)| match item.kind {
-        ItemKind::Node | ItemKind::Namespace => Tells::Nothing,
-        ItemKind::Topic | ItemKind::Group if senders > 1 => Tells::Changes,
-        ItemKind::Topic | ItemKind::Group => Tells::Rates,
+    let shown_rates = |(item, senders): (&Item, usize)| match item.kind {
+        ItemKind::Node | ItemKind::Namespace => ShownRates::Nothing,
+        ItemKind::Topic | ItemKind::Group if senders > 1 => ShownRates::Changes,
+        ItemKind::Topic | ItemKind::Group => ShownRates::Rates,
     };
-    view.items.iter().zip(senders).map(tells).collect()
+    view.items.iter().zip(senders).map(shown_rates).collect()
 }
 
 /// Whether each arrow shows its rate: a publication whose topic does not, a subscription with another rate.
 fn told_by_arrows(view: &View) -> Vec<bool> {
-    let tells = tells(view);
+    let shown_rates = shown_rates(view);
     let reported = |arrow: &Arrow| {
-        arrow.kind != ArrowKind::Publish || tells.get(arrow.to as usize) != Some(&Tells::Rates)
+        arrow.kind != ArrowKind::Publish
+            || shown_rates.get(arrow.to as usize) != Some(&ShownRates::Rates)
     };
     view.arrows.iter().map(reported).collect()
 }
 
-/// The text of an arrow in a window, and whether it stands on a pill because it changed.
+/// The text of an arrow in a window, and whether it is drawn on a pill because it changed.
 pub(crate) fn arrow_label(
     arrow: &Arrow,
     shown: &Shown,
@@ -394,7 +395,7 @@ pub(crate) fn arrow_label(
 }
 
 /// The smaller line of a box in a window.
-pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
+pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
     if let Some(inside) = &shown.inside {
         return Some(chips::inside(inside));
     }
@@ -407,16 +408,16 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     if let Some(state) = &shown.lifecycle {
         return Some(state.to_string());
     }
-    match (tells, shown.rates) {
-        (Tells::Nothing | Tells::Changes, _) => None,
-        (Tells::Rates, Some((before, now))) => Some(words::rate_change(before, now)),
-        (Tells::Rates, None) => chips::rate_in(shown),
+    match (shown_rates, shown.rates) {
+        (ShownRates::Nothing | ShownRates::Changes, _) => None,
+        (ShownRates::Rates, Some((before, now))) => Some(words::rate_change(before, now)),
+        (ShownRates::Rates, None) => chips::rate_in(shown),
     }
 }
 
 /// The rate label of a box in one window: the rate that changed, if neither an arrow nor its smaller line shows it.
-pub(crate) fn rate_label(shown: &Shown, tells: Tells) -> Option<String> {
-    let (before, now) = shown.rates.filter(|_| tells == Tells::Changes)?;
+pub(crate) fn rate_label(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
+    let (before, now) = shown.rates.filter(|_| shown_rates == ShownRates::Changes)?;
     Some(words::rate_change(before, now))
 }
 
@@ -435,7 +436,7 @@ fn ellipse(width: f64, height: f64, body: &Body) -> Size {
     Size::new(width * stretch + 2.0 * body.pad_x, full)
 }
 
-/// The part of a name inside the namespace whose box it stands in.
+/// The part of a name inside the namespace in whose box it is drawn.
 pub(crate) fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
     let rest = name
         .strip_prefix(inside)

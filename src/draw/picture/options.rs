@@ -24,7 +24,7 @@ pub(crate) struct BoxLook {
 pub(crate) struct ArrowLook {
     pub(crate) stroke: Stroke,
     pub(crate) text: Color,
-    /// Whether a dot stands at its beginning: alive by a latched message.
+    /// Whether it begins with a dot: alive by a latched message.
     pub(crate) dot: bool,
     /// A soft light around it.
     pub(crate) glow: Color,

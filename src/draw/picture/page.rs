@@ -74,7 +74,7 @@ impl PageFrame {
         }
     }
 
-    /// The largest scale at which a layout of this size fits, and the place of its corner, so that it stands in the
+    /// The largest scale at which a layout of this size fits, and the place of its corner, so that it is in the
     /// middle.
     pub(crate) fn fit(&self, layout: Size) -> GraphFit {
         let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));

@@ -8,7 +8,7 @@ use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Attendance, View};
 
-/// The chips of the member list of a namespace that stands for several: left edges and widths, from where the title begins.
+/// The chips of the member list of a namespace that represents several: left edges and widths, from where the title begins.
 pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
     if space.replicas.len() > MOST_CHIPS {
         return Vec::new();

@@ -141,7 +141,7 @@ fn apart(p: Point, a: Point, b: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::picture::measured::{Label, Tells};
+    use crate::draw::picture::measured::{Label, ShownRates};
     use crate::draw::picture::page::GraphFit;
     use crate::layout::Route;
 
@@ -163,7 +163,7 @@ mod tests {
         ItemBox {
             id: String::new(),
             label: Label::default(),
-            tells: Tells::Nothing,
+            shown_rates: ShownRates::Nothing,
             card: None,
             place,
             badge: Point::default(),

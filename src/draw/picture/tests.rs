@@ -121,7 +121,7 @@ fn a_frame_marks_changes_in_names_classes_and_text() {
     assert!(svg(2).contains("handed-over"));
     assert!(
         svg(3).contains("3 → 9 Hz"),
-        "a topic without a publisher tells its rate itself"
+        "a topic without a publisher shows its own rate"
     );
     assert!(!svg(3).contains("n-cam\""), "a ghost stays for one window");
     assert!(svg(0).contains("window 1 of 5") && svg(0).contains("no change yet"));

@@ -15,7 +15,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Frame, View};
 
-/// A bar stands for one window, or for several where there are more windows than room.
+/// A bar represents one window, or several where there is not enough room.
 struct TimelineBar {
     /// Its time: from the start of its first window to the start of the next bar's, or to the end.
     span: Span,

@@ -13,7 +13,7 @@ use crate::view::{Arrow, Mark, Shown, TopicRow, View};
 
 /// The most topics that have a row each; of more, only those that changed have, or the one with the highest rate.
 const MOST: usize = 3;
-/// The number of letters from which a rate stands below its name, so that lines need not be long.
+/// The number of letters from which a rate is drawn below its name, so that lines need not be long.
 const LONGEST: usize = 15;
 /// The largest width of a name in the height of its text.
 const WIDEST: f64 = 13.0;
@@ -63,7 +63,7 @@ impl Row {
     }
 }
 
-/// The names of the topics of an arrow as they are drawn: as short as tells them apart, without the form that an image
+/// The names of the topics of an arrow as they are drawn: as short as is unambiguous, without the form that an image
 /// is carried in.
 pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
     let plain = |name: &Arc<str>| {
@@ -103,7 +103,7 @@ fn last(name: &str) -> &str {
     }
 }
 
-/// The name without the namespace whose frame one of the ends of the arrow stands in.
+/// The name without the namespace in whose frame one of the arrow's ends lies.
 fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     let inside = |item: u32| {
         let mut rests = view.around(item).filter_map(|at| {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::arrows::{ArrowPath, Arrows, is_badged};
 use super::boxes::{Boxes, ItemBox};
-use super::measured::Tells;
+use super::measured::ShownRates;
 use super::page::GraphFit;
 use super::{Picture, badge, chips, encoded, places};
 use crate::base::geometry::{Point, Rect, Size};
@@ -124,11 +124,12 @@ impl Picture<'_> {
                 let is_latched = item.kind != ItemKind::Node && latched.contains(&at);
                 let is_live = label.second;
                 let mut shown = plain(is_live.then_some(1.0));
-                // Whatever it tells, it is a line to be filled.
+                // It is a line to be filled, whatever it shows.
                 shown.lifecycle = is_live.then(|| "-".into());
                 let mut group = boxes.item(item, &card, &shown);
                 let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);
-                let tells_changes = card.tells == Tells::Changes && marks.iter().any(is_rate);
+                let tells_changes =
+                    card.shown_rates == ShownRates::Changes && marks.iter().any(is_rate);
                 if tells_changes {
                     group.text(boxes.rate_label_text(card.place, "-"));
                 }

@@ -87,7 +87,7 @@ fn is_same(a: &Path, b: &Path) -> bool {
 /// The text of a small file.
 fn text(path: &Path) -> Option<String> {
     let mut text = String::new();
-    // Nobody waits for a pipe.
+    // A pipe would block.
     let file = path.is_file().then(|| fs::File::open(path).ok())??;
     file.take(LONGEST).read_to_string(&mut text).ok()?;
     Some(text)

@@ -335,7 +335,7 @@ fn is_of_other_ros(instance: &Instance, known: &Conclusions<'_>) -> bool {
     if of_ros1 { is_ros2 } else { is_ros1 }
 }
 
-/// Adds the node, with a question mark, and its edge, which lives with its topic.
+/// Adds the node, with a question mark, and its edge, which exists as long as its topic.
 fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
     let edge = candidate.found.role.edge(node, candidate.found.topic);

@@ -259,7 +259,7 @@ impl<'a> PythonReader<'a> {
         turns
     }
 
-    /// The items of a literal that a loop goes over, or of one that a name stands for.
+    /// The items of a literal that a loop goes over, or of one that a name refers to.
     fn items(&self, node: Node<'a>, depth: usize) -> Vec<Node<'a>> {
         let again = |node: Option<Node<'a>>| match node {
             Some(node) if depth < DEEPEST => self.items(node, depth + 1),

@@ -83,7 +83,7 @@ impl Payload {
 }
 
 /// A collector that has read one message of a connection, with the payload that it wanted.
-pub(super) fn hear(
+pub(super) fn receive(
     topic: &str,
     kind: &str,
     publisher: Option<&str>,
@@ -123,7 +123,7 @@ pub(super) fn observations(
     publisher: Option<&str>,
     payload: &Payload,
 ) -> Vec<String> {
-    let (mut collector, want) = hear(topic, kind, publisher, payload);
+    let (mut collector, want) = receive(topic, kind, publisher, payload);
     assert_eq!(want, Want::Payload);
     source::rosout::settle(&mut collector.facts);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
@@ -283,7 +283,7 @@ fn the_status_of_a_goal_names_its_client() {
 #[test]
 fn a_payload_of_another_layout_is_a_notice_and_no_claim() {
     let message = Payload::log("/a", "hello", "a.py", &[]).byte(1);
-    let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &message);
+    let (collector, _) = receive("/rosout", "rosgraph_msgs/Log", None, &message);
     assert!(collector.facts.list.is_empty());
     let kinds: Vec<_> = collector.notices.iter().map(|n| n.kind).collect();
     assert_eq!(kinds, [NoticeKind::Undecodable]);
@@ -297,7 +297,7 @@ fn every_layout_survives_any_cut() {
             bytes: record.bytes[..len].to_vec(),
             cdr: false,
         };
-        let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &cut);
+        let (collector, _) = receive("/rosout", "rosgraph_msgs/Log", None, &cut);
         assert!(collector.facts.list.is_empty(), "{len}");
     }
 }

@@ -16,14 +16,14 @@ pub(crate) struct Closed {
     published: BTreeMap<Name, BTreeSet<Name>>,
     /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
     settled: BTreeSet<Name>,
-    /// Topics whose every message names its publisher, with all these publishers.
+    /// Topics on which every message names its publisher, with all these publishers.
     stated: BTreeMap<Name, BTreeSet<Name>>,
 }
 
 impl Closed {
     pub(crate) fn new(known: &Conclusions<'_>) -> Self {
         let mut closed = Self::default();
-        let mut heard: BTreeMap<Name, Span> = BTreeMap::new();
+        let mut context: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
             let word = SOURCES.get(fact.source).map_or("", |s| s.word);
@@ -36,7 +36,7 @@ impl Closed {
                 known.facts.times.bounds(fact.times),
                 listed,
             ) {
-                let span = heard.entry(node).or_insert(Span::new(first, last));
+                let span = context.entry(node).or_insert(Span::new(first, last));
                 span.start = span.start.min(first);
                 span.end = span.end.max(last);
             }
@@ -54,8 +54,8 @@ impl Closed {
                 _ => {}
             }
         }
-        heard.retain(|_, span| span.nanos() >= SETTLED_NS);
-        closed.settled = heard.into_keys().collect();
+        context.retain(|_, span| span.nanos() >= SETTLED_NS);
+        closed.settled = context.into_keys().collect();
         closed.tell(known);
         closed
     }

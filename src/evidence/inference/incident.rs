@@ -1,4 +1,4 @@
-//! What somebody states about the graph besides who is in it: subscribers that get nothing, names used twice, messages
+//! Statements about the graph other than about which elements exist: subscribers that get nothing, names used twice, messages
 //! that the recorder lost.
 
 use std::sync::Arc;
@@ -11,13 +11,13 @@ use crate::evidence::observation::{Name, SourceId};
 /// The kind of an incident, with what is stated about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum IncidentKind {
-    /// A subscriber gets nothing, since its quality of service does not fit by this policy; empty if none is named.
+    /// A subscriber receives nothing, because this policy of its quality of service is incompatible; empty if none is named.
     Starved(Arc<str>),
     /// Two nodes have the same name.
     Duplicate,
     /// The recorder lost so many messages.
     Lost(u64),
-    /// A node that passed on the messages of one topic passes on those of another one.
+    /// A node that forwarded the messages of one topic now forwards those of another.
     Turn(Name, Name),
 }
 

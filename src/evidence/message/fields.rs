@@ -359,7 +359,7 @@ fn run(
 /// The number of elements of an array; never more than fit in the payload.
 fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
-        Array::Told => payload.length(least),
+        Array::Dynamic => payload.length(least),
         Array::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
             Err(payload.wrong("a whole array"))
         }

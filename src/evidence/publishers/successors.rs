@@ -254,7 +254,7 @@ pub(super) fn shown(observation: Observation) -> Option<Name> {
     }
 }
 
-/// Whether all messages of a stream are by the node that its header names, and say something about its life.
+/// Whether all messages of a stream are by the node that its header names, and are evidence of its lifetime.
 fn is_own(streams: &[Stream], at: usize) -> bool {
     streams[at].trust == Reliability::Whole && streams[at].connection.topic.as_str() != "/rosout"
 }

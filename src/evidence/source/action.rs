@@ -23,7 +23,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.header()?;
@@ -35,16 +35,16 @@ pub(crate) fn read(
         payload.skip_string()?;
     }
     payload.finish()?;
-    let topic = heard.stream.connection.topic.shared();
+    let topic = context.stream.connection.topic.shared();
     let Some(action) = topic.strip_suffix("/status") else {
         return Ok(());
     };
     for id in ids {
         if let Some(client) = client(id) {
-            let node = heard.name(client);
-            let goal = heard.name(&format!("{action}/goal"));
+            let node = context.name(client);
+            let goal = context.name(&format!("{action}/goal"));
             let words = || format!("goal `{id}` on {action}");
-            heard.observation(
+            context.observation(
                 Observation::Publish(node, goal),
                 Confidence::Inferred,
                 words,
@@ -66,7 +66,7 @@ fn client(id: &str) -> Option<&str> {
 const SENDS: [&str; 3] = ["status", "feedback", "result"];
 const TAKES: [&str; 2] = ["goal", "cancel"];
 
-/// The parts of an action that a bag holds or a source names, by the action's name.
+/// The parts of an action that a bag contains or a source names, by the action's name.
 type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {

@@ -34,7 +34,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 ..inference(edge, Validity::Messages(at))
             }),
             Reliability::First => known.add(Inference {
-                // The tool that wrote this header knows it of no other message.
+                // The tool that wrote this header knows the publisher of no other message.
                 confidence: Confidence::Stated,
                 ..inference(edge, Validity::First(at))
             }),

@@ -21,14 +21,14 @@ const TABLE: &str = include_str!("contracts.csv");
 
 /// Keeps the source file that a node logs from.
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     let file = record.file_name();
     if !record.logger.is_empty() && !file.is_empty() {
-        let (logger, file) = (heard.name(&record.logger), heard.name(file));
-        heard.observation(
+        let (logger, file) = (context.name(&record.logger), context.name(file));
+        context.observation(
             Observation::LogsFrom(logger, file),
             Confidence::Stated,
             String::new,
@@ -119,7 +119,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// The version of ROS whose rows do not apply.
+/// The version of ROS to which a row does not apply.
 fn foreign(known: &Conclusions<'_>) -> &'static str {
     let mut streams = known.streams.iter();
     let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);

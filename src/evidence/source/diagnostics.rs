@@ -42,7 +42,7 @@ const STATUS: (&str, &str) = (
 const VALUE: (&str, &str) = ("KeyValue", "string key;string value");
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.header()?;
@@ -58,14 +58,14 @@ pub(crate) fn read(
         }
     }
     payload.finish()?;
-    let topic = heard.stream.connection.topic.as_str();
+    let topic = context.stream.connection.topic.as_str();
     if topic == "diagnostics" || topic.ends_with("/diagnostics") {
         for name in names {
             if let Some(node) = node(name) {
-                let node = heard.name(&format!("/{node}"));
-                let topic = heard.stream.topic;
+                let node = context.name(&format!("/{node}"));
+                let topic = context.stream.topic;
                 let words = || format!("status `{name}`");
-                heard.observation(
+                context.observation(
                     Observation::Reports(node, topic),
                     Confidence::Inferred,
                     words,

@@ -18,24 +18,24 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let mut long = payload.clone();
     let (id, nodes) = nodes(payload, 16).or_else(|_| nodes(&mut long, 24))?;
     let id = cursor::hex(id);
-    let group = heard.name(&format!("participant {id}"));
+    let group = context.name(&format!("participant {id}"));
     for (space, name) in nodes {
         let full = format!("{}/{name}", space.trim_end_matches('/'));
-        let node = heard.name(&full);
+        let node = context.name(&full);
         let said = Statement {
             observation: Observation::Node(node),
             confidence: Confidence::Stated,
             snapshot: Some(group),
         };
-        heard.say(said, || format!("{full} is a node of participant {id}"));
+        context.observe(said, || format!("{full} is a node of participant {id}"));
     }
-    heard.observation(
+    context.observation(
         Observation::Snapshot(group),
         Confidence::Stated,
         String::new,

@@ -8,13 +8,13 @@ use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     if let Some(node) = doubled(&record) {
-        let node = heard.name(&node);
-        heard.observation(Observation::Duplicate(node), Confidence::Stated, || {
+        let node = context.name(&node);
+        context.observation(Observation::Duplicate(node), Confidence::Stated, || {
             format!("{} logs: {}", record.logger, record.text)
         });
     }

@@ -37,32 +37,35 @@ const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
-    if let Some(time) = heard.time
+    if let Some(time) = context.time
         && record.text.len() <= LONGEST
         && !record.file.ends_with("recorder.cpp")
     {
-        let logger = in_space(heard.space, &record.logger);
-        heard.facts.spoken.say(time, &logger, record.text);
+        let logger = in_space(context.space, &record.logger);
+        context.facts.logged.add(time, &logger, record.text);
     }
     Ok(())
 }
 
 /// Keeps the words and numbers in a message.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &MessageSchema, payload: &[u8]) {
+pub(crate) fn keep(context: &mut SourceContext<'_>, schema: &MessageSchema, payload: &[u8]) {
     if payload.len() > LONGEST {
         return;
     }
-    let value = PayloadCursor::new(&heard.stream.connection.encoding, payload)
+    let value = PayloadCursor::new(&context.stream.connection.encoding, payload)
         .and_then(|mut payload| schema.read(&mut payload));
-    if let (Ok(value), Some(time)) = (value, heard.time) {
+    if let (Ok(value), Some(time)) = (value, context.time) {
         let mut values = Vec::new();
         collect(&value, &mut values);
         for (field, value) in values.iter().enumerate() {
-            heard.facts.spoken.show(time, (heard.place, field), value);
+            context
+                .facts
+                .logged
+                .show(time, (context.place, field), value);
         }
     }
 }
@@ -124,7 +127,7 @@ struct Echo {
 type LogForm = (Name, String, String, Name);
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let (said, shown) = known.facts.spoken.sorted();
+    let (said, shown) = known.facts.logged.sorted();
     let echoes = echoes(known, &said, &shown);
     let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
     for text in &said {

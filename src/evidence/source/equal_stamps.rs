@@ -1,8 +1,8 @@
 //! Data flow, when asked for: a node that publishes messages whose header stamps equal those of an input just before,
-//! again and again, subscribes that input.
+//! again and again, subscribes to that input.
 //!
-//! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs are possible
-//! and nothing tells them apart, no observation is made, and none about a simulation, in which all that is sent in one step
+//! Fails if nodes restamp their output, and if sources are triggered together. Where two inputs are possible
+//! and nothing distinguishes them, no observation is made, and none about a simulation, in which all that is sent in one step
 //! has one stamp.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -83,22 +83,26 @@ fn stamp(connection: &Connection, first_bytes: &[u8]) -> Option<Stamp> {
 }
 
 /// Keeps the age of a message by its stamp.
-pub(crate) fn age(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    if let (Some(stamp), Some(time)) = (stamp(&heard.stream.connection, first_bytes), heard.time) {
-        heard.facts.age(heard.place, time, stamp);
+pub(crate) fn age(context: &mut SourceContext<'_>, first_bytes: &[u8]) {
+    if let (Some(stamp), Some(time)) =
+        (stamp(&context.stream.connection, first_bytes), context.time)
+    {
+        context.facts.age(context.place, time, stamp);
     }
 }
 
 /// Keeps the stamp of a message, together with its log time.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    if let (Some(stamp), Some(time)) = (stamp(&heard.stream.connection, first_bytes), heard.time) {
+pub(crate) fn collect(context: &mut SourceContext<'_>, first_bytes: &[u8]) {
+    if let (Some(stamp), Some(time)) =
+        (stamp(&context.stream.connection, first_bytes), context.time)
+    {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "modulo 2^32 is meant"
         )]
         let units = time.0.div_euclid(UNIT_NS) as u32;
-        heard.facts.header(heard.place, stamp, units);
+        context.facts.header(context.place, stamp, units);
     }
 }
 
@@ -221,7 +225,7 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name,
     best.iter().find(clear).map(found)
 }
 
-/// Measurements that sensors send, and what is made of nothing but messages of its own row: no camera image is computed
+/// Measurements of sensors, and what is computed only from messages of its own row: no camera image is computed
 /// from a laser scan.
 const SENSED: [&[&str]; 4] = [
     &[

@@ -22,7 +22,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.u64()?;
@@ -33,19 +33,19 @@ pub(crate) fn read(
     payload.u8()?;
     let to = payload.string()?;
     payload.finish()?;
-    let topic = heard.stream.connection.topic.shared();
+    let topic = context.stream.connection.topic.shared();
     let Some(name) = topic.strip_suffix("/transition_event") else {
         return Ok(());
     };
-    let node = heard.name(name);
-    let state = heard.name(to);
+    let node = context.name(name);
+    let state = context.name(to);
     let words = || format!("{name} goes from {from} to {to} ({transition})");
-    heard.observation(
-        Observation::Publish(node, heard.stream.topic),
+    context.observation(
+        Observation::Publish(node, context.stream.topic),
         Confidence::Stated,
         words,
     );
-    heard.observation(
+    context.observation(
         Observation::Lifecycle(node, state),
         Confidence::Stated,
         words,

@@ -6,7 +6,7 @@ use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.header()?;
@@ -17,15 +17,15 @@ pub(crate) fn read(
     if file.ends_with("recorder.cpp")
         && let Some(topic) = text.strip_prefix("Subscribing to ")
     {
-        let topic = heard.name(topic.trim());
-        heard.observation(Observation::Appears(topic), Confidence::Stated, || {
+        let topic = context.name(topic.trim());
+        context.observation(Observation::Appears(topic), Confidence::Stated, || {
             format!("{name}: {text}")
         });
     }
     let roscpp = file.rsplit('.').next() == Some("cpp");
     if let Some(link) = link(text).filter(|_| roscpp) {
-        let node = heard.name(link.node.unwrap_or(name));
-        let topic = heard.name(link.topic);
+        let node = context.name(link.node.unwrap_or(name));
+        let topic = context.name(link.topic);
         let words = || format!("{name} logs: {text}");
         let observation = match link.how {
             How::Begins => Observation::Joins(node, topic),
@@ -33,11 +33,11 @@ pub(crate) fn read(
             How::Refused => Observation::Refused(node, topic),
             How::Ends => {
                 // It was there until now.
-                heard.observation(Observation::Node(node), Confidence::Stated, words);
+                context.observation(Observation::Node(node), Confidence::Stated, words);
                 Observation::Unsubscribe(node, topic)
             }
         };
-        heard.observation(observation, Confidence::Stated, words);
+        context.observation(observation, Confidence::Stated, words);
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
@@ -17,32 +17,32 @@ pub(crate) fn read(
         return Ok(());
     }
     if let Some((begins, topic)) = bridged(record.text) {
-        let (node, of) = (heard.name(&record.logger), heard.name(topic));
+        let (node, of) = (context.name(&record.logger), context.name(topic));
         let observation = if begins {
             Observation::SaysSubscribe(node, of)
         } else {
             Observation::Unsubscribe(node, of)
         };
-        heard.observation(observation, Confidence::Stated, String::new);
+        context.observation(observation, Confidence::Stated, String::new);
     } else if let Some((publishes, topic)) = named(record.text) {
-        let (node, of) = (heard.name(&record.logger), heard.name(topic));
+        let (node, of) = (context.name(&record.logger), context.name(topic));
         let observation = if publishes {
             Observation::SaysPublish(node, of)
         } else {
             Observation::SaysSubscribe(node, of)
         };
-        heard.observation(observation, Confidence::Stated, String::new);
+        context.observation(observation, Confidence::Stated, String::new);
         if record.text.contains("incompatible QoS") {
             let policy = record.text.split_once("incompatible policy: ");
             let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
             let policy = policy.trim_end_matches("_QOS_POLICY").to_lowercase();
-            let policy = heard.name(&policy);
+            let policy = context.name(&policy);
             let observation = if publishes {
                 Observation::Starves(node, of, policy)
             } else {
                 Observation::Starved(node, of, policy)
             };
-            heard.observation(observation, Confidence::Stated, || {
+            context.observation(observation, Confidence::Stated, || {
                 format!("{} logs: {}", record.logger, record.text)
             });
         }
@@ -95,7 +95,7 @@ fn named(text: &str) -> Option<(bool, &str)> {
     let rest = &text[before.len()..];
     let topic = match (after.is_empty(), publishes) {
         (false, _) => rest.split_once(after)?.0,
-        // `/gz/name (gz.msgs.Clock) -> /name (rosgraph_msgs/msg/Clock)`: ROS stands behind the arrow, or before it.
+        // `/gz/name (gz.msgs.Clock) -> /name (rosgraph_msgs/msg/Clock)`: ROS is after the arrow, or before it.
         (true, true) => rest.split_once("-> ")?.1.split(' ').next()?,
         (true, false) => rest.split(' ').next()?,
     };

@@ -28,7 +28,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let recorder = payload.string()?;
@@ -39,8 +39,8 @@ pub(crate) fn read(
     payload.finish()?;
     for (topic, in_transport, in_recorder) in all {
         let lost = in_transport.saturating_add(in_recorder);
-        let (of, many) = (heard.name(topic), heard.name(&lost.to_string()));
-        heard.observation(Observation::Lost(of, many), Confidence::Stated, || {
+        let (of, many) = (context.name(topic), context.name(&lost.to_string()));
+        context.observation(Observation::Lost(of, many), Confidence::Stated, || {
             format!("{recorder} lost {in_transport} messages of {topic} in transport and {in_recorder} itself")
         });
     }

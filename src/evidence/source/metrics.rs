@@ -31,7 +31,7 @@ const DEVIATION: usize = 4;
 const SAMPLES: usize = 5;
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let node = payload.string()?;
@@ -47,17 +47,17 @@ pub(crate) fn read(
     }
     payload.finish()?;
     if !node.is_empty() {
-        let name = heard.name(&format!("/{}", node.trim_start_matches('/')));
-        let observation = Observation::Reports(name, heard.stream.topic);
-        heard.observation(observation, Confidence::Stated, || {
-            format!("{node} tells of its {metric}")
+        let name = context.name(&format!("/{}", node.trim_start_matches('/')));
+        let observation = Observation::Reports(name, context.stream.topic);
+        context.observation(observation, Confidence::Stated, || {
+            format!("{node} reports its {metric}")
         });
         let nanos = |number: f64| {
             let nanos = libm::round(number * 1e6);
             (unit == "ms" && nanos.abs() < 9e15).then(|| cast::to_i64(nanos))
         };
         let count = cast::to_u64(numbers[SAMPLES]);
-        heard.measure(Measurement {
+        context.measure(Measurement {
             topic: None,
             publisher: None,
             subscriber: Some(name),

@@ -1,4 +1,4 @@
-//! The publisher of a topic whose messages name none: where only one node is known to publish it, the messages are from
+//! The publisher of a topic with messages that name none: if only one node is known to publish it, the messages are from
 //! that node.
 
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};

@@ -26,7 +26,7 @@ const SHARE: u64 = 90;
 const FIRST: u64 = 3;
 /// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
-/// The most runs that are kept of a flow: a mux that turns more often passes on several inputs at once.
+/// The most runs that are kept of a flow: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;
 /// The longest time that a message takes to be passed on, in nanoseconds.
 const RECENT_NS: i64 = 2_000_000_000;
@@ -37,16 +37,16 @@ const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 pub(crate) const HEAD: usize = 16 << 10;
 
 /// Keeps the hash of a payload of `size` bytes with this beginning. An empty one is no evidence.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
+pub(crate) fn collect(context: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     if beginning.is_empty() {
         return;
     }
     // A fixed seed, so that two contents that share a hash by chance share it in every run.
     let hash = FixedState::default().hash_one((size, beginning));
     let [a, b, c, d, ..] = hash.to_le_bytes();
-    if let Some(time) = heard.time {
+    if let Some(time) = context.time {
         let hash = u32::from_le_bytes([a, b, c, d]);
-        heard.facts.payload(heard.place, time, hash);
+        context.facts.payload(context.place, time, hash);
     }
 }
 

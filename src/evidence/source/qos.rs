@@ -36,14 +36,14 @@ pub(crate) fn is_transient_local(text: &str) -> bool {
 }
 
 /// Keeps the topic's quality of service in short words: `reliable transient_local depth 1`.
-pub(crate) fn announced(heard: &mut SourceContext<'_>) {
-    let Some(text) = heard.stream.connection.qos.clone() else {
+pub(crate) fn announced(context: &mut SourceContext<'_>) {
+    let Some(text) = context.stream.connection.qos.clone() else {
         return;
     };
     let mut offers = offers(&text);
     offers.sort();
     if let Ok(count @ 1..) = u32::try_from(offers.len()) {
-        heard.facts.offers.insert(heard.place, count);
+        context.facts.offers.insert(context.place, count);
     }
     let same = offers.chunk_by(|a, b| a == b).map(|same| {
         let times = if same.len() > 1 {
@@ -60,8 +60,8 @@ pub(crate) fn announced(heard: &mut SourceContext<'_>) {
     });
     let words = same.collect::<Vec<_>>().join(", ");
     if !words.is_empty() {
-        let (topic, quality) = (heard.stream.topic, heard.name(&words));
-        heard.observation(
+        let (topic, quality) = (context.stream.topic, context.name(&words));
+        context.observation(
             Observation::Quality(topic, quality),
             Confidence::Declared,
             || format!("offered as {words}"),

@@ -9,19 +9,19 @@ use crate::evidence::message::parameters::ParameterEvent;
 use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let event = ParameterEvent::read(payload)?;
     let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end(p.name)).collect();
     for (topic, publishes) in ends {
-        let (node, of) = (heard.name(event.node), heard.name(topic));
+        let (node, of) = (context.name(event.node), context.name(topic));
         let (word, observation) = if publishes {
             ("publisher", Observation::Publish(node, of))
         } else {
             ("subscription", Observation::Subscribe(node, of))
         };
-        heard.observation(observation, Confidence::Stated, || {
+        context.observation(observation, Confidence::Stated, || {
             format!("{} declares qos_overrides.{topic}.{word}", event.node)
         });
     }

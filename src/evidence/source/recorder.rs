@@ -14,14 +14,14 @@ const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"
 
 /// Recognises a recorder by the file of its log records, whatever its name.
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     let file = record.file.replace('\\', "/");
     if FILES.iter().any(|end| file.ends_with(end)) {
-        let node = heard.name(&record.logger);
-        heard.observation(Observation::Node(node), Confidence::Stated, || {
+        let node = context.name(&record.logger);
+        context.observation(Observation::Node(node), Confidence::Stated, || {
             format!("{} records: {}", record.logger, record.text)
         });
     }

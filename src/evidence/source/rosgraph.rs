@@ -122,33 +122,33 @@ const FORMS: [&[(&str, &str)]; 4] = [
 
 /// Reads a snapshot of the whole graph.
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let graph = parsed(heard, payload, "Graph", "nodes")?;
-    snapshot(heard, graph.list("nodes"), "");
+    let graph = parsed(context, payload, "Graph", "nodes")?;
+    snapshot(context, graph.list("nodes"), "");
     Ok(())
 }
 
 /// Reads a snapshot of one node.
 pub(crate) fn read_node(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let node = parsed(heard, payload, "Node", "publishers")?;
+    let node = parsed(context, payload, "Node", "publishers")?;
     let name = node.text("name").to_owned();
-    snapshot(heard, &[node], &name);
+    snapshot(context, &[node], &name);
     Ok(())
 }
 
 /// A message of this type, by the definition in the bag or the first form that uses the payload up, best exactly.
 fn parsed(
-    heard: &SourceContext<'_>,
+    context: &SourceContext<'_>,
     payload: &PayloadCursor<'_>,
     name: &str,
     field: &str,
 ) -> cursor::PayloadResult<MessageValue> {
-    let text = heard.stream.connection.definition.as_deref();
+    let text = context.stream.connection.definition.as_deref();
     // Some writers list the outermost fields only.
     let own = text.filter(|text| text.contains(field) && !text.contains("struct "));
     let own = own.map(MessageSchema::of_text);
@@ -193,9 +193,9 @@ struct SnapshotEnd<'a> {
 }
 
 /// Adds the observations of nodes in one snapshot; `of` distinguishes snapshots of single nodes.
-fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
-    let topic = heard.stream.connection.topic.shared();
-    let group = heard.name(format!("snapshot {topic} {of}").trim_end());
+fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
+    let topic = context.stream.connection.topic.shared();
+    let group = context.name(format!("snapshot {topic} {of}").trim_end());
     let now = |observation| Statement {
         observation,
         confidence: Confidence::Stated,
@@ -209,44 +209,44 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         }
         if name == UNKNOWN_NODE {
             for (_, topic, kind, _) in ends(node) {
-                let (of, kind) = (heard.name(&topic), heard.name(kind));
-                heard.say(now(Observation::Topic(of)), || {
+                let (of, kind) = (context.name(&topic), context.name(kind));
+                context.observe(now(Observation::Topic(of)), || {
                     format!("{topic} is in the graph")
                 });
-                heard.say(now(Observation::Type(of, kind)), String::new);
+                context.observe(now(Observation::Type(of, kind)), String::new);
             }
             continue;
         }
-        let id = heard.name(name);
-        heard.say(now(Observation::Node(id)), || {
+        let id = context.name(name);
+        context.observe(now(Observation::Node(id)), || {
             format!("{name} is in the graph{}", parameters(node))
         });
         if !seen.insert(name) {
             let twice = || format!("{name} is twice in the graph");
-            heard.observation(Observation::Duplicate(id), Confidence::Stated, twice);
+            context.observation(Observation::Duplicate(id), Confidence::Stated, twice);
         }
         for (is_sent, topic, kind, qos) in ends(node) {
-            let (of, kind) = (heard.name(&topic), heard.name(kind));
+            let (of, kind) = (context.name(&topic), context.name(kind));
             let (observation, verb) = if is_sent {
                 (Observation::Publish(id, of), "publishes")
             } else {
                 (Observation::Subscribe(id, of), "subscribes to")
             };
             let quality = qos.and_then(quality);
-            heard.say(now(observation), || {
+            context.observe(now(observation), || {
                 let quality = quality
                     .as_ref()
                     .map_or_else(String::new, |q| format!(" ({q})"));
                 format!("{name} {verb} {topic}{quality}")
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
-                let observation = Observation::Quality(of, heard.name(&quality));
-                heard.observation(observation, Confidence::Stated, || {
+                let observation = Observation::Quality(of, context.name(&quality));
+                context.observation(observation, Confidence::Stated, || {
                     format!("offered as {quality}")
                 });
             }
-            if !heard.facts.text(kind).is_empty() {
-                heard.say(now(Observation::Type(of, kind)), String::new);
+            if !context.facts.text(kind).is_empty() {
+                context.observe(now(Observation::Type(of, kind)), String::new);
             }
             let all = if is_sent { &mut offered } else { &mut asked };
             all.push(SnapshotEnd {
@@ -262,14 +262,14 @@ fn snapshot(heard: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         if let Some(Some(policy)) = policies.next()
             && policies.all(|p| p.is_some())
         {
-            let (topic, policy) = (heard.name(&end.topic), heard.name(policy));
+            let (topic, policy) = (context.name(&end.topic), context.name(policy));
             let observation = Observation::Starved(end.node, topic, policy);
-            heard.observation(observation, Confidence::Stated, || {
+            context.observation(observation, Confidence::Stated, || {
                 "no publisher offers what it asks for".to_owned()
             });
         }
     }
-    heard.observation(
+    context.observation(
         Observation::Snapshot(group),
         Confidence::Stated,
         String::new,
@@ -291,7 +291,7 @@ fn ends(node: &MessageValue) -> Vec<MessageEnd<'_>> {
         for service in node.list(field) {
             let kind = kind(service, "request_type");
             let kind = kind.strip_suffix("_Request").unwrap_or(kind);
-            // Every node has services of its parameters, which say nothing about this one.
+            // Every node has services of its parameters, which are no evidence about this one.
             let package = kind.split('/').next().unwrap_or_default();
             if !["rcl_interfaces", "type_description_interfaces"].contains(&package) {
                 all.push((is_sent, service.text("name").into(), kind, None));
@@ -387,7 +387,7 @@ fn parameters(node: &MessageValue) -> String {
     }
 }
 
-/// The policy by which a subscriber gets nothing: it asks for more than is offered (DDS 1.4, section 2.2.3). Policies
+/// The policy because of which a subscriber receives nothing: it requests more than is offered (DDS 1.4, section 2.2.3). Policies
 /// that are not known fit.
 fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static str> {
     let is =
@@ -398,7 +398,7 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
             Some(MessageValue::Number(number)) => *number,
             _ => None,
         };
-        // 0 and the largest number of seconds stand for no limit.
+        // 0 and the largest number of seconds mean no limit.
         let (sec, nanosec) = (part("sec")?, part("nanosec")?);
         Some(sec * 1_000_000_000 + nanosec).filter(|n| *n > 0 && sec < i128::from(i32::MAX))
     };
@@ -413,7 +413,7 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
     is_late.then_some("deadline")
 }
 
-/// Adds the subscribers that get nothing, and the names that are used twice.
+/// Adds the subscribers that receive nothing, and duplicate names.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.facts.list.clone() {
         let (what, kind) = match fact.observation {

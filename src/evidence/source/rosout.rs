@@ -16,7 +16,7 @@ use crate::evidence::observation::{
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let number = payload.u32()?;
@@ -36,22 +36,22 @@ pub(crate) fn read(
     if name.is_empty() {
         return Ok(());
     }
-    let node = heard.name(name);
-    heard.observation(Observation::Node(node), Confidence::Stated, || {
+    let node = context.name(name);
+    context.observation(Observation::Node(node), Confidence::Stated, || {
         format!("{name} logs: {message}")
     });
-    let log = heard.stream.topic;
-    if heard.stream.connection.topic.as_str() == "/rosout" {
+    let log = context.stream.topic;
+    if context.stream.connection.topic.as_str() == "/rosout" {
         if number <= FIRST_RECORD {
-            heard.observation(Observation::Begins(node), Confidence::Stated, || {
+            context.observation(Observation::Begins(node), Confidence::Stated, || {
                 format!("{name} logs its first record: {message}")
             });
         }
-        heard.observation(Observation::Publish(node, log), Confidence::Stated, || {
+        context.observation(Observation::Publish(node, log), Confidence::Stated, || {
             format!("{name} logs: {message}")
         });
-        if let Some(publisher) = heard.stream.publisher.filter(|p| *p != node) {
-            heard.observation(
+        if let Some(publisher) = context.stream.publisher.filter(|p| *p != node) {
+            context.observation(
                 Observation::Carries(publisher, node),
                 Confidence::Stated,
                 String::new,
@@ -59,13 +59,13 @@ pub(crate) fn read(
         }
     }
     if is_rospy(file) {
-        heard.facts.rospy.insert(node);
+        context.facts.rospy.insert(node);
     }
-    list(heard, (name, message), &topics);
+    list(context, (name, message), &topics);
     Ok(())
 }
 
-/// Takes the lists of nodes of roscpp for what they are: lists of publications.
+/// Interprets the lists of roscpp nodes as lists of publications.
 pub(crate) fn settle(facts: &mut Observations) {
     let rospy = std::mem::take(&mut facts.rospy);
     for fact in &mut facts.list {
@@ -89,14 +89,14 @@ fn is_rospy(file: &str) -> bool {
 
 /// Takes the list of topics in a log record of a node, with its text. It is whole: what is in an earlier one and not in
 /// this one is no longer the node's.
-fn list(heard: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[&str]) {
-    let node = heard.name(name);
-    let list = format!("topics of {}", heard.facts.text(node));
-    let list = heard.name(&list);
+fn list(context: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[&str]) {
+    let node = context.name(name);
+    let list = format!("topics of {}", context.facts.text(node));
+    let list = context.name(&list);
     for topic in topics {
         let words = || format!("{name} logs with {topic} in its list of topics: {message}");
-        let topic = heard.name(topic);
-        heard.say(
+        let topic = context.name(topic);
+        context.observe(
             Statement {
                 observation: Observation::Lists(node, topic),
                 confidence: Confidence::Stated,
@@ -105,7 +105,7 @@ fn list(heard: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[
             words,
         );
     }
-    heard.observation(Observation::Snapshot(list), Confidence::Stated, String::new);
+    context.observation(Observation::Snapshot(list), Confidence::Stated, String::new);
 }
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a

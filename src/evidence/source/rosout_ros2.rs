@@ -1,4 +1,4 @@
-//! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts count as the node.
+//! Log records of ROS 2: a node is alive. Dots represent slashes; the loggers of a node's parts count as the node.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.time()?;
@@ -24,9 +24,9 @@ pub(crate) fn read(
         return Ok(());
     }
     let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
-    let node = heard.name(&text);
-    let topic = heard.stream.topic;
-    heard.observation(Observation::Logger(node, topic), Confidence::Stated, || {
+    let node = context.name(&text);
+    let topic = context.stream.topic;
+    context.observation(Observation::Logger(node, topic), Confidence::Stated, || {
         format!("logger {name}: {message}")
     });
     Ok(())

@@ -1,4 +1,4 @@
-//! The choice that a mux reports on `<mux>/selected`: it subscribes to that topic, and passes it on from then on.
+//! The choice that a mux reports on `<mux>/selected`: it subscribes to that topic and forwards it from then on.
 
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
@@ -14,7 +14,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     if reports.is_empty() {
         return;
     }
-    let (_, shown) = known.facts.spoken.sorted();
+    let (_, shown) = known.facts.logged.sorted();
     for report in reports {
         let text = known.text(report);
         let node = known.facts.known(text.trim_end_matches(SELECTED));

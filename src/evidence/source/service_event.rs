@@ -17,14 +17,14 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let kind = payload.u8()?;
     payload.time()?;
     let client = payload.bytes(16)?;
     payload.i64()?;
-    let topic = heard.stream.connection.topic.shared();
+    let topic = context.stream.connection.topic.shared();
     let Some(service) = topic.strip_suffix("/_service_event") else {
         return Ok(());
     };
@@ -36,25 +36,25 @@ pub(crate) fn read(
         _ => return Err(payload.wrong("a kind of event")),
     };
     let client = cursor::hex(client);
-    let of = heard.stream.topic;
-    if let Some(node) = heard.stream.publisher
+    let of = context.stream.topic;
+    if let Some(node) = context.stream.publisher
         && !service.contains("/_action/")
     {
-        let kind = heard.stream.connection.type_name.clone();
-        let kind = heard.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
-        let called = heard.name(service);
+        let kind = context.stream.connection.type_name.clone();
+        let kind = context.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
+        let called = context.name(service);
         let end = match word {
             "request sent" | "reply received" => Observation::Publish(node, called),
             _ => Observation::Subscribe(node, called),
         };
-        heard.observation(end, Confidence::Measured, || format!("{service}: {word}"));
-        heard.observation(
+        context.observation(end, Confidence::Measured, || format!("{service}: {word}"));
+        context.observation(
             Observation::Type(called, kind),
             Confidence::Measured,
             String::new,
         );
     }
     let words = || format!("{service}: {word}, client {client}");
-    heard.observation(Observation::Topic(of), Confidence::Measured, words);
+    context.observation(Observation::Topic(of), Confidence::Measured, words);
     Ok(())
 }

@@ -6,7 +6,7 @@ use crate::evidence::message::parameters::ParameterEvent;
 use crate::evidence::observation::{Confidence, Observation};
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let event = ParameterEvent::read(payload)?;
@@ -14,13 +14,13 @@ pub(crate) fn read(
     let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {
         return Ok(());
     };
-    let (node, clock) = (heard.name(event.node), heard.name("/clock"));
+    let (node, clock) = (context.name(event.node), context.name("/clock"));
     let observation = if simulated {
         Observation::Subscribe(node, clock)
     } else {
         Observation::Unsubscribe(node, clock)
     };
-    heard.observation(observation, Confidence::Inferred, || {
+    context.observation(observation, Confidence::Inferred, || {
         let then = if simulated {
             ""
         } else {

@@ -21,7 +21,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 };
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     let topic = payload.string()?;
@@ -36,12 +36,12 @@ pub(crate) fn read(
     }
     payload.finish()?;
     let words = || format!("{publisher} → {topic} → {subscriber}: {delivered} messages delivered");
-    let of = heard.name(topic);
-    let mut end_of = |node: &str| (!node.is_empty()).then(|| heard.name(node));
+    let of = context.name(topic);
+    let mut end_of = |node: &str| (!node.is_empty()).then(|| context.name(node));
     let (from, to) = (end_of(publisher), end_of(subscriber));
     let count = |n: i32| u64::try_from(n).ok();
     let [period, jitter, _, age, _, oldest] = durations;
-    heard.measure(Measurement {
+    context.measure(Measurement {
         topic: Some(of),
         publisher: from,
         subscriber: to,
@@ -54,12 +54,12 @@ pub(crate) fn read(
         age_ns: Some(age).filter(|_| oldest != 0),
     });
     if !publisher.is_empty() {
-        let node = heard.name(publisher);
-        heard.observation(Observation::Publish(node, of), Confidence::Measured, words);
+        let node = context.name(publisher);
+        context.observation(Observation::Publish(node, of), Confidence::Measured, words);
     }
     if !subscriber.is_empty() {
-        let node = heard.name(subscriber);
-        heard.observation(
+        let node = context.name(subscriber);
+        context.observation(
             Observation::Subscribe(node, of),
             Confidence::Measured,
             words,

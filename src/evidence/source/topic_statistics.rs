@@ -31,7 +31,7 @@ const PUBLISHED_PERIOD: u8 = 0;
 const AGE: u8 = 2;
 
 pub(crate) fn read(
-    heard: &mut SourceContext<'_>,
+    context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
     payload.time()?;
@@ -46,13 +46,13 @@ pub(crate) fn read(
     }
     payload.finish()?;
     for (kind, node, topic, count, mean) in all {
-        let (name, of) = (heard.name(node), heard.name(topic));
+        let (name, of) = (context.name(node), context.name(topic));
         let (verb, observation) = match kind {
             PUBLISHED_PERIOD => ("publishes", Observation::Publish(name, of)),
             _ => ("receives", Observation::Subscribe(name, of)),
         };
         if kind == AGE && count > 0 {
-            heard.measure(Measurement {
+            context.measure(Measurement {
                 topic: Some(of),
                 publisher: None,
                 subscriber: Some(name),
@@ -71,7 +71,7 @@ pub(crate) fn read(
         } else {
             Confidence::Stated
         };
-        heard.observation(observation, confidence, || {
+        context.observation(observation, confidence, || {
             format!("{node} {verb} {topic}: {count} messages counted")
         });
     }

@@ -9,7 +9,7 @@ use crate::base::budget::LaunchWork;
 /// The longest text after substitution, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
 
-/// Stands for the part of an anonymous name that is new in every run; no name holds it.
+/// Replaces the part of an anonymous name that is new in every run; it occurs in no name.
 pub(crate) const ANONYMOUS: char = '*';
 
 /// The deepest nesting of substitutions; deeper ones are hostile.

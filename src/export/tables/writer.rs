@@ -100,7 +100,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// The number of bytes of encoded rows that it holds in memory.
+    /// The number of bytes of encoded rows in memory.
     pub(crate) fn held(&self) -> usize {
         match self {
             Self::Csv(_) => 0,
@@ -109,7 +109,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// Writes the rows that it holds in memory.
+    /// Writes the rows in memory.
     #[cfg_attr(
         not(feature = "parquet"),
         expect(

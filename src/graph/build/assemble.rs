@@ -65,7 +65,7 @@ pub(crate) fn graphs(
 }
 
 struct GraphAssembly<'a> {
-    /// What statistics and header stamps say.
+    /// Numbers from statistics and header stamps.
     measures: WindowMeasures,
     graphs: GraphsWriter,
     messages: Vec<u64>,

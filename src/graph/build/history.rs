@@ -37,7 +37,7 @@ pub(crate) struct History {
     pub(crate) doubled: Vec<NodeId>,
     /// Transitions of lifecycle states, sorted by time.
     pub(crate) transitions: Vec<Transition>,
-    /// Statements besides who is in the graph, by element.
+    /// Statements other than about which elements exist, by element.
     pub(crate) incidents: Vec<Incident>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
@@ -45,7 +45,7 @@ pub(crate) struct History {
     pub(crate) streams: BTreeMap<Name, Vec<usize>>,
 }
 
-/// A statement about an element besides its being there.
+/// A statement about an element other than that it exists.
 #[derive(Clone, Debug)]
 pub(crate) struct Incident {
     pub(crate) what: Element,
@@ -62,11 +62,11 @@ pub(crate) struct Record {
     pub(crate) confidence: Confidence,
     /// Its lives, in order, none overlapping.
     pub(crate) lives: Vec<Life>,
-    /// The state that it always has while it lives: declared or latched.
+    /// The state that it always has while it exists: declared or latched.
     fixed: Option<State>,
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
-    /// The times at which it was silent although it lived; `None` for a silence to the end.
+    /// The times at which it was silent although it existed; `None` for a silence to the end.
     silences: Vec<(Stamp, Option<Stamp>)>,
 }
 
@@ -90,7 +90,7 @@ impl Record {
         }
     }
 
-    /// The times at which it was silent although it lived; `None` for a silence to the end.
+    /// The times at which it was silent although it existed; `None` for a silence to the end.
     pub(crate) fn silences(&self) -> &[(Stamp, Option<Stamp>)] {
         &self.silences
     }
@@ -100,7 +100,7 @@ impl Record {
         self.lives.iter().map(|life| life.span)
     }
 
-    /// The state in a window where it lives, with messages of its own or without.
+    /// The state in a window in which it exists, with or without messages of its own.
     pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
         let covers = |(from, to): &(Stamp, Option<Stamp>)| {
             *from < window.start && to.is_none_or(|to| window.end <= to)

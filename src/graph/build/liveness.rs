@@ -73,7 +73,7 @@ impl Pulse {
         end.since(self.last) > self.patience()
     }
 
-    /// The longest silence that means nothing, in nanoseconds.
+    /// The longest insignificant silence, in nanoseconds.
     fn patience(&self) -> i64 {
         self.period
             .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
@@ -101,7 +101,7 @@ pub(crate) struct Liveness {
     /// The times at which something that is proved by it began, such as a rhythm.
     pub(crate) begins: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
-    pub(crate) heard: Option<Stamp>,
+    pub(crate) last_sign: Option<Stamp>,
     /// The rhythms of its messages.
     pub(crate) pulses: Vec<Pulse>,
     /// The first and the last moment of the recordings of its messages; `None` for the whole mission.
@@ -112,7 +112,7 @@ pub(crate) struct Liveness {
     pub(crate) speaks: bool,
     /// Whether there are more proofs than moments.
     pub(crate) lasts: bool,
-    /// Whether it lives to the end, regardless of its signs.
+    /// Whether it exists to the end, regardless of its signs.
     pub(crate) unending: bool,
     /// Whether it exists for the whole mission.
     pub(crate) extent: Extent,
@@ -130,7 +130,7 @@ impl Default for Liveness {
             counted: Vec::new(),
             ends: Vec::new(),
             begins: Vec::new(),
-            heard: None,
+            last_sign: None,
             pulses: Vec::new(),
             recording: None,
             senders: (0, 0),
@@ -168,7 +168,7 @@ impl Liveness {
         self.confidence = self.confidence.min(other.confidence);
         self.signs.extend(&other.signs);
         self.begins.extend(&other.begins);
-        self.heard = self.heard.max(other.heard);
+        self.last_sign = self.last_sign.max(other.last_sign);
         self.pulses.extend(&other.pulses);
         self.reach(other.recording);
         self.senders.0 += other.senders.0;
@@ -274,19 +274,19 @@ impl Liveness {
                 latest: mission,
             });
         }
-        let heard = self.heard.filter(|_| !self.unending)?;
-        let silence = mission.since(heard);
+        let last_sign = self.last_sign.filter(|_| !self.unending)?;
+        let silence = mission.since(last_sign);
         let broken = self.pulses.iter().filter(|p| {
-            // A rhythm that was over long before the last sign tells nothing of the silence after it.
-            let ends = heard.since(p.last) <= p.patience() && silence > p.patience();
+            // A rhythm that ended long before the last sign does not explain the silence after it.
+            let ends = last_sign.since(p.last) <= p.patience() && silence > p.patience();
             ends && (is_node || p.is_even)
         });
         let is_sure = !is_node || silence > GONE_NS || broken.clone().count() > 1;
         let fastest = broken.min_by_key(|p| p.period).filter(|_| is_sure)?;
         Some(Bound {
-            time: heard,
-            earliest: fastest.last.min(heard),
-            latest: heard.plus(fastest.period.max(SHUTDOWN_NS)).min(mission),
+            time: last_sign,
+            earliest: fastest.last.min(last_sign),
+            latest: last_sign.plus(fastest.period.max(SHUTDOWN_NS)).min(mission),
         })
     }
 
@@ -391,7 +391,7 @@ impl Lifetime {
         }
     }
 
-    /// Ends the life by a proof.
+    /// Ends the life because of a proof.
     fn close(&mut self, end: Stamp) {
         let last = self.to;
         self.to = end.max(last);

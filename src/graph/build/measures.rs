@@ -1,4 +1,4 @@
-//! Further numbers of windows: what statistics count and measure, and the ages of messages by their header stamps.
+//! Further numbers of windows: counts and measurements from statistics, and the ages of messages by their header stamps.
 
 use std::collections::BTreeMap;
 use std::io;

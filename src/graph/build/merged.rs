@@ -35,7 +35,7 @@ pub(crate) fn fall_silent(
             let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
             if let Some(pulse) = pulse {
                 track.signs.push(pulse.last());
-                track.heard = track.heard.max(Some(pulse.last()));
+                track.last_sign = track.last_sign.max(Some(pulse.last()));
                 track.pulses.push(pulse);
             }
         }
@@ -53,7 +53,7 @@ fn publishers(tracks: &BTreeMap<ElementKey, Liveness>) -> BTreeMap<Name, Vec<Nam
     all
 }
 
-/// The sender that stands for all senders of a merged topic, unless messages are latched.
+/// The sender that represents all senders of a merged topic, unless messages are latched.
 fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
     let of = traffic.get(&topic)?;
     let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;

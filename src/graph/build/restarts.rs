@@ -87,7 +87,7 @@ fn around(times: &[Stamp], gap: (Stamp, Stamp)) -> Option<(Stamp, Stamp)> {
     Some((*times.get(next.checked_sub(1)?)?, *times.get(next)?))
 }
 
-/// The messages, by stream and time, whose numbers would tell more restarts, and which were not read.
+/// The unread messages, by stream and time, that could reveal more restarts by their numbers.
 pub(crate) fn unread(
     recorded: &Recorded,
     findings: &Findings,
@@ -122,7 +122,7 @@ pub(crate) fn unread(
     Ok(asked)
 }
 
-/// Finds the restarts of all nodes, but of those that several recordings show at the same time.
+/// Finds the restarts of all nodes, except those that several recordings show at the same time.
 pub(crate) fn restarts(
     recorded: &Recorded,
     findings: &Findings,
@@ -205,7 +205,7 @@ struct Fall {
 }
 
 impl Fall {
-    /// What it has in common with those of copies: messages of another stream that are passed on with their headers, whose
+    /// What it has in common with those of copies: messages of another stream that are forwarded with their headers, whose
     /// numbers prove nothing of the node that passes them on.
     fn header(&self) -> (u64, u32, &str) {
         (self.first.stamp, self.first.number, &self.kind)

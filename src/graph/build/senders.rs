@@ -21,7 +21,7 @@ pub(crate) type Traffic = BTreeMap<Name, Senders>;
 pub(crate) struct Senders {
     /// The places of the topic's streams.
     pub(crate) streams: Vec<usize>,
-    /// The first and the last message of each stream; `None` if it has none.
+    /// The first and the last message of each stream; `None` without messages.
     pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
     /// The messages of each sender: first the unknown ones together, then the known ones, sorted.
     pub(crate) list: Vec<Sender>,
@@ -73,7 +73,7 @@ fn senders(
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
     let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
-    let (of, mut heard) = places(&of_topic, recordings);
+    let (of, mut received) = places(&of_topic, recordings);
     let mut pauses = LongestPauses::default();
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
@@ -82,12 +82,12 @@ fn senders(
         let trace = &mut traces[timed.series];
         *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
         pauses.add(timed.time);
-        heard[of[timed.series]].add(timed.time);
+        received[of[timed.series]].add(timed.time);
     })?;
     Ok(Senders {
         streams,
         traces,
-        list: heard.into_iter().map(SenderTimes::into_sender).collect(),
+        list: received.into_iter().map(SenderTimes::into_sender).collect(),
         of,
         pauses: pauses.spans(),
     })
@@ -160,7 +160,7 @@ fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Ve
         .iter()
         .map(|stream| places[&sender(stream)])
         .collect();
-    let heard = latched
+    let received = latched
         .iter()
         .map(|(node, (latched, recording))| SenderTimes {
             node: *node,
@@ -170,5 +170,5 @@ fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Ve
             every: 1,
             passed: 0,
         });
-    (places, heard.collect())
+    (places, received.collect())
 }

@@ -20,7 +20,7 @@ pub(crate) fn settle(
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
-    // What lives as long as its node tells its topic of itself, and nothing of the node.
+    // An element that exists as long as its node is evidence of its topic, but not of the node.
     let followers: BTreeSet<ElementKey> = inferences
         .iter()
         .filter(|inference| matches!(inference.when, Validity::Like(ElementKey::Node(_))))
@@ -47,7 +47,7 @@ pub(crate) fn settle(
             .or_default()
             .know(track);
     }
-    // Whose last connection was closed, and who was not heard of again, is gone.
+    // A node is gone if its last connection was closed and it gave no later sign.
     for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
         if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))

@@ -4,7 +4,7 @@ use crate::base::rhythm::{EVEN, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
 use crate::base::time::Stamp;
 use crate::graph::history::Stretch;
 
-/// The number of intervals on each side of a gap that show the usual one.
+/// The number of intervals on each side of a gap from which the usual one is taken.
 const AROUND: usize = 9;
 /// The most pieces of a run that are searched for changes of rate; intervals of longer ones are summed up first.
 const PIECES: usize = 2048;

@@ -77,7 +77,7 @@ pub(crate) fn tracks(
                     track.counted.extend(signs.first());
                 }
                 if SOURCES.get(inference.source).is_some_and(|s| s.own) {
-                    track.heard = track.heard.max(signs.last().copied());
+                    track.last_sign = track.last_sign.max(signs.last().copied());
                     track.speaks = true;
                 }
             }
@@ -103,7 +103,7 @@ pub(crate) fn tracks(
     Ok(tracks)
 }
 
-/// The publications, as node and topic, that pass on the messages of others and that end with these: their end shows
+/// The publications, as node and topic, that forward the messages of others and end with these: their end shows
 /// nothing of the node.
 fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
     let last = |topic: &Name, node: Option<Name>| {
@@ -167,7 +167,7 @@ fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
     sent.collect()
 }
 
-/// Whether a proof still holds after its last sign.
+/// Whether a proof is still valid after its last sign.
 fn lasts(when: &Validity) -> bool {
     !matches!(when, Validity::Moments(_) | Validity::Like(_))
 }
@@ -184,7 +184,7 @@ const LATCHED: u64 = 20;
 
 /// Facts about a stream that is followed.
 struct Followed<'a> {
-    /// Whether it is followed for a topic whose senders are known: the topic lives as long as its publications.
+    /// Whether it belongs to a topic with known senders: the topic exists as long as its publications.
     known: bool,
     /// Whether its rhythm shows that its sender exists, which has no log records.
     beats: bool,
@@ -212,7 +212,7 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
     if what.beats && (latched || begins_steadily(&sender.stretches)) {
         track.begins.push(first);
     }
-    track.heard = track.heard.max(Some(last));
+    track.last_sign = track.last_sign.max(Some(last));
     track.reach(Some(sender.recording));
     let pulse = Pulse::of(&sender.stretches, what.restarts);
     track

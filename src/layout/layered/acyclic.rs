@@ -21,7 +21,7 @@ pub(crate) fn in_order(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     reversed
 }
 
-/// Whether a path leads from `start` to `goal`; `seen` holds the round in which an item was last met.
+/// Whether a path leads from `start` to `goal`; `seen` contains the round in which an item was last met.
 fn reaches(
     after: &[Vec<usize>],
     start: usize,

@@ -115,7 +115,7 @@ impl<'a> CrossingReducer<'a> {
         }
     }
 
-    /// Begins anew, sorted by these keys.
+    /// Starts over, sorted by these keys.
     pub(crate) fn restart(&mut self, key: &[f64]) {
         self.items.clone_from(&self.begin);
         self.key = key.to_vec();
@@ -223,7 +223,7 @@ impl<'a> CrossingReducer<'a> {
         }
     }
 
-    /// Sorts the units that stand directly in one cluster by key, and the inside of those that are clusters themselves.
+    /// Sorts the units that are directly in one cluster by key, and the inside of those that are clusters themselves.
     /// Returns whether anything moved.
     fn sort(&mut self, range: Range<usize>) -> bool {
         let mut has_moved = false;
@@ -353,7 +353,7 @@ impl<'a> CrossingReducer<'a> {
             before = Some(start..end);
             if let Some(left) = left {
                 self.items[left.start..end].rotate_left(left.len());
-                // The left unit now stands behind this one and may move on.
+                // The left unit is now behind this one and may move on.
                 before = Some(left.start + extent..end);
                 better = true;
             }

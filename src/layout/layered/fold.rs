@@ -1,4 +1,4 @@
-//! Folds crowded layers: where few subscribers are known, most nodes would stand in one layer and most topics in the
+//! Folds crowded layers: where few subscribers are known, most nodes would be in one layer and most topics in the
 //! next; sources move to later layers, more of them if that suits the page.
 
 use super::rank::neighbours;

@@ -17,7 +17,7 @@ const EFFORT: u64 = 20_000_000;
 /// The number of cells in which edges may be noted, over all edges; the longest are then not avoided. Long edges of a
 /// drawing with tens of thousands of boxes in a column pass through thousands each.
 const CELLS: usize = 2_000_000;
-/// The room between a label and its edge, if it stands beside.
+/// The room between an edge and a label beside it.
 const ASIDE: f64 = 2.0;
 /// The cost of a label that hides most of its own edge.
 const HIDING: f64 = 4.0;
@@ -80,7 +80,7 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
     }
 }
 
-/// Moves and grows the whole where a label stands outside of it.
+/// Moves and enlarges the whole where a label is outside of it.
 pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
     let before = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
     let whole = layout
@@ -321,7 +321,7 @@ mod tests {
         let mut layout = layout(Orientation::TopBottom, Point::new(0.0, 160.0), routes);
         place(&crowded, &mut layout);
         assert_eq!(layout.routes[0].label, None);
-        // Without its neighbours it stands beside the line, and the whole grows where that needs room.
+        // Without its neighbours it is beside the line, and the whole is enlarged where that needs room.
         let alone = plan(vec![labelled(70.0, 50.0)]);
         layout.routes.truncate(1);
         place(&alone, &mut layout);

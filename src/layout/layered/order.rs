@@ -16,7 +16,7 @@ pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
     Search::new(layers, effort).finished()
 }
 
-/// A search for an order with few crossings. Its effort counts edges swept: the search begins anew, then shakes the
+/// A search for an order with few crossings. Its effort counts edges swept: the search starts over, then shakes the
 /// best order, until that is spent.
 pub(crate) struct Search<'a> {
     pub(crate) layers: &'a Layers,

@@ -11,7 +11,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
     for i in plan.valid_links() {
         groups.join(plan.links[i].from, plan.links[i].to);
     }
-    // A second look at links alone tells the pieces within a part.
+    // A second pass over the links alone finds the pieces within a part.
     let mut pieces = groups.clone();
     for (v, vertex) in plan.vertices.iter().enumerate() {
         if let Some(cluster) = vertex.cluster {

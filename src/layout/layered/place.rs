@@ -39,7 +39,7 @@ struct Table<'a> {
     first: Vec<(usize, usize)>,
     /// The neighbours of all items by their places in `items`, with the weight with which they pull.
     pulls: Vec<(usize, f64)>,
-    /// The distance of each item from the first of those that it is placed with, if they stand as near as they may.
+    /// The distance of each item from the first of those that it is placed with, if they are as close as allowed.
     offset: Vec<f64>,
     /// The middle of each item across.
     across: Vec<f64>,
@@ -236,7 +236,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Places the items anew between the borders, which stay.
+    /// Places the items again between the borders, which stay.
     fn inside_borders(&mut self) {
         let mut stretches = Vec::new();
         for rank in 0..self.start.len() - 1 {

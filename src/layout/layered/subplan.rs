@@ -83,7 +83,7 @@ impl Subplan {
 }
 
 impl PlacedPart {
-    /// A part in which nothing has a place yet.
+    /// A part without any placement yet.
     pub(crate) fn unplaced(part: &Component) -> Self {
         Self {
             boxes: vec![Rect::default(); part.vertices.len()],
@@ -95,7 +95,7 @@ impl PlacedPart {
 }
 
 impl Component {
-    /// All of it as a plan of its own.
+    /// All of it as a separate plan.
     pub(crate) fn plan(&self, whole: &Plan) -> Plan {
         Subplan::new(whole, self, 0, |_| true).plan
     }

@@ -46,7 +46,7 @@ pub(crate) fn wraps(
             continue;
         };
         let block = block.on_page(orientation);
-        // More rows make it narrower and higher: past the best there is nothing to find.
+        // More rows make it narrower and higher: beyond the best number, the search can stop.
         if found.last().is_some_and(|last| fit(last) >= fit(&block)) {
             break;
         }

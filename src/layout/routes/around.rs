@@ -1,4 +1,4 @@
-//! Routes between boxes that stand anywhere: straight where nothing is in the way, else around the corners of boxes.
+//! Routes between boxes at arbitrary places: straight where nothing is in the way, else around the corners of boxes.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -217,7 +217,7 @@ impl Map {
         }
     }
 
-    /// A route from one box to another around whatever stands between; its first and its last point between the boxes
+    /// A route from one box to another around whatever lies between; its first and its last point between the boxes
     /// lie on level lanes and may move along them. `None` if a way is blocked.
     pub(crate) fn via(&mut self, from: End, to: End, points: &[Point]) -> Option<Route> {
         let [first, between @ .., last] = points else {

@@ -1,4 +1,4 @@
-//! The log of a mission of which only the windows are known: each change belongs to its window.
+//! The log of a mission with known windows only: each change belongs to its window.
 
 use std::collections::BTreeMap;
 

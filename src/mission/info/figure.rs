@@ -54,8 +54,8 @@ fn map(mission: &Mission) -> Option<FigureInfo> {
         node.is_some_and(|n| !n.is_tool())
     };
     let sent: BTreeSet<u32> = ends(&elements.publishes, &is_shown);
-    let heard: BTreeSet<u32> = ends(&elements.subscribes, &is_shown);
-    let both = sent.intersection(&heard).filter(|topic| {
+    let subscribed: BTreeSet<u32> = ends(&elements.subscribes, &is_shown);
+    let both = sent.intersection(&subscribed).filter(|topic| {
         let topic = elements.topics.get(**topic as usize);
         topic.is_some_and(|t| !is_quiet(t.name.as_str()))
     });

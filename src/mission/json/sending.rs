@@ -54,7 +54,7 @@ struct PausesJson<'a> {
     spans: Vec<[i64; 2]>,
 }
 
-/// The senders by topic and node; `None` stands for all unknown ones.
+/// The senders by topic and node; `None` means all unknown ones.
 pub(super) fn senders(sending: &Sending) -> BTreeMap<(TopicId, Option<NodeId>), &Sender> {
     let senders = sending.senders.iter();
     senders.map(|one| ((one.topic, one.node), one)).collect()

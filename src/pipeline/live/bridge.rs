@@ -93,7 +93,7 @@ impl Bridge<'_> {
             }
             is_new |= self.renew()?;
             // Several messages describe one graph, which is written after all of them. A server that has just started
-            // knows no node for a while.
+            // does not know any nodes for a while.
             let is_known = !self.watched.graph.is_empty() || begun.elapsed() >= WAIT;
             if is_known && beat.elapsed() >= if is_new { BEAT / 10 } else { BEAT } {
                 self.watched.beat()?;

@@ -32,7 +32,7 @@ struct Run {
 }
 
 impl Drawn {
-    /// The group of `tree` on a page of `page` pixels, `scale` times as large as it says.
+    /// The group of `tree` on a page of `page` pixels, `scale` times as large as its own size.
     pub(super) fn new(tree: Tree, scale: f64, page: (u32, u32)) -> Self {
         match GroupPixels::of(&tree, scale, page) {
             Some(pixels) => Self::Pixels(pixels),
@@ -91,7 +91,7 @@ impl GroupPixels {
         ))
     }
 
-    /// The pixels of `map` that are not clear; its corner stands at this column and row of a page `across` pixels wide.
+    /// The pixels of `map` that are not clear; its corner is at this column and row of a page `across` pixels wide.
     fn inked(map: &Pixmap, (left, top): (usize, usize), across: usize) -> Self {
         let (mut runs, mut rgba) = (Vec::new(), Vec::new());
         let rows = map.data().chunks_exact(map.width() as usize * 4);

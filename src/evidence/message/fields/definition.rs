@@ -22,7 +22,7 @@ pub(crate) enum Array {
     /// An array of this length.
     Fixed(usize),
     /// An array whose length is in the payload.
-    Told,
+    Dynamic,
 }
 
 impl fmt::Display for Array {
@@ -30,7 +30,7 @@ impl fmt::Display for Array {
         match self {
             Self::No => Ok(()),
             Self::Fixed(length) => write!(f, "[{length}]"),
-            Self::Told => f.write_str("[]"),
+            Self::Dynamic => f.write_str("[]"),
         }
     }
 }
@@ -184,7 +184,7 @@ fn field(line: &str) -> Result<Option<Field>, String> {
 fn length(array: &str) -> Result<Array, String> {
     match array.strip_prefix('[').and_then(|a| a.strip_suffix(']')) {
         None if array.is_empty() => Ok(Array::No),
-        Some(inner) if inner.is_empty() || inner.starts_with("<=") => Ok(Array::Told),
+        Some(inner) if inner.is_empty() || inner.starts_with("<=") => Ok(Array::Dynamic),
         Some(inner) => inner
             .parse()
             .map(Array::Fixed)

@@ -148,7 +148,7 @@ fn kind<'t, 'a>(
             let ([">", rest @ ..] | [",", _, ">", rest @ ..]) = rest else {
                 return Err(unexpected(tokens));
             };
-            return Ok((array_of(inner, Array::Told)?, rest));
+            return Ok((array_of(inner, Array::Dynamic)?, rest));
         }
         [text @ ("string" | "wstring"), "<", _, ">", rest @ ..] => return Ok((plain(text), rest)),
         _ => {}

@@ -1,4 +1,4 @@
-//! Rows in which clusters stand like words in brackets, from their top borders to their bottom borders.
+//! Rows in which clusters are like words in brackets, from their top borders to their bottom borders.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What is kept of rows beside what they give anew, and the counts that swaps rest on.
+//! The cached values of rows beside freshly computed ones, and the counts that swaps are based on.
 
 use super::*;
 use crate::layout::layers::{Lane, cut};
@@ -56,7 +56,7 @@ fn cached_rows_equal_recomputed_ones() {
             kept.transpose();
             let rows = kept.rows(kept.items());
             assert_eq!(kept.crossings(), counted(&layers, &rows));
-            // All swaps of a fresh start are none where a settled row says so.
+            // A settled row stops the swaps of a fresh start.
             let settled = kept.is_settled.clone();
             kept.is_settled.fill(false);
             (0..layers.ranks).for_each(|rank| kept.changed(rank));
