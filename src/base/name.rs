@@ -110,14 +110,21 @@ pub fn is_recorder(node: &str) -> bool {
 
 /// A name in a namespace, unless that is empty or the name lies in it already.
 pub(crate) fn in_space<'a>(space: &str, name: &'a str) -> Cow<'a, str> {
-    let is_inside = || {
-        name.strip_prefix(space)
-            .is_some_and(|rest| rest.starts_with('/'))
-    };
-    if space.is_empty() || is_inside() {
+    if space.is_empty() || lies_in(name, space) {
         return Cow::Borrowed(name);
     }
     Cow::Owned(format!("{space}/{}", name.trim_start_matches('/')))
+}
+
+/// Whether a name lies inside a namespace, which is written without a slash at its end.
+pub(crate) fn lies_in(name: &str, space: &str) -> bool {
+    let rest = name.strip_prefix(space);
+    rest.is_some_and(|rest| rest.starts_with('/'))
+}
+
+/// As [`lies_in`], or the namespace's own name.
+pub(crate) fn is_within(name: &str, space: &str) -> bool {
+    name == space || lies_in(name, space)
 }
 
 /// Whether a node or topic is hidden by default: log, clock, parameters, statistics, recorder events.

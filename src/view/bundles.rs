@@ -7,6 +7,7 @@ use super::group::Groups;
 use super::names::is_plumbing;
 use super::select::Selection;
 use super::{AlsoHere, Item, Namespace, Showing, ViewOptions};
+use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
 use crate::graph::{Elements, NodeId, Topic};
@@ -161,10 +162,7 @@ pub(super) fn also_here(
     let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();
     let shown = shown.into_iter().map(Some).chain(std::iter::repeat(None));
     for (item, shown) in items.into_iter().zip(shown) {
-        let is_around = |space: &Namespace| {
-            let rest = item.name.strip_prefix(&*space.name);
-            rest.is_some_and(|rest| rest.starts_with('/'))
-        };
+        let is_around = |space: &Namespace| lies_in(&item.name, &space.name);
         // Children come after their parents.
         let cluster = namespaces.iter().rposition(is_around);
         let also = also.entry(cluster).or_default();

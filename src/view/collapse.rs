@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Item, ItemKind, View, ViewOptions};
-use crate::base::name::namespace;
+use crate::base::name::{lies_in, namespace};
 use crate::graph::Element;
 use crate::mission::Mission;
 
@@ -49,10 +49,7 @@ impl<'a> Collapse<'a> {
         }
         let is_rest = |space: &str| {
             let mut open = self.expand.iter();
-            open.any(|name| {
-                name.strip_prefix(space)
-                    .is_some_and(|rest| rest.starts_with('/'))
-            })
+            open.any(|name| lies_in(name, space))
         };
         let single = folded
             .into_iter()
@@ -123,11 +120,8 @@ pub(crate) fn changed(mission: &Mission) -> BTreeMap<&str, usize> {
 impl View {
     /// The boxes inside a namespace that hold one of these elements.
     pub(crate) fn holding(&self, reported: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
-        let is_inside = |name: &str| {
-            let rest = name.strip_prefix(space);
-            rest.is_some_and(|rest| rest.starts_with('/'))
-        };
-        let inside = self.items.iter().filter(|item| is_inside(&item.name));
+        let items = self.items.iter();
+        let inside = items.filter(|item| lies_in(&item.name, space));
         let changes = |item: &&Item| item.members.iter().any(|member| reported.contains(member));
         let open = inside.filter(|item| item.kind != ItemKind::Namespace);
         open.filter(changes)

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Frame, Mark, SeenWindow, Shown, View};
+use crate::base::name::lies_in;
 use crate::graph::Element;
 use crate::mission::Mission;
 use crate::mission::event_log::{EventId, Kind};
@@ -90,13 +91,9 @@ fn largest(
 
 /// The namespaces with a frame around a name, the outermost first.
 fn around(view: &View, name: &str) -> Vec<usize> {
-    let is_around = |space: &str| {
-        let rest = name.strip_prefix(space);
-        rest.is_some_and(|rest| rest.starts_with('/'))
-    };
     let spaces = view.namespaces.iter().enumerate();
     spaces
-        .filter(|(_, space)| is_around(&space.name))
+        .filter(|(_, space)| lies_in(name, &space.name))
         .map(|(at, _)| at)
         .collect()
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::ViewOptions;
 use crate::base::error::Error;
-use crate::base::name::namespace;
+use crate::base::name::{is_within, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
@@ -42,7 +42,10 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
     let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
     let both: Vec<&str> = nodes.iter().chain(&topics).copied().collect();
     let without = |spaces: &[Arc<str>]| -> Vec<String> {
-        let is_used = |space: &&Arc<str>| both.iter().any(|name| within(name, space));
+        let is_used = |space: &&Arc<str>| {
+            both.iter()
+                .any(|name| is_within(name, space.trim_end_matches('/')))
+        };
         let unused = spaces.iter().filter(|space| !is_used(space));
         unused.map(ToString::to_string).collect()
     };
@@ -73,13 +76,6 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
         }
     }
     notices
-}
-
-/// Whether a name lies in a namespace, or is it.
-fn within(name: &str, space: &str) -> bool {
-    let space = space.trim_end_matches('/');
-    let rest = name.strip_prefix(space);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 fn among(names: usize) -> String {

@@ -8,8 +8,8 @@ use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
 use super::ViewOptions;
-use crate::base::name::namespace;
-use crate::graph::{Edge, Element, Elements};
+use crate::base::name::{is_within, namespace};
+use crate::graph::{Element, Elements};
 
 /// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
@@ -186,12 +186,6 @@ impl ViewOptions {
     }
 }
 
-/// Whether a name is a namespace's own or lies inside it.
-fn within(name: &str, space: &str) -> bool {
-    let rest = name.strip_prefix(space);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-}
-
 fn names(elements: &Elements) -> impl Iterator<Item = (&str, Element)> {
     let nodes = elements.nodes.iter().zip(0..);
     let topics = elements.topics.iter().zip(0..);
@@ -233,11 +227,14 @@ fn described(elements: &Elements) -> Vec<(&str, u64)> {
             all.push((space, hash(&(kind, seen(name, space)))));
         }
     }
-    let publishes = elements.publishes.iter().map(|e| (e, '>'));
-    let subscribes = elements.subscribes.iter().map(|e| (e, '<'));
-    for (edge, sign) in publishes.chain(subscribes) {
-        let Some((node, topic)) = ends(elements, edge) else {
+    for (what, _) in elements.edges() {
+        let (Some(node), Some(topic)) = elements.names(what) else {
             continue;
+        };
+        let sign = if matches!(what, Element::Publish(_)) {
+            '>'
+        } else {
+            '<'
         };
         let spaces = [space_of(node), space_of(topic)];
         let second = spaces[1].filter(|space| spaces[0] != Some(space));
@@ -260,7 +257,7 @@ enum Seen<'a> {
 
 fn seen<'a>(name: &'a str, space: &str) -> Seen<'a> {
     match name.strip_prefix(space) {
-        Some(rest) if within(name, space) => return Seen::Own(rest),
+        Some(rest) if is_within(name, space) => return Seen::Own(rest),
         _ => {}
     }
     match space_of(name) {
@@ -285,13 +282,12 @@ fn single_names(elements: &Elements) -> BTreeSet<&str> {
 
 /// The pairs of namespaces with the same index that an edge links.
 fn partners(elements: &Elements) -> Vec<(&str, &str)> {
-    let edges = elements.publishes.iter().chain(&elements.subscribes);
-    let pair = |edge: &Edge| {
-        let (node, topic) = ends(elements, edge)?;
-        let (a, b) = (space_of(node)?, space_of(topic)?);
+    let pair = |(what, _)| {
+        let (node, topic) = elements.names(what);
+        let (a, b) = (space_of(node?)?, space_of(topic?)?);
         (a != b && index(a) == index(b)).then_some((a, b))
     };
-    edges.filter_map(pair).collect()
+    elements.edges().filter_map(pair).collect()
 }
 
 /// Drops fleets of which a member is linked to one of the same index that is in no fleet, and those linked to them:
@@ -327,12 +323,6 @@ fn hash(what: &impl Hash) -> u64 {
     let mut hasher = DefaultHasher::new();
     what.hash(&mut hasher);
     hasher.finish()
-}
-
-fn ends<'a>(elements: &'a Elements, edge: &Edge) -> Option<(&'a str, &'a str)> {
-    let node = elements.nodes.get(edge.node as usize)?;
-    let topic = elements.topics.get(edge.topic as usize)?;
-    Some((node.name.as_str(), topic.name.as_str()))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::base::name::lies_in;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::picture::PageOptions;
@@ -10,10 +11,7 @@ use crate::pipeline::Drawing;
 /// The collapsed namespaces as text, each with the number of changing elements kept outside.
 pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
     let reported = |name: &Arc<str>| {
-        let inside = |other: &&Arc<str>| {
-            let rest = other.strip_prefix(&**name);
-            rest.is_some_and(|rest| rest.starts_with('/'))
-        };
+        let inside = |other: &&Arc<str>| lies_in(other, name);
         let words = match kept.iter().filter(inside).count() {
             0 => name.to_string(),
             many => format!("{name} but for {} in it", words::count(many, "node")),
