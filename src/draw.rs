@@ -1,4 +1,4 @@
-//! Drawings as values: style, measured text and the scene of each window; painters stand in `paint`.
+//! Drawings as values: style, measured text and the scene of each window; painters are in `paint`.
 
 pub(crate) mod board;
 pub(crate) mod figure;

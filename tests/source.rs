@@ -292,8 +292,8 @@ fn the_code_as_of_the_recording_is_read_from_git() {
     let said = String::from_utf8_lossy(&inside.stderr).into_owned();
     assert!(said.contains("code of 2023-12-24 ("), "{said}");
     for (commit, says) in [
-        ("nowhere", "git knows no commit `nowhere`"),
-        ("--output=x", "git knows no commit"),
+        ("nowhere", "git has no commit `nowhere`"),
+        ("--output=x", "git has no commit"),
     ] {
         let at = format!("--source-at={commit}");
         let refused = bagreel(folder.path(), &["info", "run.mcap", "--source", "ws", &at]);
@@ -445,7 +445,7 @@ fn a_git_file_must_be_referenced_by_its_repository() {
     let partial = [&partial[..], &[&url, "partial"]].concat();
     assert!(git(folder.path(), &partial));
     let said = read("partial");
-    assert!(said.contains("does not hold all files of commit"), "{said}");
+    assert!(said.contains("does not have all files of commit"), "{said}");
     // Refers to the repository of another folder.
     for way in ["file", "link"] {
         let foreign = folder.path().join(way);
@@ -529,7 +529,7 @@ fn reasons_against_a_declaration_are_reported() {
     );
     for (nodes, code, says) in [
         (&["/other"][..], &logging, "its node would have logged"),
-        (&[], &many, "several places can be meant"),
+        (&[], &many, "several places match"),
         (&[], &few, "most of its node's topics are not in the bag"),
     ] {
         let folder = folder(

@@ -220,7 +220,7 @@ def figure(
     source_at: str | None = None,
     infer: str | None = None,
 ) -> Rendered:
-    """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of who talks to whom, or the
+    """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of publishers and subscribers, or the
     reconfigurations one by one, as wide as `width` says (88mm).
     """
     offset, ns, topology = list(offset), list(ns), list(topology)
@@ -301,7 +301,7 @@ def baseline(
     roles: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
 ) -> str:
-    """The expectation that holds in all of these healthy runs, a bag each, as YAML; also written to `output`, if given."""
+    """The expectations that all of these healthy runs (one bag each) meet, as YAML; also written to `output`, if given."""
     topology = list(topology)
     _, text = run("baseline", bags, output="-", **given(locals(), "bags", "output"))
     if output is not None:
@@ -371,7 +371,7 @@ def extract(
 ) -> Path:
     """Writes a table with a row per message, or with `fields` a folder with a table per topic; returns its path.
 
-    In a folder the table `index` says which file holds which topic.
+    In a folder, the table `index` lists which file contains which topic.
     """
     msg_path = list(msg_path)
     run("extract", bags, **given(locals(), "bags"))

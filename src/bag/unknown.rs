@@ -9,7 +9,7 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     let (looks_like, hint) = if folder {
         (
             "a folder without a recording",
-            "name a `.bag`, `.db3` or `.mcap` file, or the folder that holds `metadata.yaml`",
+            "name a `.bag`, `.db3` or `.mcap` file, or the folder that contains `metadata.yaml`",
         )
     } else {
         guess(head)
@@ -83,7 +83,7 @@ fn guess(head: &[u8]) -> (&'static str, &'static str) {
     found.map_or(
         (
             "of another kind",
-            "bags are ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, and folders that hold `metadata.yaml`",
+            "bags are ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, and folders that contain `metadata.yaml`",
         ),
         |(_, what, hint)| (*what, *hint),
     )

@@ -157,7 +157,7 @@ fn io_hint(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::NotFound => "check the spelling of the path",
         io::ErrorKind::PermissionDenied => "check its permissions",
-        io::ErrorKind::StorageFull => "make room or write elsewhere with `-o`",
+        io::ErrorKind::StorageFull => "free some space or write elsewhere with `-o`",
         _ => "",
     }
 }
@@ -187,7 +187,7 @@ impl fmt::Display for Error {
             Self::Unsupported { path, what, .. } => {
                 write!(f, "`{}` cannot be read: {what}", path.display())
             }
-            Self::NoMessages { path, .. } => write!(f, "`{}` holds no messages", path.display()),
+            Self::NoMessages { path, .. } => write!(f, "`{}` contains no messages", path.display()),
             Self::BadFile {
                 path, line, reason, ..
             } => match line {

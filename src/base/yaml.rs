@@ -78,10 +78,13 @@ impl From<Location> for YamlPlace {
 
 /// The parser's messages and what a user can do about them. Messages about Rust or parser options are never shown.
 const MISTAKES: [(&str, &str); 12] = [
-    ("budget", "it holds too many values, or nests them too deep"),
+    (
+        "budget",
+        "it contains too many values, or nests them too deep",
+    ),
     (
         "tabs disallowed",
-        "a tab indents the line; YAML takes spaces only",
+        "a tab indents the line; YAML only allows spaces",
     ),
     (
         "did not find expected key",
@@ -101,7 +104,7 @@ const MISTAKES: [(&str, &str); 12] = [
     ),
     (
         "mapping values are not allowed",
-        "a key too many in one line, or wrong indentation; put text that holds `: ` in quotes",
+        "more than one key in the line, or wrong indentation; put text that contains `: ` in quotes",
     ),
     (
         "simple key expected ':'",
@@ -136,7 +139,7 @@ fn reason(error: &serde_saphyr::Error) -> String {
     };
     let twice = plain.strip_prefix("duplicate mapping key: ");
     if let Some((key, _)) = twice.and_then(|rest| rest.rsplit_once(", set ")) {
-        return format!("the key `{key}` stands there twice; keep one of them");
+        return format!("the key `{key}` occurs twice; keep one of them");
     }
     match plain.strip_prefix("unexpected character: `") {
         Some(c) => format!(
@@ -170,7 +173,7 @@ mod tests {
     fn mistakes_are_reported_with_advice() {
         let table = [
             ("a:\n\tb: 1\n", "a tab indents the line"),
-            ("a: 1\na: 2\n", "the key `a` stands there twice"),
+            ("a: 1\na: 2\n", "the key `a` occurs twice"),
             ("a:\n b: 1\n  c: 2\n", "indent"),
             ("a: 1\n---\nb: 2\n", "remove the line `---`"),
             ("a: *x\n", "in quotes"),

@@ -156,7 +156,7 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "bytes",
         takes: |_, output| ["json", "csv", "parquet"].contains(&output.format.word),
-        what: "data holds sizes: `x.json`, `x.csv`",
+        what: "data contains sizes: `x.json`, `x.csv`",
     },
     AppliesTo {
         options: "link",
@@ -228,7 +228,10 @@ pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
     match outputs.iter().find(|output| !holds(output)) {
         None => Ok(()),
         Some(output) => Err(Error::usage(
-            format!("`{}` cannot hold a figure", output.target.path().display()),
+            format!(
+                "`{}` cannot contain a figure",
+                output.target.path().display()
+            ),
             "figures are `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include them; `bagreel render` writes the rest",
         )),
     }

@@ -175,7 +175,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
             }
         };
         let changed = words::count(done.changed, "fact");
-        terminal.say(&format!("{}: {changed} written anew{left}", path.display()));
+        terminal.say(&format!("{}: {changed} updated{left}", path.display()));
     }
     let codes = done.missions.iter().map(code);
     Ok(codes.max().unwrap_or(DONE))

@@ -252,7 +252,7 @@ pub(super) fn kept(file: Option<&Path>) -> Result<Option<Places>> {
     places.map(Some).ok_or_else(|| Error::BadFile {
         path: path.to_owned(),
         line: 0,
-        reason: "it holds no layout".to_owned(),
+        reason: "it contains no layout".to_owned(),
         hint: "write it beside a picture: `bagreel render BAG -o x.gif -o x.json`".to_owned(),
     })
 }

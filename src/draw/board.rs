@@ -1,5 +1,5 @@
 //! The topic board: the picture of a mission with few known publishers. Rows are topics over the whole time, with types
-//! and the rate now; a head marks the window of a frame; nodes stand below as pills.
+//! and the rate now; a head marks the window of a frame; nodes are pills below.
 
 use std::collections::BTreeSet;
 
@@ -97,7 +97,7 @@ impl<'a> Board<'a> {
         let page = PageFrame::new(style, &options, 0, true);
         let (place, scale) = placed(&lives, &page, &options, fonts);
         if !is_sized {
-            // A short board leaves no empty page below; an even number of rows is what videos want.
+            // A short board leaves no empty page below; videos need an even number of rows.
             let canvas = PaperCanvas::new(fonts, sizes, scale);
             let end = (place.top + lives.height(&canvas) + BELOW) * scale;
             options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);

@@ -66,7 +66,7 @@ impl FigureKind {
 }
 
 worded! {
-    /// The kind of thing that rows and boxes stand for.
+    /// The kind of thing that rows and boxes represent.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum RowKind {
         /// Nodes, by role.
@@ -98,7 +98,7 @@ pub struct FigureOptions {
     pub width_mm: f64,
     /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
     pub text_pt: f64,
-    /// The kind of thing that rows and boxes stand for; `None` for the most detailed that fits.
+    /// The kind of thing that rows and boxes represent; `None` for the most detailed that fits.
     pub rows: Option<RowKind>,
     /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, ≥ 2; the largest if empty.
     pub steps: Vec<usize>,
@@ -139,7 +139,7 @@ pub(crate) const MOST_HEIGHT: f64 = 225.0;
 /// Draws a figure of the nodes and topics that pass the filters.
 ///
 /// # Errors
-/// [`Error::Usage`] where nothing is left, or where it does not fit even as groups; the hint names a filter that would
+/// [`Error::Usage`] if nothing is left, or if it does not fit even as groups; the hint names a filter that would
 /// do.
 pub(crate) fn figure(
     mission: &Mission,

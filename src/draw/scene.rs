@@ -223,7 +223,7 @@ impl Stroke {
 }
 
 impl Group {
-    /// A group of furniture: an id, which is its class too, and nothing in it yet.
+    /// A group of furniture: an id, which is its class too, and no content yet.
     pub fn named(id: &str) -> Self {
         Self {
             id: id.to_owned(),

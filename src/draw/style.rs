@@ -12,7 +12,7 @@ use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::draw::text::Weight;
 
-/// The built-in styles by name; the first is the default and complete, the others hold only the keys that differ from
+/// The built-in styles by name; the first is the default and complete, the others contain only the keys that differ from
 /// their `base`.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("light", include_str!("../../styles/light.toml")),
@@ -332,7 +332,7 @@ impl<'a> StyleFile<'a> {
     }
 }
 
-/// The kind of value that `new` should be to stand for `old`; `None` if it is one.
+/// The kind of value that `new` should be to replace `old`; `None` if it is one.
 fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
     let length = |v: &Value| {
         #[expect(clippy::cast_precision_loss, reason = "only its range matters")]

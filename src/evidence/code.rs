@@ -83,7 +83,7 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
     };
     if files.is_cut {
         let text = format!(
-            "`{}` holds more than {} or {} of source code; the rest was not read",
+            "`{}` contains more than {} or {} of source code; the rest was not read",
             wanted.folder.display(),
             words::count(files::MOST_FILES, "file"),
             words::bytes(files::MOST_BYTES as u64)

@@ -43,7 +43,7 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
         let edge = ElementKey::Publish(node, topic);
         add(known, "unknown", node, edge, &|| {
             let counted = count(offered, "publisher");
-            format!("the recording counts {counted} of {text}, of which nothing names {missing}")
+            format!("the recording counts {counted} of {text}, but does not name {missing}")
         });
     }
 }
@@ -64,7 +64,7 @@ fn owned(known: &mut Conclusions<'_>, owners: &Owners, topic: Name) {
     }
     let node = known.facts.name(&format!("{owner} ?"));
     let why =
-        format!("nothing names the publisher of {text}; only {owner} is known to publish {kind}");
+        format!("the publisher of {text} is not named; only {owner} is known to publish {kind}");
     add(
         known,
         "owned_type",

@@ -37,7 +37,7 @@ impl Write for Shared {
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    target.must_be_one("an animation holds all windows")?;
+    target.must_be_one("an animation contains all windows")?;
     Ok(Box::new(Apng {
         target: target.clone(),
         frames: sequence.frame_times().len(),

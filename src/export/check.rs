@@ -22,7 +22,7 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
         let name = target.path().display();
         if let Some(other) = targets[..at].iter().find(|t| t.may_meet(target)) {
             let what = if *other == *target {
-                format!("`{name}` is asked for twice")
+                format!("`{name}` is requested twice")
             } else {
                 format!("`{name}` and `{}` may be one file", other.path().display())
             };
@@ -120,14 +120,14 @@ fn check_place(target: &Target) -> Result<()> {
     let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
     if Target::Path(path.clone()).is_numbered() && !is_text {
         return refuse(
-            "`{n}` stands in a name that is not UTF-8".to_owned(),
+            "`{n}` is in a name that is not UTF-8".to_owned(),
             "give it a name in UTF-8, or leave `{n}` out",
         );
     }
     let folder = folder_of(path);
     if folder.to_string_lossy().contains(NUMBER) {
         return refuse(
-            "`{n}` stands in the folder".to_owned(),
+            "`{n}` is in the folder".to_owned(),
             "put `{n}` into the file's name",
         );
     }
@@ -140,7 +140,7 @@ fn check_place(target: &Target) -> Result<()> {
     if !there.is_dir() {
         return refuse(
             format!("`{}` is not a folder", there.display()),
-            "name a folder, or one that can be made",
+            "name an existing folder, or one that can be created",
         );
     }
     if is_special(path) {

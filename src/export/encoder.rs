@@ -123,7 +123,7 @@ pub(crate) fn single<'a>(
 
 /// The writer of one output in a format. An unfinished output leaves no files when dropped.
 pub trait Encoder: Send {
-    /// The data that it needs for every frame; nothing if it writes from the sequence at the end.
+    /// The data that it needs for every frame; none if it writes from the sequence at the end.
     fn needs(&self) -> Needs {
         Needs::Nothing
     }

@@ -26,7 +26,7 @@ struct Gif {
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    target.must_be_one("an animation holds all windows")?;
+    target.must_be_one("an animation contains all windows")?;
     Ok(Box::new(Gif {
         target: target.clone(),
         sink: Some(OutputSink::create(target, sequence.options.max_bytes)?),

@@ -1,7 +1,7 @@
 //! A folder with a document per node in the node definition language `NoDL` 2:
 //! <https://github.com/ros-tooling/nodl/tree/main/nodl_schema/nodl_schema/schemas>.
 //!
-//! The schema wants a type for every end and a quality of service for every topic: an end of unknown type is left out,
+//! The schema requires a type for every end and a quality of service for every topic: an end of unknown type is left out,
 //! an unknown quality of service is `SYSTEM_DEFAULT`.
 
 use std::collections::BTreeMap;

@@ -37,7 +37,7 @@ pub struct SequenceOptions {
     pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
-    /// Whether descriptions of nodes hold what is only inferred.
+    /// Whether descriptions of nodes include inferred endpoints.
     pub has_inferred: bool,
     /// The windows of a film strip, if requested; it also replaces a sequence of drawings.
     pub strip: Option<Choice>,

@@ -25,7 +25,7 @@ pub(crate) struct OutputSink {
 #[derive(Debug)]
 enum SinkTarget {
     Stdout(io::Stdout),
-    /// An existing device or pipe: nothing to rename.
+    /// An existing device or pipe, which is not renamed.
     Special(File),
     /// An unnamed file, which disappears even if the process is killed.
     #[cfg(target_os = "linux")]

@@ -29,7 +29,7 @@ pub(crate) fn check(target: &Target) -> Result<()> {
     let what = match target {
         Target::Stdout => "standard output is one".to_owned(),
         Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
-        Target::Path(_) => return target.must_be_one("the tables hold all windows"),
+        Target::Path(_) => return target.must_be_one("the tables contain all windows"),
     };
     Err(Error::usage(
         format!("the tables are several files, {what}"),

@@ -50,7 +50,7 @@ fn missing(path: PathBuf, error: &io::Error) -> Error {
     Error::Output {
         path,
         reason: format!("video needs `ffmpeg`, which cannot be run: {error}"),
-        hint: "install ffmpeg, or write `.gif` or `.apng`, which need nothing".to_owned(),
+        hint: "install ffmpeg, or write `.gif` or `.apng`, which need no other program".to_owned(),
     }
 }
 
@@ -96,7 +96,7 @@ pub(crate) fn start<'a>(
     target: &Target,
     kind: &'static VideoKind,
 ) -> Started<'a> {
-    target.must_be_one("an animation holds all windows")?;
+    target.must_be_one("an animation contains all windows")?;
     Ok(Box::new(Video {
         sequence,
         kind,
@@ -166,7 +166,7 @@ impl Video<'_> {
         let last = messages.lines().rev().find(|l| !l.trim().is_empty());
         self.failed(format!(
             "ffmpeg failed: {}",
-            last.unwrap_or("it did not say why")
+            last.unwrap_or("it gave no reason")
         ))
     }
 }

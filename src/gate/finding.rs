@@ -27,17 +27,17 @@ macro_rules! kinds {
 kinds! {
     NodeMissing "node-missing":
         "An expected node is not in the bag.",
-        "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
-         folded). Undecidable in a bag that names no node at all or only those that wrote a log, in one whose senders a tool \
-         has merged, of nodes with `known_by: log`, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
-         true` asks for nothing.";
+        "Any evidence counts except source code and launch files, under the node's name or its role (anonymous suffixes \
+         folded). Undecidable if the bag names no node or only those that wrote a log, if a tool has merged its senders, for \
+         nodes with `known_by: log`, and if the recorder of a ROS 2 bag seems to have started late: more nodes are missing \
+         than are named. `optional: true` requires nothing.";
     NodeForbidden "node-forbidden":
         "A forbidden node is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.";
     NodeLate "node-late":
         "A node appeared later, or earlier, than it should have.",
-        "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have been there earlier for \
-         all that the bag tells.";
+        "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have existed before its \
+         first sign.";
     NodeGone "node-gone":
         "A node ended before the mission did.",
         "An expected node is expected to stay. Its end is inferred from a rhythm that broke for good, or stated by a \
@@ -52,7 +52,7 @@ kinds! {
     TopicMissing "topic-missing":
         "An expected topic is not in the bag.",
         "A topic is there if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
-         messages. `optional: true` asks for nothing.";
+         messages. `optional: true` requires nothing.";
     TopicForbidden "topic-forbidden":
         "A forbidden topic is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern.";
@@ -61,25 +61,25 @@ kinds! {
         "`type: sensor_msgs/LaserScan`, or a list of several; the `/msg/` of ROS 2 makes no difference.";
     TopicQos "topic-qos":
         "A topic is offered with another quality of service.",
-        "`qos: reliable` asks for each of its words; `latched: true` for a last message that stands. Undecidable where \
-         the bag does not tell.";
+        "`qos: reliable` requires each of its words; `latched: true` requires a latched last message. Undecidable where \
+         the bag does not record it.";
     TopicRateLow "topic-rate-low":
         "A topic had fewer messages per second than expected.",
         "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
-         95` of them at least. A message more or less at the edge of a window is none. `mean_hz: 2..3` is judged from the \
-         first to the last message, for topics that come unevenly.";
+         95` of them at least. One message more or less at the edge of a window is ignored. `mean_hz: 2..3` is judged from the \
+         first to the last message, for topics with an uneven rate.";
     TopicRateHigh "topic-rate-high":
         "A topic had more messages per second than expected.",
         "As `topic-rate-low`, above the range.";
     TopicGap "topic-gap":
         "A topic was silent for longer than allowed.",
-        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.";
+        "`max_gap: 0.5s` applies between any two messages, and from the last one to the end of the mission unless it `may_end`.";
     TopicLate "topic-late":
         "A topic's first message came later, or earlier, than it should have.",
         "`within: 40s..1:10` counts from the first message of the bag. What comes within 2.5 s of the recorder's start is \
          never early: it may have been there before.";
     TopicGone "topic-gone":
-        "A topic's last message came before its time.",
+        "A topic ended too early.",
         "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.";
     TopicAge "topic-age":
         "The messages of a topic were older than allowed when they arrived.",
@@ -93,7 +93,7 @@ kinds! {
         "`drops: ..0` is checked in every window, by the drops that statistics report. Undecidable in a bag without them.";
     PublisherMissing "publisher-missing":
         "A node does not publish an expected topic.",
-        "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.";
+        "`by: [/a, /b]`. Undecidable where the publishers of the topic are unknown.";
     PublisherUnexpected "publisher-unexpected":
         "A topic has a publisher that is not listed.",
         "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` makes it milder. Only publishers that are \
@@ -104,7 +104,7 @@ kinds! {
          discovery, or this node's log of its connections.";
     OrderBroken "order-broken":
         "Nodes did not appear in the expected order.",
-        "`appear_in_order: [/a, /b]`. Undecidable where the times that the bag tells overlap.";
+        "`appear_in_order: [/a, /b]`. Undecidable where the uncertain times overlap.";
     ReactionMissing "reaction-missing":
         "An expected reaction did not happen.",
         "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
@@ -119,17 +119,17 @@ kinds! {
         "A topic in the bag is not in the file.",
         "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.";
     Starved "starved":
-        "A subscriber gets nothing, since its quality of service asks for more than is offered.",
-        "A warning wherever a log or `/rosgraph` says so; `policy: {starved: error}` or `allow`.";
+        "A subscriber gets nothing because it requests a higher quality of service than is offered.",
+        "A warning wherever a log or `/rosgraph` reports it; `policy: {starved: error}` or `allow`.";
     DuplicateName "duplicate-name":
         "Two nodes have the same name.",
-        "A warning wherever a log or `/rosgraph` says so; `policy: {duplicate_names: error}` or `allow`.";
+        "A warning wherever a log or `/rosgraph` reports it; `policy: {duplicate_names: error}` or `allow`.";
     MessagesLost "messages-lost":
         "The recorder lost messages, so that gaps and low rates may be its own.",
-        "A warning wherever the recorder says so; `policy: {messages_lost: error}` or `allow`.";
+        "A warning wherever the recorder reports it; `policy: {messages_lost: error}` or `allow`.";
     AllowUnused "allow-unused":
-        "An allowance forgave nothing.",
-        "Remove it, so that it does not forgive something else later.";
+        "An allowance matched no finding.",
+        "Remove it, so that it does not hide another finding later.";
 }
 
 impl FindingKind {

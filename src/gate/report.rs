@@ -183,7 +183,7 @@ pub(crate) fn explain(word: &str) -> Option<String> {
     let (_, word, says, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
     let [says, more] = [says, more].map(|text| hang("", text, 0, Some(80)));
     Some(format!(
-        "{word}\n\n{says}\n{more}\nTo forgive it:\n\nallow:\n  - {{finding: {word}, name: /name, until: 2027-01-31, why: \"…\"}}\n"
+        "{word}\n\n{says}\n{more}\nTo allow it:\n\nallow:\n  - {{finding: {word}, name: /name, until: 2027-01-31, why: \"…\"}}\n"
     ))
 }
 

@@ -90,7 +90,7 @@ pub(super) fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -
         // An empty bag may be intact.
         Err(Error::NoMessages { path, hint }) => SurveyRow {
             is_complete: hint == NOTHING_RECORDED,
-            error: Some(format!("`{}` holds no messages: {hint}", path.display())),
+            error: Some(format!("`{}` contains no messages: {hint}", path.display())),
             ..row
         },
         Err(error) => SurveyRow {

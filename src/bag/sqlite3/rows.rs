@@ -283,7 +283,7 @@ impl LostRows {
         let unused = "rows are missing among the others: deleted, or lost by damage";
         let kinds = [
             (Damaged, self.orphans, orphans),
-            (Damaged, self.odd, "rows hold no topic or no time"),
+            (Damaged, self.odd, "rows have no topic or no time"),
             (
                 Damaged,
                 self.payloads,

@@ -52,7 +52,7 @@ const BURST: i64 = 33;
 
 impl Course {
     /// The course in at most `most` rows: of nodes, or of topics where publishers are unknown, as far as something
-    /// happens to them. From the lives of [`of_all`]. Events without a row stand together on the last one.
+    /// happens to them. From the lives of [`of_all`]. Events without a row share the last one.
     pub(crate) fn new(lives: &LivesFigure<'_>, most: usize) -> Self {
         let source = lives.source;
         let mut marks = lives.marks.clone().plain();
@@ -204,7 +204,7 @@ fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
     source.phases.iter().enumerate().map(phase).collect()
 }
 
-/// What began or ended, in words that get shorter: all that the phase names, then two and one of them.
+/// What began or ended, in ever fewer words: all that the phase names, then two and one of them.
 fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
     let mut names = vec![format!("{sign} {those}")];
     let each: Vec<&str> = those

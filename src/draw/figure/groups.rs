@@ -1,4 +1,4 @@
-//! Groups: nodes of one namespace that live in the same phases. A group hides no change, for its members come and go
+//! Groups: nodes of one namespace that exist in the same phases. A group hides no change, for its members come and go
 //! together. Where groups of whole namespaces are too many, shorter namespaces make fewer of them.
 
 use std::collections::{BTreeMap, BTreeSet};

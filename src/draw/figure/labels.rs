@@ -33,7 +33,7 @@ struct Labels<'a> {
     spots: Vec<Option<Spot>>,
 }
 
-/// A place for each label that finds one, those of short arrows first; one that finds none may push another one aside.
+/// A place for each label that fits, those of short arrows first; one that does not fit may displace another one.
 pub(crate) fn set(room: &Room<'_>) -> Vec<Option<Spot>> {
     let mut order: Vec<usize> = (0..room.labels.len()).collect();
     order.retain(|at| !room.labels[*at].is_empty());

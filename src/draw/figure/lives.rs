@@ -172,7 +172,7 @@ impl<'a> LivesFigure<'a> {
                 "phase",
             );
         }
-        // Without a band the heads stand in the row of the first namespace, or above it.
+        // Without a band the heads are in the row of the first namespace, or above it.
         let head = if phases.is_empty() {
             place.top - canvas.sizes.line() / 2.0
         } else {
@@ -215,7 +215,7 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
-    /// Draws rows that live throughout as one light bar.
+    /// Draws rows that exist throughout as one light bar.
     fn folded(
         &self,
         canvas: &mut PaperCanvas<'_>,

@@ -1,4 +1,4 @@
-//! The marks of a figure: events of the log on the rows of their elements. Nothing is marked that is not in the log,
+//! The marks of a figure: events of the log on the rows of their elements. Only events of the log are marked,
 //! and every headline of an element that has a row is marked there.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ use crate::mission::EventId;
 use crate::mission::event_log::{Detail, Event, Kind};
 use crate::mission::events::predicate;
 
-/// The most letters, and the most arrows: more crowd the rows. What has none is marked by a small circle.
+/// The most letters, and the most arrows: more crowd the rows. Other events are marked by a small circle.
 const MOST: (usize, usize) = (10, 6);
 
 /// The sign of a mark.
@@ -68,7 +68,7 @@ pub(crate) struct Handover {
 }
 
 impl Handover {
-    /// The same from and to the rows that stand for its tracks; `None` where none do, or one for both.
+    /// The same from and to the rows of its tracks; `None` if they have none, or share one.
     pub(crate) fn on(&self, row: impl Fn(usize) -> Option<usize>) -> Option<Self> {
         let (from, to) = (row(self.from)?, row(self.to)?);
         (from != to).then(|| Self {
@@ -144,7 +144,7 @@ impl Marks {
         marks
     }
 
-    /// Gives letters to the weightiest of what is not a tick or a cross, in order of time; a restart without a letter
+    /// Gives letters to the weightiest events other than ticks and crosses, in order of time; a restart without a letter
     /// has its cross and tick.
     fn letter(&mut self, source: &FigureSource<'_>, tracks: &[Track], circles: Vec<RowMark>) {
         let events = &source.mission.log.events;

@@ -172,7 +172,7 @@ fn top_space(name: &str) -> Option<&str> {
     name.get(..=end)
 }
 
-/// The error of a figure with nothing to draw: filters leave nothing, or no node of the bag is known.
+/// The error of a figure with nothing to draw: filters leave nothing, or no nodes are known.
 pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
     if source.shown_topics().next().is_some() && source.knows_no_node() {
         return Error::usage(

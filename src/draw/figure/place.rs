@@ -198,7 +198,7 @@ fn tightened(
         }
         all.push(PlacedPanel::new(plan, &layout, labels, tightness, width));
         if plan.links.is_empty() {
-            // Nothing else would come of more room.
+            // More room would not change anything else.
             break;
         }
     }

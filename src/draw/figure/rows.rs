@@ -14,7 +14,7 @@ const BURST: i64 = 66;
 const END: i64 = 33;
 /// The least number of rows that live throughout and are folded.
 const FEWEST_FOLDED: usize = 3;
-/// The most rows of a figure in which nothing comes or goes that stand one by one.
+/// The most rows that are drawn one by one in a figure in which nothing comes or goes.
 const MOST_OPEN: usize = 12;
 
 /// One row of the figure.
@@ -75,7 +75,7 @@ fn of_space(
     let mut rows = vec![FigureRow::Space(space.to_owned())];
     let is_folded = |at: &usize| !marked.contains(at) && is_throughout(&tracks[*at], whole);
     let mut folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
-    // Where nothing else is shown, few rows say more than their number.
+    // If nothing else is shown, a few rows are more informative than their number.
     let is_all = folded.len() == tracks.len() && tracks.len() <= MOST_OPEN;
     if folded.len() < FEWEST_FOLDED || is_all {
         folded.clear();
@@ -123,7 +123,7 @@ fn in_order(tracks: &[Track], whole: Span, marks: &Marks, mut own: Vec<usize>) -
             .ends(at)
             .then(|| tracks[at].end().since(whole.start) / grid)
     };
-    // Who never ends comes first.
+    // Elements that never end come first.
     let end = |at: usize| end(at).unwrap_or(i64::MAX);
     for burst in &mut bursts {
         burst.sort_by(|a, b| {

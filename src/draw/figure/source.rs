@@ -87,7 +87,7 @@ impl<'a> FigureSource<'a> {
         self.topics.get(topic as usize) == Some(&true)
     }
 
-    /// Whether nearly every node uses this topic, so that arrows and lists of it say nothing: transforms, diagnostics,
+    /// Whether nearly every node uses this topic, so that its arrows and lists are not informative: transforms, diagnostics,
     /// bonds.
     pub(crate) fn is_hub(&self, topic: TopicId) -> bool {
         let last = last_part(self.topic(topic));

@@ -443,12 +443,12 @@ impl<'s> StepSource<'s> {
             links: talks.iter().map(|(talk, _)| talk.link()).collect(),
             ..Plan::default()
         };
-        // Badges stand out of their boxes.
+        // Badges extend beyond their boxes.
         let width = self.panel_width() - 2.0 * INSIDE - 1.6;
         place(canvas, &plan, labels, width)
     }
 
-    /// All panels in rows, in order of time, and notes of what repeats and what is left out.
+    /// All panels in rows, in order of time, with notes of repetitions and omissions.
     fn page(&self, panels: &[Panel], repeated: &[String], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();

@@ -120,7 +120,7 @@ impl<'a> Talks<'a> {
         }
     }
 
-    /// The talks between boxes, `vertex` being the box of each track, that hold at any moment of `time`, or in half of
+    /// The talks between boxes, `vertex` being the box of each track, that exist at any moment of `time`, or in half of
     /// it.
     pub(crate) fn between(
         &self,

@@ -28,7 +28,7 @@ struct Slot {
 }
 
 impl AnimatedScenes {
-    /// The scenes with the times for which they are shown, in milliseconds. All have one size; tooltips, which tell
+    /// The scenes with the times for which they are shown, in milliseconds. All have one size; tooltips, which show
     /// numbers that differ from scene to scene, are left out.
     pub(crate) fn new(scenes: impl Iterator<Item = (Scene, u32)>) -> Self {
         let mut all = Self::default();

@@ -1,4 +1,4 @@
-//! The graph of a whole mission as one compact drawing without colours: classes say how elements look in a window, and
+//! The graph of a whole mission as one compact drawing without colours: classes determine how elements look in a window, and
 //! their rules follow from the style. The player's page is painted with it.
 
 mod css;
@@ -138,7 +138,7 @@ impl<'a> Classes<'a> {
     fn form(xml: &mut Xml, form: &Form, class: Option<&str>) {
         match form {
             Form::Rect(r, radius) => {
-                // Edges are rounded, not lengths, so that what touches goes on touching.
+                // Edges are rounded, not lengths, so that touching shapes still touch.
                 xml.open("rect");
                 if let Some(class) = class {
                     xml.attribute("class", class);

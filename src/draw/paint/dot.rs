@@ -87,7 +87,7 @@ impl<'a> DotView<'a> {
         words.join(" ")
     }
 
-    /// Writes the namespaces and items that stand directly in a namespace, given by its place, with the attributes that a
+    /// Writes the namespaces and items that are directly in a namespace, given by its place, with the attributes that a
     /// profile has for them. Namespaces nest 16 deep at most.
     fn members(
         &self,

@@ -115,7 +115,7 @@ impl fmt::Write for Escaped<'_> {
     }
 }
 
-/// `text` for use between tags and in attributes; characters that XML cannot hold are spelled out, and those that would
+/// `text` for use between tags and in attributes; characters that XML does not allow are spelled out, and those that would
 /// hide or turn round the page's own text are written as a number.
 fn escape(out: &mut String, text: &str) {
     for c in text.chars() {

@@ -1,4 +1,4 @@
-//! The nodes and topics that stand as words in their namespace: `also here: camera_tf, imu_driver, scan 4 Hz`.
+//! The nodes and topics that are listed as words in their namespace: `also here: camera_tf, imu_driver, scan 4 Hz`.
 
 use std::collections::BTreeSet;
 

@@ -71,7 +71,7 @@ impl LabelPlace {
         Self { area, side, line }
     }
 
-    /// The middle of words of this width, which stand next to the arrow however wide the room is.
+    /// The middle of words of this width, which are next to the arrow however wide the room is.
     fn middle(&self, width: f64) -> Point {
         let (centre, slack) = (self.area.centre(), (self.area.w - width).max(0.0) / 2.0);
         match self.side {

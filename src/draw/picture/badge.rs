@@ -10,7 +10,7 @@ use crate::view::Mark;
 
 /// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
 pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
-    // Its words say since when it is away.
+    // Its words show since when it is away.
     if mark == Mark::Away {
         return;
     }

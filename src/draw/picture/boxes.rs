@@ -13,7 +13,7 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::view::{Crowd, Item, ItemKind, Mark, Shown};
 
-/// The dashes of a namespace in which nothing is there.
+/// The dashes of an empty namespace.
 const EMPTY: [f64; 2] = [1.0, 4.0];
 
 /// The style, the fonts and the scale that boxes are drawn with.
@@ -355,7 +355,7 @@ pub(super) fn hexagon(place: Rect, point: f64) -> Form {
     ])
 }
 
-/// The places on the outline of a box where its badge may stand, the best first: at its top right.
+/// The places on the outline of a box where its badge may be placed, the best first: at its top right.
 pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
     let (x, y) = (place.w / 2.0 - 7.0 * scale, place.h / 2.0 - scale);

@@ -238,7 +238,7 @@ impl Boxes<'_> {
 /// A rectangle with round corners at its top.
 fn round_top(place: Rect, radius: f64) -> Form {
     let (left, right, top, low) = (place.x, place.right(), place.y, place.bottom());
-    // The part of a radius at which the controls of a quarter of a circle stand.
+    // The part of a radius at which the control points of a quarter circle are placed.
     let near = radius * 0.45;
     let at = Point::new;
     Form::Path(vec![

@@ -197,7 +197,7 @@ impl CourseStrip<'_> {
         });
         let mut fitting = names.filter(|name| wide(name) <= room);
         let text = fitting.next().map(std::borrow::Cow::into_owned);
-        // Words that are cut say more than a number, if some of them are left.
+        // Words that are cut are more informative than a number, if some of them are left.
         let is_number = |text: &&String| text.chars().all(|c| c.is_ascii_digit());
         let text = match (text, cut) {
             (text, Some(cut)) if text.as_ref().is_none_or(|t| is_number(&t)) => {

@@ -1,4 +1,4 @@
-//! The plan to lay out: every label at its widest, every namespace that gets a box.
+//! The plan to lay out: every label at its widest, and every namespace with a box.
 
 use super::also::{self, Footer};
 use super::card::{self, Card};

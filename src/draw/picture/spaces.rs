@@ -1,4 +1,4 @@
-//! The frames of namespaces: their titles, the robots that they stand for, and when something is first inside.
+//! The frames of namespaces: their titles, the robots that they represent, and the time of their first content.
 
 use super::replicas;
 use crate::draw::text::Fonts;

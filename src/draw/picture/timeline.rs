@@ -145,7 +145,7 @@ impl<'a> Timeline<'a> {
         groups
     }
 
-    /// The groups that change from frame to frame: what lives in the window at place `k` (or the bars up to it), and
+    /// The groups that change from frame to frame: what exists in the window at place `k` (or the bars up to it), and
     /// the head over exactly its time.
     pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
@@ -214,7 +214,7 @@ impl<'a> Timeline<'a> {
         let most = cast::to_i64((self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0));
         let step = round_length(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
-        // Counted, not added up: a span may be as long as a number can say.
+        // Counted, not added up: a span may be as long as the largest number.
         for at in (0..=total / step).map(|tick| tick * step) {
             let text = words::moment(at);
             let wide = width(&text);

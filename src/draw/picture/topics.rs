@@ -29,7 +29,7 @@ const FAMILIES: [&str; 8] = [
     "/service_events",
 ];
 
-/// Last parts of names that say nothing without the part before.
+/// Last parts of names that are meaningless without the part before.
 const VAGUE: [&str; 6] = ["data", "raw", "state", "status", "info", "events"];
 
 /// A row of words.

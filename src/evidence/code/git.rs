@@ -54,7 +54,7 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
     };
     let commit = commit(folder, version, end)?;
     if commit.is_empty() {
-        return lying("git holds no commit before the recording's end");
+        return lying("git has no commit before the recording's end");
     }
     let reason = match of_commit(folder, &commit, &prefix) {
         Some(files) if !files.list.is_empty() => {
@@ -63,8 +63,8 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
                 words: words(folder, &commit, version),
             });
         }
-        Some(_) => "holds no source code of this folder in",
-        None => "does not hold all files of",
+        Some(_) => "has no source code of this folder in",
+        None => "does not have all files of",
     };
     lying(&format!("git {reason} commit {}", short(&commit)))
 }
@@ -130,7 +130,7 @@ fn short(commit: &str) -> &str {
 fn unknown(folder: &Path, name: &str, reason: &str) -> Error {
     Error::usage(
         format!(
-            "git knows no commit `{name}` in `{}`: {reason}",
+            "git has no commit `{name}` in `{}`: {reason}",
             folder.display()
         ),
         "name a commit, branch or tag, or `worktree` for the files as they lie",

@@ -22,7 +22,7 @@ worded! {
     /// The reason why a declaration is not drawn.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub(super) enum NotDrawn {
-        SeveralPlaces = "several places can be meant",
+        SeveralPlaces = "several places match",
         /// What its node publishes has another publisher or fits another declaration too, so it may not have run.
         Disputed = "what its node publishes may come from elsewhere",
         KnownPublisher = "its publishers are known",

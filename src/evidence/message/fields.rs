@@ -185,7 +185,7 @@ impl DecodePlan<'_> {
         let definition = self.definition;
         let fields = &definition.messages[message].fields;
         if depth > DEEPEST {
-            return Err("its definition holds itself".to_owned());
+            return Err("its definition contains itself".to_owned());
         }
         if fields.is_empty() && self.is_cdr {
             return Ok((vec![DecodeStep::Nothing], 1));

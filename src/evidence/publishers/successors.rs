@@ -62,7 +62,7 @@ pub(super) fn part(
                 confidence: Confidence::Stated,
                 snapshot: None,
             };
-            let words = || "nothing shows it after a topic of its own fell silent".to_owned();
+            let words = || "there is no sign of it after a topic of its own fell silent".to_owned();
             facts.explain(said, "connection", Some(time), words);
             facts.add(source.unwrap_or(0), said, Some(time));
         }

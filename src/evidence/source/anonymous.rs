@@ -27,7 +27,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             },
         };
         known.because(inference, Some(start), |known| {
-            format!("the name {} holds this start", known.text(node))
+            format!("the name {} contains this start time", known.text(node))
         });
     }
 }

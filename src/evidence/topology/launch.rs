@@ -186,7 +186,7 @@ impl Launch {
             }
             "load_composable_node" => self.inside(path, child, &mut scope.clone())?,
             python::UNREAD => {
-                self.left_out(path, child, "what stands here is only known when it runs");
+                self.left_out(path, child, "this is only known at run time");
             }
             _ => {}
         }

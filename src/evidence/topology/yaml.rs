@@ -117,7 +117,7 @@ impl<'a> TopologyYaml<'a> {
         let fields = match value {
             Value::Null => &empty,
             Value::Object(fields) => fields,
-            _ => return Err(self.wrong(name, &format!("`{name}` holds no mapping"))),
+            _ => return Err(self.wrong(name, &format!("`{name}` is not a mapping"))),
         };
         let is_known = |key: &str| {
             ["start", "end"].contains(&key) || ENDS.iter().any(|(known, _)| *known == key)

@@ -64,7 +64,7 @@ pub(crate) fn update(
     if wanted.len() > MOST {
         return Err(Error::usage(
             format!(
-                "{} of `{}` no longer hold, as if it described another robot",
+                "{} of `{}` no longer match, as if it described another robot",
                 words::count(wanted.len(), "fact"),
                 path.display()
             ),

@@ -15,7 +15,7 @@ impl Judge<'_> {
             if !forgive(&mut self.checks, allowance, start) {
                 let name = allowance.name.as_str();
                 let word = allowance.finding.word();
-                let says = format!("the allowance of {word} for {name} forgave nothing");
+                let says = format!("the allowance of {word} for {name} matched no finding");
                 let mut finding = Finding::new(FindingKind::AllowUnused, name, allowance.at, says)
                     .saw("nothing", word)
                     .hint("remove it");

@@ -92,7 +92,7 @@ impl Judge<'_> {
                 (true, _) => Vec::new(),
                 (false, _) if facts.is_logged => {
                     let says =
-                        format!("cannot tell whether {name} is there: only its log would say so");
+                        format!("cannot tell whether {name} is there: only its log would show it");
                     vec![Finding::unknown(FindingKind::NodeMissing, name, at, says)]
                 }
                 (false, true) => vec![self.missing(pattern, at)],
@@ -129,7 +129,7 @@ impl Judge<'_> {
             .any(|(_, nodes)| self.facts.is_sure(nodes))
         {
             (
-                "this bag names few nodes, as one whose recorder came late",
+                "this bag names few nodes, as if its recorder had started late",
                 "record /parameter_events from before the nodes start, or /rosgraph",
             )
         } else {

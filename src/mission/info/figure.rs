@@ -62,7 +62,10 @@ fn map(mission: &Mission) -> Option<FigureInfo> {
     let both = both.count();
     (both > 0).then(|| FigureInfo {
         figure: "map",
-        shows: format!("who talks to whom: over {}", words::count(both, "topic")),
+        shows: format!(
+            "who publishes to whom: over {}",
+            words::count(both, "topic")
+        ),
     })
 }
 

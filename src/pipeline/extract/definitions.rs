@@ -31,7 +31,7 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
         }
         if files.is_empty() {
             return Err(Error::usage(
-                format!("`{}` holds no `.msg` or `.idl` file", folder.display()),
+                format!("`{}` contains no `.msg` or `.idl` file", folder.display()),
                 "name the folder of a package or of several: `my_msgs/msg/Thing.msg`",
             ));
         }

@@ -1,5 +1,5 @@
-//! The map with differences: nodes that come and go, and those they talk to, at the same places in every phase, with
-//! what the phase changes in colour.
+//! The map with differences: nodes that come and go, and those connected to them, at the same places in every phase, with
+//! changes of the phase in colour.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -91,7 +91,7 @@ impl<'u, 's> Union<'u, 's> {
             talks: Vec::new(),
         };
         union.talk(many);
-        // Neighbours without an arrow to a changed node say nothing.
+        // Neighbours without an arrow to a changed node are not informative.
         let linked: BTreeSet<usize> = union
             .talks
             .iter()

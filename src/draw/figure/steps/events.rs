@@ -26,7 +26,7 @@ impl StepSource<'_> {
         Span::new(middle(k - 1), middle(k))
     }
 
-    /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
+    /// The nodes that phase `k` has more of, or fewer, than the one before, with the events by which they began or ended.
     pub(super) fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EventId>> {
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let (old, new) = match sign {

@@ -37,7 +37,7 @@ fn base(style: &Style) -> String {
 /// The rules for what classes change of that: rate, confidence, state and mark; a later rule counts more. Only these class
 /// words have rules.
 fn states(style: &Style, words: &BTreeSet<&str>) -> String {
-    // What is silent has no rate worth a place.
+    // The rate of a silent element is not worth showing.
     let mut out = String::from(
         ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed):not(.changed)>.r{visibility:hidden}",
     );

@@ -56,7 +56,7 @@ impl DotIds {
     }
 }
 
-/// The id, cut if it is too long, with a number if it was taken, in quotes if DOT wants them.
+/// The id, cut if it is too long, with a number if it was taken, in quotes if DOT requires them.
 fn unlike(mut id: String, taken: &mut BTreeSet<String>) -> String {
     // Ids are ASCII.
     id.truncate(LONGEST_ID);

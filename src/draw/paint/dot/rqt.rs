@@ -2,7 +2,7 @@
 //!
 //! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and draws nothing
 //! that has no place. It breaks on edge labels without `lp`, widths that are not whole numbers, edges at both ends,
-//! clusters without a `graph` statement and colours in parts; all edges stand at the top level, or they come twice.
+//! clusters without a `graph` statement and colours in parts; all edges must be at the top level, or they appear twice.
 
 use std::fmt::Write as _;
 

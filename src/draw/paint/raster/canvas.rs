@@ -10,7 +10,7 @@ use crate::base::cast;
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
-/// The largest share of changed tiles; above it, all is drawn anew.
+/// The largest share of changed tiles; above it, everything is redrawn.
 const MOST_SHARE: f64 = 0.7;
 
 /// A page that frames are drawn on in turn; it remembers the last one.
@@ -125,7 +125,7 @@ impl Last {
         scene.groups.iter().map(same).collect()
     }
 
-    /// The tiles under everything that differs; `None` where all has to be drawn anew.
+    /// The tiles under everything that differs; `None` if everything must be redrawn.
     fn dirty(
         &self,
         scene: &Scene,

@@ -60,7 +60,7 @@ impl Definition {
     pub(super) fn parse(text: &str, type_name: &str) -> Result<Self, String> {
         let is_empty = text.lines().all(|l| without_comment(l).is_empty());
         if is_empty && !type_name.ends_with("/Empty") {
-            return Err("the bag holds no definition of its type".to_owned());
+            return Err("the bag contains no definition of its type".to_owned());
         }
         let messages = messages(text, type_name)?;
         Ok(Self {

@@ -181,7 +181,7 @@ fn opaque_functions_are_followed_and_unknowns_reported() {
     assert!(
         texts
             .iter()
-            .any(|t| t.contains("line 9: what stands here is only known when it runs")),
+            .any(|t| t.contains("line 9: this is only known at run time")),
         "{texts:?}"
     );
 }
