@@ -121,7 +121,7 @@ fn undecodable_messages_report_the_reason() {
     };
     assert!(why("", Encoding::Ros1).contains("no definition"));
     assert!(why("X x\n", Encoding::Ros1).contains("lacks the type `X`"));
-    assert!(why("T t\n===\nMSG: a/T\nT t\n", Encoding::Ros1).contains("holds itself"));
+    assert!(why("T t\n===\nMSG: a/T\nT t\n", Encoding::Ros1).contains("contains itself"));
     assert!(why("int8 x\n", Encoding::Other("json".to_owned())).contains("`json`"));
     assert!(
         why(
