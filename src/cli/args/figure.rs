@@ -17,7 +17,7 @@ pub(crate) struct FigureArgs {
     #[command(flatten)]
     pub(crate) inputs: Inputs,
     /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable. [default:
-    /// out/<bag name>.pdf]
+    /// `out/<bag name>.pdf`]
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
     /// Life lines, a map of who publishes to whom, or the reconfigurations one by one.
