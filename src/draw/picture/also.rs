@@ -1,5 +1,6 @@
 //! The nodes and topics that are listed as words in their namespace: `also here: camera_tf, imu_driver, scan 4 Hz`.
 
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 use super::boxes::Boxes;
@@ -20,6 +21,8 @@ const ABOVE: f64 = 0.4;
 /// The distance of the words from the frame of their namespace, in pixels.
 const INSET: f64 = 8.0;
 const FIRST: &str = "also here:";
+/// The most names that are listed: ten lines or so. The others are counted.
+const MOST_LISTED: usize = 60;
 
 /// The words for the nodes of one namespace.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,11 +47,13 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
         let names: Vec<String> = also.items.iter().map(|item| short(&item.label)).collect();
         let size = style.edge.size;
         let all = names.iter().zip(&also.items).zip(&also.shown);
-        let words = words(all.map(|((name, item), shown)| {
+        let long = |text: &String| text.chars().count();
+        let longest = all.map(|((name, item), shown)| {
             let texts = shown.looks().iter().map(|look| said(item, look, name));
-            let long = |text: &String| text.chars().count();
             texts.max_by_key(long).unwrap_or_else(|| name.clone())
-        }));
+        });
+        let longest: Vec<String> = longest.collect();
+        let words = words(&longest, &listed(&longest, long));
         let places = broken(&words, fonts, size, WIDTH * size);
         let ends = places.iter().zip(&words);
         let ends = ends.map(|(at, word)| at.x + fonts.width(word, size, Weight::SemiBold));
@@ -78,11 +83,26 @@ fn said(item: &Item, shown: &Shown, name: &str) -> String {
     }
 }
 
-/// Names as they follow each other, each with its comma, after the words before them.
-fn words(names: impl Iterator<Item = String>) -> Vec<String> {
+/// The places of the names that are listed, in order: those of the highest ranks if there are too many.
+fn listed<T, R: Ord>(all: &[T], rank: impl Fn(&T) -> R) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..all.len()).collect();
+    if places.len() > MOST_LISTED {
+        places.sort_by_cached_key(|at| Reverse(rank(&all[*at])));
+        places.truncate(MOST_LISTED);
+        places.sort_unstable();
+    }
+    places
+}
+
+/// The listed names as they follow each other, each with its comma, after the words before them; then the number of
+/// the others.
+fn words(names: &[String], listed: &[usize]) -> Vec<String> {
     let mut words = vec![FIRST.to_owned()];
-    words.extend(names.map(|name| name + ","));
-    words.last_mut().map(String::pop);
+    words.extend(listed.iter().map(|at| format!("{},", names[*at])));
+    match names.len() - listed.len() {
+        0 => drop(words.last_mut().map(String::pop)),
+        more => words.push(format!("and {more} more")),
+    }
     words
 }
 
@@ -117,10 +137,11 @@ impl Boxes<'_> {
         let seen =
             seen.filter_map(|((item, shown), name)| Some((item, view.calm_at(shown, k)?, name)));
         let seen: Vec<_> = seen.collect();
-        let words = words(
-            seen.iter()
-                .map(|(item, shown, short)| said(item, shown, short)),
-        );
+        let texts = seen
+            .iter()
+            .map(|(item, shown, short)| said(item, shown, short));
+        let listed = listed(&seen, |(_, shown, _)| shown.mark.is_some());
+        let words = words(&texts.collect::<Vec<_>>(), &listed);
         let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
         let places = broken(&words, self.fonts, style.size, most);
         let place = self.fit.rect(place);
@@ -144,7 +165,8 @@ impl Boxes<'_> {
             title: names.join("\n"),
             ..Group::default()
         };
-        let marks = std::iter::once(None).chain(seen.iter().map(|(_, shown, _)| shown.mark));
+        let marks = listed.iter().map(|at| seen[*at].1.mark);
+        let marks = std::iter::once(None).chain(marks).chain([None]);
         for ((word, at), mark) in words.into_iter().zip(places).zip(marks) {
             group.text(Text {
                 at: Point::new(
@@ -166,5 +188,22 @@ impl Boxes<'_> {
             });
         }
         (!names.is_empty()).then_some(group)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_beyond_the_limit_are_counted_and_changed_ones_are_listed() {
+        let names: Vec<String> = (0..70).map(|n| format!("n{n}")).collect();
+        let few = words(&names[..3], &listed(&names[..3], String::len));
+        assert_eq!(few, ["also here:", "n0,", "n1,", "n2"]);
+
+        let many = words(&names, &listed(&names, |name| name == "n69"));
+        assert_eq!(many.len(), 1 + MOST_LISTED + 1);
+        assert_eq!(many[1], "n0,");
+        assert_eq!(many[MOST_LISTED..], ["n69,", "and 10 more"]);
     }
 }

@@ -149,11 +149,13 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         still,
         change: page.sequence.unfolded.map_or(0.25, |u| u.rate_change),
     };
-    let json = serde_json::to_string(&data).unwrap_or_default();
+    let mut json = serde_json::to_string(&data).unwrap_or_default();
+    drop(data);
     // Whole seconds need no decimal point.
-    json.replace(".0,", ",")
-        .replace(".0]", "]")
-        .replace('<', "\\u003c")
+    for (from, to) in [(".0,", ","), (".0]", "]"), ("<", "\\u003c")] {
+        json = json.replace(from, to);
+    }
+    json
 }
 
 /// The origin of times in seconds.

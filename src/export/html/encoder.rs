@@ -1,5 +1,6 @@
 //! The encoder of the page.
 
+use crate::base::error::Error;
 use crate::draw::picture::Union;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::html::{HtmlPage, PageGraph};
@@ -7,11 +8,24 @@ use crate::export::sequence::{Sequence, UnionDrawings};
 use crate::export::target::Target;
 use crate::export::{Started, one_text};
 
+/// The most boxes and arrows of a page: with four kilobytes each, half a gigabyte; browsers are slow long before.
+const MOST_DRAWN: usize = 120_000;
+
 /// Begins the page.
 ///
 /// # Errors
-/// As [`one_text`].
+/// [`Error::Usage`] if it would have more than [`MOST_DRAWN`] boxes and arrows; as [`one_text`].
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
+    let unfolded = sequence.unfolded.map(|u| u.view);
+    let folded = Some(sequence.view).filter(|view| unfolded.is_none() || view.is_folded());
+    let views = unfolded.into_iter().chain(folded);
+    let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
+    if drawn > MOST_DRAWN {
+        return Err(Error::usage(
+            format!("a page of {drawn} boxes and arrows is too large; {MOST_DRAWN} are possible"),
+            "leave some out with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
+        ));
+    }
     let style = Style::builtin(BUILTIN[0].0)?;
     one_text(target, move || page(sequence, &style))
 }
