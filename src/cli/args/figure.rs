@@ -16,8 +16,8 @@ use crate::graph::diff::RATE_CHANGE;
 pub(crate) struct FigureArgs {
     #[command(flatten)]
     pub(crate) inputs: Inputs,
-    /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable. [default:
-    /// `out/<bag name>.pdf`]
+    /// Output file: `.pdf`, `.svg`, `.png` or `.webp`, and `.tex` to include it. Repeatable; without it,
+    /// `out/<bag name>.pdf`.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
     /// Life lines, a map of who publishes to whom, or the reconfigurations one by one.
