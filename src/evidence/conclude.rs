@@ -206,7 +206,7 @@ fn declared(
     notices: &mut Notices,
 ) -> Vec<String> {
     let Some(code) = code else { return Vec::new() };
-    let owners = Owners::new();
+    let owners = Owners::new(known);
     let owner = |kind: &str, topic: &str| owners.node(kind, topic);
     let found = matching::conclude(code, known, &owner);
     notices.extend(found.notices);

@@ -19,7 +19,7 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
         !is_quiet(&text) && !text.split('/').any(|part| part.starts_with('_'))
     };
     let topics: Vec<Name> = topics.into_iter().filter(is_shown).collect();
-    let owners = Owners::new();
+    let owners = Owners::new(known);
     for topic in &topics {
         owned(known, &owners, *topic);
     }

@@ -19,6 +19,21 @@ use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 const TABLE: &str = include_str!("contracts.csv");
 
+/// Folders of the client libraries, which log in the name of every node.
+const LIBRARIES: [&str; 4] = [
+    "/libros/",
+    "/src/rclcpp/",
+    "-packages/rospy/",
+    "-packages/rclpy/",
+];
+
+/// Whether a file is part of many programs, so that it does not tell them apart: a header, or a client library's.
+fn is_shared(path: &str) -> bool {
+    path.ends_with(".h")
+        || path.ends_with(".hpp")
+        || LIBRARIES.iter().any(|folder| path.contains(folder))
+}
+
 /// Keeps the source file that a node logs from.
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
@@ -26,7 +41,7 @@ pub(crate) fn read(
 ) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     let file = record.file_name();
-    if !record.logger.is_empty() && !file.is_empty() {
+    if !record.logger.is_empty() && !file.is_empty() && !is_shared(record.file) {
         let (logger, file) = (context.name(&record.logger), context.name(file));
         context.observation(
             Observation::LogsFrom(logger, file),
@@ -47,7 +62,7 @@ struct Contract {
     /// The version of ROS, `1` or `2`; empty for either.
     ros: String,
     publishes: bool,
-    /// As a node names it: `scan` in its namespace, `~/map` below its name, `/tf` for all.
+    /// As a node names it: `scan` in its namespace, `../map` in the one around, `~/map` below its name, `/tf` for all.
     topic: String,
     kind: String,
     /// Whether no other program publishes this type.
@@ -88,10 +103,9 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
-    let foreign = foreign(known);
     let nodes = known.nodes().clone();
     let mut publishers: BTreeMap<Name, Vec<(Name, Contract)>> = BTreeMap::new();
-    for contract in contracts().into_iter().filter(|c| c.ros != foreign) {
+    for contract in Owners::new(known).0 {
         for node in nodes.iter().copied() {
             let name = known.text(node);
             if !is_meant(&contract, &name, files.get(&node)) {
@@ -117,13 +131,6 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (topic, nodes) in publishers {
         publish(source, known, topic, &nodes);
     }
-}
-
-/// The version of ROS to which a row does not apply.
-fn foreign(known: &Conclusions<'_>) -> &'static str {
-    let mut streams = known.streams.iter();
-    let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
-    if is_ros1 { "2" } else { "1" }
 }
 
 /// Adds the publishers of a topic, unless there would be more than the bag counts.
@@ -156,13 +163,21 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
     )
 }
 
-/// The well-known programs, and the types that one of them alone publishes.
+/// The well-known programs of the recording's version of ROS, and the types that one of them alone publishes.
 pub(crate) struct Owners(Vec<Contract>);
 
 impl Owners {
     /// Reads the table.
-    pub(crate) fn new() -> Self {
-        Self(contracts())
+    pub(crate) fn new(known: &Conclusions<'_>) -> Self {
+        let mut streams = known.streams.iter();
+        let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
+        Self::of(if is_ros1 { "2" } else { "1" })
+    }
+
+    /// The rows that are not for this version of ROS alone.
+    fn of(foreign: &str) -> Self {
+        let rows = contracts().into_iter().filter(|c| c.ros != foreign);
+        Self(rows.collect())
     }
 
     /// The default name of the node that publishes messages of this type: in the namespace in which it would publish
@@ -182,12 +197,11 @@ impl Owners {
         kind: &str,
         node: &str,
     ) -> Vec<(bool, Name)> {
-        let foreign = foreign(known);
         let owner = self.0.iter().find(|c| c.owns && c.kind == kind);
         let is_other = |row: &&Contract| {
             let is_same =
                 |owner: &Contract| (&owner.node, &owner.package) == (&row.node, &row.package);
-            row.ros != foreign && owner.is_some_and(is_same)
+            owner.is_some_and(is_same)
         };
         let recorded = |row: &Contract| {
             let topic = known.facts.known(&resolved(&row.topic, node));
@@ -227,11 +241,17 @@ fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>)
 
 /// A topic's full name in the default configuration of a node.
 fn resolved(topic: &str, node: &str) -> String {
-    match topic.strip_prefix("~/") {
-        Some(private) => format!("{node}/{private}"),
-        None if topic.starts_with('/') => topic.to_owned(),
-        None => format!("{}/{topic}", namespace(node).trim_end_matches('/')),
+    let space = namespace(node);
+    if let Some(private) = topic.strip_prefix("~/") {
+        return format!("{node}/{private}");
     }
+    if let Some(outer) = topic.strip_prefix("../") {
+        return format!("{}/{outer}", namespace(space).trim_end_matches('/'));
+    }
+    if topic.starts_with('/') {
+        return topic.to_owned();
+    }
+    format!("{}/{topic}", space.trim_end_matches('/'))
 }
 
 #[cfg(test)]
@@ -284,12 +304,15 @@ mod tests {
 
     #[test]
     fn a_unique_type_identifies_its_program() {
-        let owners = Owners::new();
+        let owners = Owners::of("1");
         let owner = |topic| owners.node("turtlesim/Pose", topic);
         assert_eq!(owner("/turtle1/pose").as_deref(), Some("/turtlesim"));
         assert_eq!(owner("/r1/turtle1/pose").as_deref(), Some("/r1/turtlesim"));
         assert_eq!(owner("/pose").as_deref(), Some("/turtlesim"));
         assert_eq!(owners.node("std_msgs/String", "/chatter"), None);
+        // The driver of ROS 1 has another name.
+        let packets = |owners: Owners| owners.node("velodyne_msgs/VelodyneScan", "/packets");
+        assert!(packets(owners).is_some() && packets(Owners::of("2")).is_none());
     }
 
     #[test]
@@ -298,5 +321,20 @@ mod tests {
         assert_eq!(resolved("scan", "/amcl"), "/scan");
         assert_eq!(resolved("~/odom", "/base"), "/base/odom");
         assert_eq!(resolved("/tf", "/r1/base"), "/tf");
+        assert_eq!(resolved("../map", "/r1/costmap/costmap"), "/r1/map");
+        assert_eq!(resolved("../map", "/costmap/costmap"), "/map");
+    }
+
+    #[test]
+    fn a_log_record_of_a_shared_file_does_not_tell_programs_apart() {
+        let shared = [
+            "./clients/roscpp/src/libros/connection.cpp",
+            "./src/rclcpp/subscription_base.cpp",
+            "/opt/ros/noetic/include/tf2_ros/message_filter.h",
+            "/opt/ros/noetic/lib/python3/dist-packages/rospy/topics.py",
+        ];
+        assert!(shared.into_iter().all(is_shared));
+        let own = ["./src/amcl_node.cpp", "/ws/examples/rclcpp/lambda.cpp"];
+        assert!(!own.into_iter().any(is_shared));
     }
 }
