@@ -830,3 +830,125 @@ fn a_client_makes_rosbridge_subscribe() {
         .end;
     assert_eq!(end, Stamp(ORIGIN + 9 * SECOND + 1));
 }
+
+#[test]
+fn a_complete_list_decides_between_two_copies() {
+    let bag = |listed: bool| {
+        let mut bag = Recording::default();
+        let input = bag.publisher("/camera", "/image", "sensor_msgs/Image");
+        let output = bag.publisher("/relay", "/again", "sensor_msgs/Image");
+        let log = bag.publisher("/camera", "/rosout", "rosgraph_msgs/Log");
+        for n in 0..60_u32 {
+            // The recorder gets every second copy before its original.
+            let (at, early) = (i64::from(n) * 100, n % 2 == 0);
+            let payload = n.to_le_bytes().repeat(50);
+            bag.at(input, at, payload.clone());
+            bag.at(output, if early { at - 2 } else { at + 2 }, payload);
+        }
+        if listed {
+            bag.at(log, 50, log1("/camera", "up", "camera.py", &["/image"]));
+        }
+        bag.messages.sort_by_key(|m| m.1);
+        bag
+    };
+    assert!(copies(&bag(false)).is_empty());
+    assert_eq!(copies(&bag(true)), ["/image > /relay inferred"]);
+}
+
+#[test]
+fn a_mux_says_what_it_passes_on() {
+    let mut bag = Recording::default();
+    for (node, topic) in [
+        ("/teleop", "/cmd_teleop"),
+        ("/nav", "/cmd_nav"),
+        ("/mux", "/cmd_vel"),
+    ] {
+        let twist = bag.publisher(node, topic, "geometry_msgs/Twist");
+        bag.send(twist, (0, 30_000), 100, &[1; 48]);
+    }
+    // Not an input: of another type.
+    let battery = bag.publisher("/base", "/battery", "std_msgs/Float32");
+    bag.send(battery, (0, 30_000), 100, &[0; 4]);
+    let rosout = bag.publisher("/mux", "/rosout", "rosgraph_msgs/Log");
+    bag.at(
+        rosout,
+        1,
+        log1("/mux", "up", "mux.cpp", &["/cmd_vel", "/mux/selected"]),
+    );
+    let selected = bag.publisher("/mux", "/mux/selected", "std_msgs/String");
+    bag.publishers[selected].latching = true;
+    for (at, topic) in [
+        (5, "__none"),
+        (10, "/cmd_nav"),
+        (15_000, "/cmd_teleop"),
+        (20_000, "/battery"),
+    ] {
+        bag.at(selected, at, text1(topic));
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    assert_eq!(
+        edges(&bag, "payload"),
+        ["/cmd_nav > /mux inferred", "/cmd_teleop > /mux inferred"]
+    );
+}
+
+/// The windows in which a node is there that a launch file declares beside two robots: `/r1/base` from 0 to 10 s, and
+/// `/r2/base` and a viewer with an anonymous name from 5 to 10 s.
+fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
+    let mut bag = Recording::default();
+    for (node, topic, from) in [
+        ("/r1/base", "/r1/odom", 0),
+        ("/r2/base", "/r2/odom", 5_000),
+        ("/viewer_robot_47_1234", "/view", 5_000),
+    ] {
+        let odom = bag.publisher(node, topic, "nav_msgs/Odometry");
+        bag.send(odom, (from, 10_001), 100, &[1; 8]);
+    }
+    let recorded = recorded(&bag, CollectOptions::default());
+    let start = recorded.span.unwrap().start;
+    let window = |n: i64| Span::new(start.plus(n * 2 * SECOND), start.plus((n + 1) * 2 * SECOND));
+    let windows: Vec<Span> = (0..5).map(window).collect();
+    let declared = TopologyEntry {
+        declared: true,
+        ..entry(element, None)
+    };
+    let options = conclude::ConcludeOptions {
+        topology: Topology {
+            entries: vec![declared],
+            ..Topology::default()
+        },
+        ..conclude::ConcludeOptions::default()
+    };
+    let built = graph::build(&recorded, &windows, &options, 0).unwrap();
+    let names: Vec<String> = built
+        .elements
+        .nodes
+        .iter()
+        .map(|n| n.name.to_string())
+        .collect();
+    let id = names.iter().position(|name| name == node);
+    let is_there = |g: &graph::Graph| g.nodes.iter().any(|n| Some(n.id as usize) == id);
+    (built.graphs.iter().map(is_there).collect(), names)
+}
+
+#[test]
+fn a_declared_node_lives_as_long_as_its_namespace() {
+    let lives = |node: &str| launched(NamedElement::Node(node.to_owned()), node).0;
+    assert_eq!(lives("/r1/planner"), [true; 5]);
+    assert_eq!(lives("/r2/planner"), [false, false, true, true, true]);
+    assert_eq!(lives("/planner"), [true; 5]);
+}
+
+#[test]
+fn an_anonymous_node_of_a_launch_file_is_the_one_of_the_bag() {
+    let (seen, topic) = ("/viewer_robot_47_1234", "/r1/odom".to_owned());
+    let (there, names) = launched(
+        NamedElement::Subscribe("/viewer*".to_owned(), topic.clone()),
+        seen,
+    );
+    assert_eq!(there, [false, false, true, true, true]);
+    assert!(!names.contains(&"/viewer".to_owned()));
+    // Without one in the bag, it has the name without its number.
+    let (_, names) = launched(NamedElement::Subscribe("/monitor*".to_owned(), topic), seen);
+    assert!(names.contains(&"/monitor".to_owned()));
+}
