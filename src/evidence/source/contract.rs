@@ -29,8 +29,7 @@ const LIBRARIES: [&str; 4] = [
 
 /// Whether a file is part of many programs, so that it does not tell them apart: a header, or a client library's.
 fn is_shared(path: &str) -> bool {
-    path.ends_with(".h")
-        || path.ends_with(".hpp")
+    matches!(path.rsplit_once('.'), Some((_, "h" | "hpp")))
         || LIBRARIES.iter().any(|folder| path.contains(folder))
 }
 
