@@ -86,7 +86,7 @@ fn a_full_disk_is_a_failure_of_every_command() {
         if !args.iter().any(|a| ["--help", "--version"].contains(a)) {
             let said = errors(&output);
             assert!(
-                said.contains("No space left") && said.contains("hint: make room"),
+                said.contains("No space left") && said.contains("hint: free some space"),
                 "{said}"
             );
         }
