@@ -277,6 +277,20 @@ fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
 }
 
 #[test]
+fn every_change_in_json_names_its_event() {
+    for bag in bags() {
+        let log = Log::of(&bag);
+        let mission: Value =
+            serde_json::from_str(&said(&bag, &["render", "-o", "-", "--format", "json"])).unwrap();
+        let windows = mission["windows"].as_array().unwrap().iter();
+        let changes = windows.flat_map(|window| window["changes"].as_array().unwrap());
+        for change in changes {
+            log.kind(change["entry"].as_u64().unwrap());
+        }
+    }
+}
+
+#[test]
 fn the_marks_of_frames_strips_and_pages_are_events_too() {
     for bag in bags() {
         let log = Log::of(&bag);

@@ -11,6 +11,7 @@ use crate::mission::event_log::{Detail, described};
 #[derive(Serialize)]
 pub(crate) struct ChangeRow<'a> {
     kind: &'static str,
+    #[serde(rename = "entry")]
     event: EventId,
     #[serde(flatten)]
     named: ElementName<'a>,
