@@ -1,6 +1,6 @@
 //! Checks of missions: compares them with each other, generates expectations, and checks against them.
 //!
-//! Everything here is based on lifetimes, rates and the ledger, never on the difference of two windows. An element
+//! Everything here is based on lifetimes, rates and the event log, never on the difference of two windows. An element
 //! without evidence in the bag is not absent but undecidable, and reported as such.
 
 mod baseline;

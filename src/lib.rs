@@ -31,8 +31,8 @@
 //! |---|---|---|
 //! | `base` | | times, names, errors, notices, words: the nouns that all share |
 //! | [`bag`] | files | connections and messages, distinguished by the first bytes |
-//! | `evidence` | messages | claims: the publishers and subscribers, with the kind and the strength of the evidence |
-//! | `graph` | claims and windows | the computation graph of each window, and the changes |
+//! | `evidence` | messages | observations: the publishers and subscribers, with the kind and the strength of the evidence |
+//! | `graph` | observations and windows | the computation graph of each window, and the changes |
 //! | `mission` | graphs | the whole sequence, as a value and as JSON; its log and its summary |
 //! | `view` | a mission | the part of it that the picture shows: filtered, grouped, collapsed, counted |
 //! | `layout` | the union of a view | places for everything, once, so that nothing moves |
@@ -47,8 +47,8 @@
 //! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
 //! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
-//! *window* one half-open interval `[start, end)`. A *claim* is a statement of one source about the graph, with the
-//! times at which it said so; a *proof* is a fact that follows from claims; a *confidence* is the strength of the evidence
+//! *window* one half-open interval `[start, end)`. An *observation* is a statement of one source about the graph,
+//! with its times; an *inference* is a fact that follows from observations; a *confidence* is the strength of the evidence
 //! for something. The *graph* of a window contains the *states* of nodes, topics, publications and subscriptions, its
 //! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
 //! every run. The *view* contains *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with

@@ -50,7 +50,7 @@ pub(crate) const NAME: usize = 1 << 16;
 pub(crate) const NAMES_BYTES: usize = 32 << 20;
 
 /// The most observations about those names, each by one source: eight for each name.
-pub(crate) const CLAIMS: usize = 1 << 19;
+pub(crate) const OBSERVATIONS: usize = 1 << 19;
 
 /// The most lines of evidence listed for a query: more than anyone reads.
 pub(crate) const EVIDENCE_LINES: usize = 1 << 16;

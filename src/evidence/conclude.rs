@@ -1,4 +1,4 @@
-//! Conclusions from everything recorded: the proofs of all sources and of the user's files, stated values.
+//! Conclusions from everything recorded: the inferences of all sources and of the user's files, stated values.
 //! Made once, for any windows.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,7 +44,7 @@ pub struct Findings {
     pub(crate) mission: (Stamp, Stamp),
     /// The connections, as in [`Recorded`] except for the numbers of names.
     pub(crate) streams: Vec<Stream>,
-    /// Every proof of an element.
+    /// Every inference about an element.
     pub(crate) inferences: Vec<Inference>,
     /// Statements other than about which elements exist.
     pub(crate) incidents: Vec<Incident>,
@@ -260,7 +260,7 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
     stated.into_iter().map(notice).collect()
 }
 
-/// Explains proofs that rest on no single message, for elements that `why` asks about.
+/// Explains inferences that rest on no single message, for elements that `why` asks about.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let is_asked = |inference: &&Inference| {
         known.facts.is_watched(inference.what.ends())
@@ -283,7 +283,7 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     known.facts.pieces.extend(pieces);
 }
 
-/// The time and the words of a proof; `None` where observations with their own words made it.
+/// The time and the words of an inference; `None` where observations with their own words made it.
 fn explained(
     known: &Conclusions<'_>,
     messages: &Stamps,

@@ -117,7 +117,7 @@ pub(crate) enum Validity {
     Signs { signs: Vec<Stamp>, ends: Vec<Stamp> },
     /// From a beginning to the next end.
     Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
-    /// At these moments; without other proofs, it is not known to last.
+    /// At these moments; without other inferences, it is not known to last.
     Moments(Vec<Stamp>),
     /// As long as this other element exists.
     Like(ElementKey),
@@ -209,7 +209,7 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// Adds a proof.
+    /// Adds an inference.
     pub(crate) fn add(&mut self, inference: Inference) {
         let [node, _] = inference.what.ends();
         self.nodes.extend(node);
@@ -225,7 +225,7 @@ impl<'a> Conclusions<'a> {
         self.inferences.push(inference);
     }
 
-    /// Adds a proof, with its explanation for `why`; `time` if it belongs to one.
+    /// Adds an inference, with its explanation for `why`; `time` if it belongs to one.
     pub(crate) fn because(
         &mut self,
         inference: Inference,
@@ -291,7 +291,7 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// Whether there is a proof of this element already.
+    /// Whether there is an inference about this element already.
     pub(crate) fn knows(&self, what: ElementKey) -> bool {
         match what {
             ElementKey::Node(node) => self.nodes.contains(&node),

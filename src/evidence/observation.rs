@@ -335,7 +335,7 @@ impl Observations {
         let key = (said.observation, source, said.snapshot);
         let place = match self.places.get(&key) {
             Some(place) => *place,
-            None if self.list.len() >= budget::CLAIMS => {
+            None if self.list.len() >= budget::OBSERVATIONS => {
                 self.dropped += 1;
                 return;
             }

@@ -53,7 +53,9 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
             texts.max_by_key(long).unwrap_or_else(|| name.clone())
         });
         let longest: Vec<String> = longest.collect();
-        let words = words(&longest, &listed(&longest, long));
+        let listed = listed(&longest, long);
+        let texts = listed.iter().map(|at| longest[*at].clone());
+        let words = words(texts, longest.len() - listed.len());
         let places = broken(&words, fonts, size, WIDTH * size);
         let ends = places.iter().zip(&words);
         let ends = ends.map(|(at, word)| at.x + fonts.width(word, size, Weight::SemiBold));
@@ -94,14 +96,14 @@ fn listed<T, R: Ord>(all: &[T], rank: impl Fn(&T) -> R) -> Vec<usize> {
     places
 }
 
-/// The listed names as they follow each other, each with its comma, after the words before them; then the number of
-/// the others.
-fn words(names: &[String], listed: &[usize]) -> Vec<String> {
+/// Names as they follow each other, each with its comma, after the words before them; then the number of the others.
+fn words(names: impl Iterator<Item = String>, more: usize) -> Vec<String> {
     let mut words = vec![FIRST.to_owned()];
-    words.extend(listed.iter().map(|at| format!("{},", names[*at])));
-    match names.len() - listed.len() {
-        0 => drop(words.last_mut().map(String::pop)),
-        more => words.push(format!("and {more} more")),
+    words.extend(names.map(|name| name + ","));
+    if more > 0 {
+        words.push(format!("and {more} more"));
+    } else {
+        words.last_mut().map(String::pop);
     }
     words
 }
@@ -137,11 +139,12 @@ impl Boxes<'_> {
         let seen =
             seen.filter_map(|((item, shown), name)| Some((item, view.calm_at(shown, k)?, name)));
         let seen: Vec<_> = seen.collect();
-        let texts = seen
-            .iter()
-            .map(|(item, shown, short)| said(item, shown, short));
         let listed = listed(&seen, |(_, shown, _)| shown.mark.is_some());
-        let words = words(&texts.collect::<Vec<_>>(), &listed);
+        let texts = listed.iter().map(|at| {
+            let (item, shown, short) = &seen[*at];
+            said(item, shown, short)
+        });
+        let words = words(texts, seen.len() - listed.len());
         let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
         let places = broken(&words, self.fonts, style.size, most);
         let place = self.fit.rect(place);
@@ -198,10 +201,13 @@ mod tests {
     #[test]
     fn names_beyond_the_limit_are_counted_and_changed_ones_are_listed() {
         let names: Vec<String> = (0..70).map(|n| format!("n{n}")).collect();
-        let few = words(&names[..3], &listed(&names[..3], String::len));
+        let few = words(names[..3].iter().cloned(), 0);
         assert_eq!(few, ["also here:", "n0,", "n1,", "n2"]);
 
-        let many = words(&names, &listed(&names, |name| name == "n69"));
+        assert_eq!(listed(&names[..3], String::len), [0, 1, 2]);
+        let listed = listed(&names, |name| name == "n69");
+        let texts = listed.iter().map(|at| names[*at].clone());
+        let many = words(texts, names.len() - listed.len());
         assert_eq!(many.len(), 1 + MOST_LISTED + 1);
         assert_eq!(many[1], "n0,");
         assert_eq!(many[MOST_LISTED..], ["n69,", "and 10 more"]);

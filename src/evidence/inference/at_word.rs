@@ -23,7 +23,7 @@ impl Conclusions<'_> {
         facts.into_iter().map(times).collect()
     }
 
-    /// Adds the proofs that the observations state without any rule: nodes, topics, publications and subscriptions.
+    /// Adds the inferences that the observations state without any rule: nodes, topics, publications and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let refusals = self.refusals();

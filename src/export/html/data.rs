@@ -388,10 +388,10 @@ fn facts_of(
     if let (true, [Element::Topic(_), ..]) = (is_item, members) {
         facts.extend(types(elements, members));
     }
-    let proof = members
+    let evidence = members
         .iter()
         .fold(Evidence::NONE, |all, m| all.and(elements.evidence(*m)));
-    facts.extend(proof.lines().map(|line| format!("known by {line}")));
+    facts.extend(evidence.lines().map(|line| format!("known by {line}")));
     if is_item {
         let lives = members.iter().map(|m| elements.life(*m));
         let first = lives.clone().filter_map(|l| l.0).min();

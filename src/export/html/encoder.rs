@@ -7,6 +7,7 @@ use crate::export::html::{HtmlPage, PageGraph};
 use crate::export::sequence::{Sequence, UnionDrawings};
 use crate::export::target::Target;
 use crate::export::{Started, one_text};
+use crate::view::View;
 
 /// The most boxes and arrows of a page: with four kilobytes each, half a gigabyte; browsers are slow long before.
 const MOST_DRAWN: usize = 120_000;
@@ -16,9 +17,8 @@ const MOST_DRAWN: usize = 120_000;
 /// # Errors
 /// [`Error::Usage`] if it would have more than [`MOST_DRAWN`] boxes and arrows; as [`one_text`].
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    let unfolded = sequence.unfolded.map(|u| u.view);
-    let folded = Some(sequence.view).filter(|view| unfolded.is_none() || view.is_folded());
-    let views = unfolded.into_iter().chain(folded);
+    let graphs = graphs(sequence);
+    let views = graphs.iter().flatten().map(|(view, _)| view);
     let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
     if drawn > MOST_DRAWN {
         return Err(Error::usage(
@@ -27,22 +27,32 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         ));
     }
     let style = Style::builtin(BUILTIN[0].0)?;
-    one_text(target, move || page(sequence, &style))
+    one_text(target, move || page(sequence, graphs, &style))
 }
 
-/// The page with all elements separately, and with the picture if it groups elements.
-fn page(sequence: &Sequence<'_>, style: &Style) -> String {
-    let overview = sequence.picture.overview();
+/// A graph of the page: what it shows, and where that is drawn.
+type DrawnGraph<'a> = (&'a View, UnionDrawings<'a>);
+
+/// The graph with all elements separately, and the picture's if it groups elements; none for a timeline of topics.
+fn graphs<'a>(sequence: &'a Sequence<'a>) -> [Option<DrawnGraph<'a>>; 2] {
     let opened = sequence
         .unfolded
         .and_then(|opened| Some((opened.view, opened.picture?.graph()?)));
     let is_folded = opened.is_some() && sequence.view.is_folded();
     let picture = (is_folded || opened.is_none()).then(|| sequence.picture.graph());
     let picture = picture.flatten().map(|drawings| (sequence.view, drawings));
-    let (whole, folded) = match opened {
-        Some(_) => (opened, picture),
-        None => (picture, None),
-    };
+    match opened {
+        Some(_) => [opened, picture],
+        None => [picture, None],
+    }
+}
+
+fn page(
+    sequence: &Sequence<'_>,
+    [whole, folded]: [Option<DrawnGraph<'_>>; 2],
+    style: &Style,
+) -> String {
+    let overview = sequence.picture.overview();
     // A chosen style is always used; the default one has a dark variant.
     let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
