@@ -18,7 +18,9 @@ from drive import END, LEFT, until, window
 
 # A page is drawn in three percent of the time, so that the next one may take a while on a busy machine.
 GROWN = 120
-SEEK = "Number(document.getElementById('seek').max)"
+# While the page reloads it has no slider: no number is more than another then, so that a wait goes on.
+SEEK = "Number(document.getElementById('seek')?.max)"
+SHOWN = "Number(document.getElementById('seek')?.value)"
 
 
 class Recording:
@@ -55,15 +57,15 @@ class Recording:
 
 def drive(b, recording):
     b.open(recording.url)
-    until(b, f"document.getElementById('seek') != null && {SEEK} > 0", seconds=GROWN)
+    until(b, f"{SEEK} > 0", seconds=GROWN)
     first = b.js(f"return {SEEK}")
     assert window(b) == first, "the newest window is shown"
     recording.grow(0.4, 0.6)
     until(b, f"{SEEK} > {first}", seconds=GROWN)
     second = b.js(f"return {SEEK}")
-    until(b, "Number(document.getElementById('seek').value)", second)
+    until(b, SHOWN, second)
     b.keys(LEFT)
-    until(b, "Number(document.getElementById('seek').value)", second - 1)
+    until(b, SHOWN, second - 1)
     served = recording.page()
     recording.grow(0.6, 0.8)
     while recording.page() == served:
@@ -71,12 +73,12 @@ def drive(b, recording):
     # Time enough to reload, if the page did so by mistake.
     time.sleep(1)
     b.keys(LEFT)
-    until(b, "Number(document.getElementById('seek').value)", second - 2)
+    until(b, SHOWN, second - 2)
     assert b.js(f"return {SEEK}") == second, "a page that is looked at does not change"
     b.keys(END)
     until(b, f"{SEEK} > {second}", seconds=GROWN)
     third = b.js(f"return {SEEK}")
-    until(b, "Number(document.getElementById('seek').value)", third)
+    until(b, SHOWN, third)
     print(f"  the film grows from {first + 1} to {second + 1} and {third + 1} windows, and stepping back works meanwhile")
 
 
