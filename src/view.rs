@@ -419,7 +419,9 @@ impl View {
 
     /// The look of something in window `k` as it is drawn there, without a colour if that is on the frame of a crowd.
     pub(crate) fn calm_at(&self, shown: &Showing, k: usize) -> Option<Shown> {
-        self.frames.get(k)?.calmed(shown.at(k)?)
+        let mut shown = shown.at(k)?.clone();
+        self.frames.get(k)?.calm(&mut shown);
+        Some(shown)
     }
 
     /// Every look of any item or arrow, in no particular order.

@@ -143,7 +143,8 @@ fn alive(svg: &str, window: &Value, at: &str) {
         let name = &rest[..rest.find('"').unwrap()];
         let classes: Vec<&str> = classes.split(' ').collect();
         // Unknown publishers and collapsed namespaces are boxes, not nodes.
-        let is_drawn = classes.contains(&"active") && !classes.contains(&"removed");
+        let is_gone = ["removed", "gone"].iter().any(|c| classes.contains(c));
+        let is_drawn = classes.contains(&"active") && !is_gone;
         if is_drawn && !name.contains(" ?") && !rest.contains(" data-members=") {
             assert!(names.iter().any(|n| is_run(n, name)), "{name} of {at}");
         }

@@ -370,8 +370,8 @@ impl<'a> Board<'a> {
             (ink::LINE, style.timeline.axis),
             (ink::RULE, style.timeline.axis),
             (ink::TINT, style.cluster.fill),
-            (ink::BAND[0], style.cluster.stroke),
-            (ink::BAND[1], style.cluster.fill),
+            (ink::BAND[0], style.timeline.future),
+            (ink::BAND[1], style.legend.fill),
             (ink::ADDED, style.added.color),
             (ink::REMOVED, style.removed.color),
             (ink::CHANGED, style.changed.color),
@@ -400,7 +400,7 @@ fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
 /// The part of the page for the board.
 fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     let margin = page.graph.x;
-    let top = page.title.bottom().max(margin / 2.0) + margin / 4.0;
+    let top = page.title.bottom().max(margin / 2.0) + margin / 2.0;
     let size = options.size;
     Rect::new(
         margin,

@@ -351,6 +351,7 @@ impl<'a> Picture<'a> {
             groups.push(space);
         }
         let whole = Rect::new(0.0, 0.0, self.layout.size.w, self.layout.size.h);
+        let mut numbers = Vec::new();
         for (nth, crowd) in frame.crowds.iter().enumerate() {
             let space = crowd.space.and_then(|at| self.layout.clusters.get(at));
             let name = crowd.space.map_or("", |at| &*view.namespaces[at].name);
@@ -358,7 +359,7 @@ impl<'a> Picture<'a> {
             let others = before.filter(|other| other.space == crowd.space);
             let [frame, words] = boxes.crowd(crowd, (name, *space.unwrap_or(&whole)), others);
             groups.push(frame);
-            titles.push(words);
+            numbers.push(words);
         }
         for (footer, also) in self.measured.graph.footers.iter().zip(&view.also) {
             let place = match footer.cluster {
@@ -377,6 +378,7 @@ impl<'a> Picture<'a> {
                 groups.extend(boxes.card_rows(card, view, k));
             }
         }
+        groups.extend(numbers);
     }
 
     fn boxes(&self) -> Boxes<'_> {

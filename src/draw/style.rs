@@ -156,6 +156,15 @@ impl Style {
             dash: self.declared.dash.clone(),
         }
     }
+
+    /// The look of something that ended as one of many: the dashes of what went, without its colour.
+    pub(crate) fn gone(&self) -> Quiet {
+        Quiet {
+            fill: Color::NONE,
+            dash: self.removed.dash.clone(),
+            ..self.silent.clone()
+        }
+    }
 }
 
 impl Body {
@@ -432,28 +441,61 @@ mod tests {
     }
 
     #[test]
-    fn every_line_has_contrast_on_page_and_namespace() {
+    fn every_line_and_text_has_contrast_to_its_ground() {
         for (name, _) in BUILTIN {
             let style = Style::builtin(name).unwrap();
-            let lines = [
-                style.edge.stroke,
-                style.silent.stroke,
-                style.declared.stroke,
-                style.added.color,
-                style.removed.color,
-                style.changed.color,
-            ];
             let page = style.background();
-            for (ground, line) in [page, style.cluster.fill]
-                .into_iter()
-                .filter(|ground| *ground != Color::NONE)
-                .flat_map(|ground| lines.map(|line| (ground, line)))
-            {
-                let contrast = contrast(line, ground);
-                assert!(
-                    contrast >= 3.0,
-                    "{name}: {line} on {ground} is {contrast:.2}"
-                );
+            let or_page = |fill: Color| if fill == Color::NONE { page } else { fill };
+            let graph = [page, or_page(style.cluster.fill)];
+            let (node, topic) = (or_page(style.node.fill), or_page(style.topic.fill));
+            let (title, legend) = (&style.title, style.legend.fill);
+            let mut pairs = vec![
+                (4.5, style.legend.text, vec![legend, style.timeline.future]),
+                (4.5, style.timeline.text, vec![legend]),
+                (4.5, style.page.text, vec![page, legend]),
+                (4.5, style.page.quiet, vec![graph[0], graph[1], node, topic]),
+                (4.5, style.cluster.text, graph.to_vec()),
+                (4.5, style.node.text, vec![node]),
+                (4.5, style.topic.text, vec![topic]),
+                (
+                    4.5,
+                    style.edge.text,
+                    vec![graph[0], graph[1], style.edge.halo],
+                ),
+                (3.0, style.node.stroke, graph.to_vec()),
+                (3.0, style.topic.stroke, graph.to_vec()),
+                (3.0, style.edge.stroke, graph.to_vec()),
+            ];
+            let words = [
+                title.text,
+                title.quiet,
+                title.added,
+                title.removed,
+                title.changed,
+            ];
+            pairs.extend(words.map(|color| (4.5, color, vec![title.fill])));
+            for quiet in [&style.silent, &style.declared] {
+                pairs.push((3.0, quiet.stroke, graph.to_vec()));
+                pairs.push((4.5, quiet.text, graph.to_vec()));
+            }
+            let chip = &style.chip;
+            let chips = [
+                (chip.added_text, chip.added),
+                (chip.removed_text, chip.removed),
+                (chip.changed_text, chip.changed),
+            ];
+            pairs.extend(chips.map(|(text, fill)| (4.5, text, vec![fill])));
+            for change in [&style.added, &style.removed, &style.changed] {
+                let fill = or_page(change.fill);
+                pairs.push((4.5, change.text, vec![fill]));
+                pairs.push((4.5, change.color, vec![fill, graph[0], graph[1]]));
+                pairs.push((4.5, style.badge.sign, vec![change.color]));
+            }
+            for (least, color, grounds) in pairs {
+                for ground in grounds {
+                    let found = contrast(color, ground);
+                    assert!(found >= least, "{name}: {color} on {ground} is {found:.2}");
+                }
             }
         }
     }

@@ -1,9 +1,9 @@
 //! Windows with more changes than a reader can follow: those of one kind in one namespace are one coloured frame
 //! with their number, and as few words in the headline.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use super::{Frame, Mark, SeenWindow, Shown, View};
+use super::{Frame, Mark, Phrase, SeenWindow, Shown, View};
 use crate::base::name::lies_in;
 use crate::graph::Element;
 use crate::mission::Mission;
@@ -13,6 +13,11 @@ use crate::mission::event_log::{EventId, Kind};
 const MOST: usize = 5;
 /// The event of a phrase that describes several.
 const FOLDED: EventId = EventId::MAX;
+/// The word for publications and subscriptions.
+const EDGES: &str = "edges";
+
+/// The places of a phrase in the headline and of a name in it.
+type NamePlace = (usize, usize);
 
 /// Changes of one kind in one namespace that are one coloured frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,38 +38,42 @@ pub(super) fn gather(view: &mut View, mission: &Mission) {
     for frame in &mut frames {
         let words = |frame: &Frame| frame.caption.iter().map(|p| p.names.len()).sum::<usize>();
         while words(frame) > MOST {
-            let Some((phrase, names, space)) = largest(frame, view, mission) else {
+            let Some((names, space)) = largest(frame, view, mission) else {
                 break;
             };
-            fold(frame, (phrase, &names), space, view, mission);
+            fold(frame, &names, space, view, mission);
         }
     }
     view.frames = frames;
 }
 
-/// The place of the phrase with most names in one namespace, or anywhere, the places of those names, and the innermost
-/// namespace around all of them.
+/// The largest group of names of one kind in one namespace, or anywhere, and the innermost namespace around all of them.
 fn largest(
     frame: &Frame,
     view: &View,
     mission: &Mission,
-) -> Option<(usize, Vec<usize>, Option<usize>)> {
-    let mut groups: BTreeMap<(bool, usize, usize), Vec<usize>> = BTreeMap::new();
+) -> Option<(Vec<NamePlace>, Option<usize>)> {
+    let mut groups: BTreeMap<(bool, usize, usize), Vec<NamePlace>> = BTreeMap::new();
+    // The first phrase about edges that come, and about those that go.
+    let mut edges: BTreeMap<char, usize> = BTreeMap::new();
     for (at, phrase) in frame.caption.iter().enumerate() {
         for (name, event) in phrase.events.iter().enumerate() {
             if *event == FOLDED {
                 continue;
             }
+            let kind = match noun(mission, *event) {
+                EDGES => *edges.entry(phrase.sign).or_insert(at),
+                _ => at,
+            };
             let around = around(view, subject(mission, *event));
             // The whole graph comes after all namespaces.
             let outermost = around.first().copied().unwrap_or(usize::MAX);
             if outermost < usize::MAX {
-                groups.entry((true, at, outermost)).or_default().push(name);
+                let group = groups.entry((true, kind, outermost)).or_default();
+                group.push((at, name));
             }
-            groups
-                .entry((false, at, usize::MAX))
-                .or_default()
-                .push(name);
+            let group = groups.entry((false, kind, usize::MAX)).or_default();
+            group.push((at, name));
         }
     }
     groups.retain(|_, names| names.len() > 1);
@@ -77,16 +86,15 @@ fn largest(
             let order = (usize::MAX - at, usize::MAX - space);
             (*is_framed, stays, names.len(), order)
         });
-    let ((_, at, _), names) = best?;
-    let events = &frame.caption[at].events;
+    let (_, names) = best?;
     let spaces = names
         .iter()
-        .map(|name| around(view, subject(mission, events[*name])));
+        .map(|(at, name)| around(view, subject(mission, frame.caption[*at].events[*name])));
     let common = spaces.reduce(|a, b| {
         let same = a.into_iter().zip(b).take_while(|(a, b)| a == b);
         same.map(|(a, _)| a).collect()
     });
-    Some((at, names, common.and_then(|all| all.last().copied())))
+    Some((names, common.and_then(|all| all.last().copied())))
 }
 
 /// The namespaces with a frame around a name, the outermost first.
@@ -107,34 +115,52 @@ fn subject(mission: &Mission, event: EventId) -> &str {
         .unwrap_or_default()
 }
 
-/// Makes some names of a phrase one.
+/// The kind of thing that an event is about, in the plural.
+fn noun(mission: &Mission, event: EventId) -> &'static str {
+    let event = mission.log.events.get(event as usize);
+    event.map_or("changes", |event| match (event.kind, event.what) {
+        (Kind::Rate, _) => "rates",
+        (_, Element::Node(_)) => "nodes",
+        (Kind::Appeared | Kind::Vanished, Element::Publish(_) | Element::Subscribe(_)) => EDGES,
+        _ => "topics",
+    })
+}
+
+/// Makes some names one.
 fn fold(
     frame: &mut Frame,
-    (at, names): (usize, &[usize]),
+    names: &[NamePlace],
     space: Option<usize>,
     view: &View,
     mission: &Mission,
 ) {
-    let phrase = &mut frame.caption[at];
-    let first = mission.log.events.get(phrase.events[names[0]] as usize);
-    let noun = first.map_or("changes", |event| match (event.kind, event.what) {
-        (Kind::Rate, _) => "rates",
-        (_, Element::Node(_)) => "nodes",
-        _ => "topics",
-    });
-    let mut events: Vec<EventId> = names.iter().map(|name| phrase.events[*name]).collect();
+    let event = |(at, name): &NamePlace| frame.caption[*at].events[*name];
+    let mut events: Vec<EventId> = names.iter().map(event).collect();
+    let (count, noun, at) = (names.len(), noun(mission, events[0]), names[0].0);
+    events.sort_unstable();
     let space_name = space.map(|at| &*view.namespaces[at].name);
     let place = space_name.filter(|space| !frame.note.starts_with(space));
     let place = place.map_or_else(String::new, |space| format!(" in {space}"));
-    let count = names.len();
-    for name in names.iter().rev() {
-        phrase.names.remove(*name);
-        phrase.events.remove(*name);
+    for (at, name) in names.iter().rev() {
+        frame.caption[*at].names.remove(*name);
+        frame.caption[*at].events.remove(*name);
     }
+    let sign = frame.caption[at].sign;
+    if noun == EDGES {
+        // Their phrases have different words.
+        let tail = if sign == '+' { "appear" } else { "end" };
+        let phrase = Phrase {
+            sign,
+            tail: tail.to_owned(),
+            ..Phrase::default()
+        };
+        frame.caption.insert(at, phrase);
+    }
+    let phrase = &mut frame.caption[at];
     phrase.names.insert(0, format!("{count} {noun}{place}"));
     phrase.events.insert(0, FOLDED);
-    events.sort_unstable();
-    let (mark, sign) = match phrase.sign {
+    frame.caption.retain(|phrase| !phrase.names.is_empty());
+    let (mark, sign) = match sign {
         '+' => (Mark::Added, "+"),
         '−' => (Mark::Removed, "−"),
         _ => (Mark::Changed, ""),
@@ -148,66 +174,41 @@ fn fold(
 }
 
 impl View {
-    /// The looks in window `k` with the colours of crowds on their frames alone: their members are drawn as if nothing
-    /// happened, and those that are gone are not drawn, unless a line to them changed itself.
+    /// The looks in window `k` with the colours of crowds on their frames alone.
     pub(crate) fn calm(&self, k: usize) -> SeenWindow {
-        let seen = self.seen(k);
-        let Some(frame) = self.frames.get(k).filter(|frame| !frame.crowds.is_empty()) else {
-            return seen;
-        };
-        let ends = |shown: &Shown| {
-            let arrow = self.arrows.get(shown.id as usize);
-            arrow.into_iter().flat_map(|arrow| [arrow.from, arrow.to])
-        };
-        let is_changed = |shown: &&Shown| !shown.events.is_empty() && !frame.is_crowd(shown);
-        let reported: BTreeSet<u32> = seen
-            .arrows
-            .iter()
-            .filter(is_changed)
-            .flat_map(ends)
-            .collect();
-        let stays = |shown: &Shown| reported.contains(&shown.id).then(|| shown.clone());
-        let items = seen.items.iter();
-        let items: Vec<Shown> = items
-            .filter_map(|shown| frame.calmed(shown).or_else(|| stays(shown)))
-            .collect();
-        let is_there = |at: u32| items.binary_search_by_key(&at, |shown| shown.id).is_ok();
-        let arrows = seen.arrows.iter().filter(|shown| ends(shown).all(is_there));
-        SeenWindow {
-            arrows: arrows.filter_map(|shown| frame.calmed(shown)).collect(),
-            items,
+        let mut seen = self.seen(k);
+        if let Some(frame) = self.frames.get(k) {
+            for shown in seen.items.iter_mut().chain(&mut seen.arrows) {
+                frame.calm(shown);
+            }
         }
+        seen
     }
 }
 
 impl Frame {
-    /// Whether all events of something are those of a crowd.
-    fn is_crowd(&self, shown: &Shown) -> bool {
+    /// Takes the colour from a look whose events are those of a crowd: it is drawn as if nothing happened, or as
+    /// gone; a folded namespace keeps its words.
+    pub(crate) fn calm(&self, shown: &mut Shown) {
         let in_crowd = |event: &EventId| {
             let mut crowds = self.crowds.iter();
             crowds.any(|crowd| crowd.events.binary_search(event).is_ok())
         };
-        !shown.events.is_empty() && shown.events.iter().all(in_crowd)
-    }
-
-    /// A look without its colour, if its events are those of a crowd; `None` for something gone.
-    pub(crate) fn calmed(&self, shown: &Shown) -> Option<Shown> {
-        let is_crowd = self.is_crowd(shown);
-        let mut shown = shown.clone();
-        if !is_crowd {
-            return Some(shown);
+        if matches!(shown.mark, None | Some(Mark::Away))
+            || shown.events.is_empty()
+            || !shown.events.iter().all(in_crowd)
+        {
+            return;
         }
-        match shown.mark {
-            Some(Mark::Removed) => return None,
-            Some(Mark::Away) | None => return Some(shown),
-            Some(_) => {}
-        }
-        (shown.mark, shown.rates, shown.inside) = (None, None, None);
-        shown.topics.retain(|row| row.mark != Some(Mark::Removed));
+        let is_ghost = shown.is_ghost();
+        shown.rates = None;
+        shown.mark = is_ghost.then_some(Mark::Gone);
+        shown
+            .topics
+            .retain(|row| is_ghost || row.mark != Some(Mark::Removed));
         for row in &mut shown.topics {
             (row.mark, row.rates) = (None, None);
         }
-        Some(shown)
     }
 }
 
@@ -226,7 +227,8 @@ mod tests {
         let (view, _) = view(&mission(windows), &options);
         let frame = view.frames.last().unwrap();
         let seen = view.calm(view.frames.len() - 1);
-        let coloured = seen.items.iter().filter(|shown| shown.mark.is_some());
+        let has_color = |shown: &&Shown| shown.mark.is_some_and(Mark::has_color);
+        let coloured = seen.items.iter().filter(has_color);
         let name = |at: Option<usize>| at.map_or("page", |at| &*view.namespaces[at].name);
         let crowd = |crowd: &Crowd| format!("{}: {}", name(crowd.space), crowd.words);
         (
@@ -251,6 +253,33 @@ mod tests {
         assert_eq!(words, "− /a, x stop; + 5 nodes, /b start");
         assert_eq!(crowds, ["/r: +5 nodes"]);
         assert_eq!(coloured, ["/a", "/b", "/r/x"]);
+    }
+
+    #[test]
+    fn nodes_that_stop_together_are_drawn_without_their_colour() {
+        let windows = ["/a /r/b /r/c /r/d /r/e /r/f /r/g", "/a"];
+        let (words, crowds, coloured) = last(&windows);
+        assert_eq!(words, "− 6 nodes stop");
+        assert_eq!(crowds, ["/r: −6 nodes"]);
+        assert!(coloured.is_empty(), "{coloured:?}");
+        let options = ViewOptions {
+            is_picture: true,
+            ..ViewOptions::default()
+        };
+        let (view, _) = view(&mission(&windows), &options);
+        let seen = view.calm(1);
+        let gone = seen.items.iter().filter(|s| s.mark == Some(Mark::Gone));
+        assert_eq!((gone.count(), seen.items.len()), (6, 7));
+    }
+
+    #[test]
+    fn edges_of_many_nodes_are_one_crowd() {
+        let all = ["/b", "/c", "/d", "/e", "/f", "/g"];
+        let after: Vec<String> = all.iter().map(|node| format!("{node}</t")).collect();
+        let (before, after) = (all.join(" "), after.join(" "));
+        let (words, crowds, _) = last(&[&format!("/a>/t {before}"), &format!("/a>/t {after}")]);
+        assert_eq!(words, "+ 6 edges appear");
+        assert_eq!(crowds, ["page: +6 edges"]);
     }
 
     #[test]

@@ -145,16 +145,9 @@ impl LookClass {
 /// The class name that identifies a mark: the class of its badge.
 pub(crate) fn word(mark: Mark) -> &'static str {
     match mark {
-        Mark::Added => "added",
-        Mark::Removed => "removed",
-        Mark::Faster => "faster",
-        Mark::Slower => "slower",
-        Mark::HandedOver => "handed-over",
-        Mark::Restarted => "restarted",
-        Mark::Paused => "paused",
+        // All of them are changes.
         Mark::Changed => "other",
-        Mark::Inside => "inside",
-        Mark::Away => "away",
+        mark => mark.word(),
     }
 }
 

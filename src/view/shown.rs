@@ -38,6 +38,8 @@ pub enum Mark {
     Inside,
     /// It is a node that left in an earlier window and comes back in a later one.
     Away,
+    /// It ended with others, whose one coloured frame says so.
+    Gone,
 }
 
 impl Mark {
@@ -54,15 +56,22 @@ impl Mark {
             Self::Changed => "changed",
             Self::Inside => "inside",
             Self::Away => "away",
+            Self::Gone => "gone",
         }
     }
 
-    /// The class in SVG: `added`, `removed`, `away` or `changed`.
+    /// Whether it has a colour of its own.
+    pub(crate) fn has_color(self) -> bool {
+        self != Self::Gone
+    }
+
+    /// The class in SVG: `added`, `removed`, `away`, `gone` or `changed`.
     pub fn class(self) -> &'static str {
         match self {
             Self::Added => "added",
             Self::Removed => "removed",
             Self::Away => "away",
+            Self::Gone => "gone",
             _ => "changed",
         }
     }
@@ -139,6 +148,11 @@ impl Shown {
             confidence,
             ..Self::default()
         }
+    }
+
+    /// Whether it ended in the window.
+    pub(crate) fn is_ghost(&self) -> bool {
+        matches!(self.mark, Some(Mark::Removed | Mark::Gone))
     }
 
     /// Makes it the look of a service, for which no messages do not mean silence.

@@ -199,7 +199,7 @@ impl<'a> PaperCanvas<'a> {
 
     /// As [`PaperCanvas::text_middle`], on a white halo, over lines.
     pub(crate) fn label(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
-        let halo = Some((ink::PAPER, 0.7 * self.scale));
+        let halo = Some((ink::PAPER, 1.2 * self.scale));
         self.put(Anchor::Middle, Point::new(x, y), of, color, halo, text);
     }
 

@@ -12,7 +12,7 @@ use crate::base::name::last_part;
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::EventId;
-use crate::mission::event_log::{Event, Kind, Phase};
+use crate::mission::event_log::{Event, Kind};
 
 /// The course of a mission below its picture: the phases, and a row per group of nodes that come and go together.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -176,32 +176,39 @@ fn unplaced(source: &FigureSource<'_>, signs: &[RowMark]) -> Vec<CourseMark> {
     others.map(mark).collect()
 }
 
-/// The phases with their names: the user's, else by what starts or ends, else how many.
+/// The phases with their names: the user's, else by what starts or ends, else how many. Without a name a phase with the
+/// same nodes as the one before belongs to it.
 fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
-    let phase = |(k, phase): (usize, &Phase)| {
+    let mut phases: Vec<CoursePhase> = Vec::new();
+    for (k, phase) in source.phases.iter().enumerate() {
+        let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
+        let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
+        let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
+        if let Some(last) = phases.last_mut()
+            && !source.is_named
+            && counts.is_empty()
+        {
+            last.span.end = phase.span.end;
+            continue;
+        }
         let name = phase.name.to_string();
         let mut names = match name.split_once(": ").filter(|_| !source.is_named) {
             Some((count, those)) => {
                 let sign: String = count.chars().take(1).collect();
                 shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
             }
-            // The same nodes as before: its number is enough.
-            None if !source.is_named && name.starts_with("same ") => Vec::new(),
             None => vec![name],
         };
-        let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
-        let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
-        let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
         if !source.is_named && !counts.is_empty() {
             names.push(counts.join(" "));
         }
         names.push((k + 1).to_string());
-        CoursePhase {
+        phases.push(CoursePhase {
             span: phase.span,
             names,
-        }
-    };
-    source.phases.iter().enumerate().map(phase).collect()
+        });
+    }
+    phases
 }
 
 /// What began or ended, in ever fewer words: all that the phase names, then two and one of them.

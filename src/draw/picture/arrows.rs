@@ -15,6 +15,8 @@ use crate::view::{Arrow, ArrowKind, Mark, Shown};
 /// The number of straight pieces in which a curve is measured, and of those in which its way out of a frame is found.
 const PIECES: u32 = 10;
 const EXIT: u32 = 64;
+/// The largest distance of a label from its line in pixels.
+const NEAR: f64 = 12.0;
 
 /// The style, the fonts and the scale that arrows are drawn with.
 pub(crate) struct Arrows<'a> {
@@ -138,7 +140,7 @@ impl ArrowPath {
         }
     }
 
-    /// The part of it outside of a frame that it begins in, or else ends in; `None` if its label is not there.
+    /// The part of it outside of a frame that it begins in, or else ends in; `None` if its label is not at it.
     pub(super) fn outside(&self, frame: Rect, begins_inside: bool) -> Option<Self> {
         let label = self.label.filter(|label| !label.area.overlaps(&frame))?;
         let mut path = self.clone();
@@ -167,7 +169,12 @@ impl ArrowPath {
         if !begins_inside {
             path.turn();
         }
-        Some(path)
+        let near = label.area.grown(NEAR);
+        let pieces = path.points();
+        let mut pieces = pieces
+            .windows(2)
+            .filter_map(|p| Rect::of_points(p.iter().copied()));
+        pieces.any(|piece| piece.overlaps(&near)).then_some(path)
     }
 
     /// Turns it to run from its end to its start.
@@ -333,7 +340,7 @@ impl Arrows<'_> {
         let is_upright = place.side != Anchor::Middle;
         let is_forward = track.is_forward(is_upright);
         for (row, at) in rows.iter().zip(0_u32..) {
-            let mark = row.mark.or(shown.mark);
+            let mark = row.mark.or(shown.mark).filter(|mark| mark.has_color());
             let color = match row.mark {
                 Some(mark) => options::change(self.style, mark).color,
                 None if mark.is_some() => look.stroke.color,

@@ -10,8 +10,8 @@ use crate::view::Mark;
 
 /// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
 pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
-    // Its words show since when it is away.
-    if mark == Mark::Away {
+    // Its words show since when it is away; the frame of others shows that it went with them.
+    if matches!(mark, Mark::Away | Mark::Gone) {
         return;
     }
     let radius = style.badge.radius * scale;
@@ -99,7 +99,7 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
                 color,
             ));
         }
-        Mark::Away | Mark::Inside => {
+        Mark::Away | Mark::Gone | Mark::Inside => {
             group.shape(Shape::filled(
                 Form::Ellipse(Rect::around(centre, Size::new(1.1 * r, 1.1 * r))),
                 color,

@@ -100,11 +100,13 @@ impl Boxes<'_> {
     ) -> [Group; 2] {
         let (style, pen) = (self.style, self.fit.pen);
         let change = options::change(style, crowd.mark);
-        let place = self.fit.rect(place).grown(if crowd.space.is_none() {
+        // That of the whole graph is outside of all boxes.
+        let beyond = if crowd.space.is_none() {
             4.0 * pen
         } else {
             0.0
-        });
+        };
+        let place = self.fit.rect(place).grown(beyond);
         let events: Vec<String> = crowd.events.iter().map(ToString::to_string).collect();
         let group = |part: &str| Group {
             id: format!("crowd{part}{}{}", crowd.mark.word(), super::encoded(name)),
@@ -122,7 +124,10 @@ impl Boxes<'_> {
         let size = style.cluster.size * self.fit.scale;
         let width = |crowd: &Crowd| badge::pill_width(self.fonts, &crowd.words, size);
         let taken: f64 = others.map(|other| width(other) + size * 0.5).sum();
-        let centre = Point::new(place.right() - width(crowd) / 2.0 - size - taken, place.y);
+        let centre = Point::new(
+            place.right() - width(crowd) / 2.0 - size - taken,
+            place.y - beyond * 0.75,
+        );
         badge::pill(
             &mut words,
             self.fonts,
@@ -180,10 +185,7 @@ impl Boxes<'_> {
             Some(rows) => self.card(&mut group, rows, place, &look),
             None => self.outline(&mut group, item, body, place, &look),
         };
-        if shown.state == State::Latched
-            && item.kind != ItemKind::Node
-            && shown.mark != Some(Mark::Removed)
-        {
+        if shown.state == State::Latched && item.kind != ItemKind::Node && !shown.is_ghost() {
             self.latch(&mut group, inner, body);
         }
         let second = second_line(shown, card.shown_rates);
@@ -355,10 +357,10 @@ pub(super) fn hexagon(place: Rect, point: f64) -> Form {
     ])
 }
 
-/// The places on the outline of a box where its badge may be placed, the best first: at its top right.
+/// The places at the corners of a box where its badge may be placed, clear of its name, the best first: at its top right.
 pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
-    let (x, y) = (place.w / 2.0 - 7.0 * scale, place.h / 2.0 - scale);
+    let (x, y) = (place.w / 2.0 - 4.0 * scale, place.h / 2.0 - scale);
     [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
 }
 

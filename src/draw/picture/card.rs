@@ -193,7 +193,7 @@ impl Boxes<'_> {
         // The colour of the whole card shows it already.
         let owner = view.items_shown.get(row.owner as usize);
         let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
-        let is_new = |mark: &Mark| owner.map(Mark::class) != Some(mark.class());
+        let is_new = |mark: &Mark| mark.has_color() && owner.map(Mark::class) != Some(mark.class());
         if let Some(mark) = shown.mark.filter(is_new) {
             let inset = style.added.width / 2.0 * self.fit.pen;
             let inside = Rect::new(place.x + inset, place.y, place.w - 2.0 * inset, place.h);
@@ -222,7 +222,7 @@ impl Boxes<'_> {
             (size, look.text),
             line.words(is_there),
         ));
-        let rate = rate(shown).filter(|_| seen.len() == 1 && shown.mark != Some(Mark::Removed));
+        let rate = rate(shown).filter(|_| seen.len() == 1 && !shown.is_ghost());
         let small = style.topic.small * self.fit.scale;
         let right = place.right() - PAD * size;
         group.text(words(

@@ -116,7 +116,7 @@ impl CourseStrip<'_> {
     pub(crate) fn ground(&self) -> Vec<Group> {
         let mut band = Group::named("phases");
         for (k, phase) in self.course.phases.iter().enumerate() {
-            let fill = self.style.cluster.stroke;
+            let fill = self.style.timeline.future;
             let fill = if k % 2 == 0 {
                 fill.towards(self.style.legend.fill, 0.5)
             } else {
@@ -126,7 +126,7 @@ impl CourseStrip<'_> {
                 &mut band,
                 phase,
                 fill,
-                self.style.timeline.text,
+                self.style.legend.text,
                 Weight::Regular,
             );
         }
@@ -164,8 +164,14 @@ impl CourseStrip<'_> {
             }
             self.name(&mut group, (k, row), color, weight);
         }
-        let begun = |phase: &&CoursePhase| phase.span.start < time.end;
-        if let Some(phase) = self.course.phases.iter().rev().find(begun) {
+        let shared = |phase: &&CoursePhase| {
+            let (from, to) = (
+                phase.span.start.max(time.start),
+                phase.span.end.min(time.end),
+            );
+            to.since(from)
+        };
+        if let Some(phase) = self.course.phases.iter().max_by_key(shared) {
             let (fill, text) = (self.style.page.text, self.style.page.background);
             self.phase(&mut group, phase, fill, text, Weight::SemiBold);
         }

@@ -101,7 +101,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
             "gets nothing (quality of service)",
         ),
         (
-            any(&|s| s.hz.is_some()),
+            !view.arrows.is_empty() && any(&|s| s.hz.is_some()),
             LegendSign::Width,
             if view.arrows.iter().any(|arrow| arrow.kilobytes.is_some()) {
                 "thicker = more bytes"

@@ -14,7 +14,7 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::showing::both;
-use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Showing, Shown, View};
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Showing, Shown, View};
 
 /// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
@@ -43,10 +43,9 @@ pub(crate) struct Label {
 impl Label {
     /// The smaller line of a topic in a window without a message.
     pub(crate) fn silence(&self, shown: &Shown, shown_rates: ShownRates) -> &'static str {
-        match (shown.mark, shown.state) {
-            (Some(Mark::Removed), _) => "",
-            _ if !self.second || shown_rates != ShownRates::Rates => "",
-            (_, State::Latched) => "latched",
+        match shown.state {
+            _ if shown.is_ghost() || !self.second || shown_rates != ShownRates::Rates => "",
+            State::Latched => "latched",
             _ => NO_MESSAGE,
         }
     }
@@ -366,7 +365,7 @@ pub(crate) fn arrow_label(
     shown: &Shown,
     from: Option<&Shown>,
 ) -> Option<(String, bool)> {
-    if shown.mark == Some(Mark::Removed) {
+    if shown.is_ghost() {
         return None;
     }
     let called = if arrow.is_service { "() " } else { " " };
@@ -399,7 +398,7 @@ pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<Stri
     if let Some(inside) = &shown.inside {
         return Some(chips::inside(inside));
     }
-    if shown.mark == Some(Mark::Removed) {
+    if shown.is_ghost() {
         return None;
     }
     if let Some((number, word)) = shown.members.number() {

@@ -39,10 +39,19 @@ pub(crate) fn change(style: &Style, mark: Mark) -> &Change {
     }
 }
 
+/// The paint of something that is away, or went with others.
+fn absent(style: &Style, shown: &Shown) -> Option<Quiet> {
+    match shown.mark {
+        Some(Mark::Away) => Some(style.away()),
+        Some(Mark::Gone) => Some(style.gone()),
+        _ => None,
+    }
+}
+
 /// The paint of a box.
 pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
-    if shown.mark == Some(Mark::Away) {
-        return quiet_box(&style.away());
+    if let Some(quiet) = absent(style, shown) {
+        return quiet_box(&quiet);
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
@@ -94,8 +103,8 @@ pub(crate) fn of_arrow(
 ) -> ArrowLook {
     let edge = &style.edge;
     let latched = shown.state == State::Latched;
-    if shown.mark == Some(Mark::Away) {
-        return quiet_arrow(&style.away());
+    if let Some(quiet) = absent(style, shown) {
+        return quiet_arrow(&quiet);
     }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);

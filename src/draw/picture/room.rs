@@ -175,9 +175,9 @@ mod tests {
         let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
         place_badges(&mut cards, &mut [along(130.0)], Vec::new(), (8.0, 1.0));
-        assert_eq!(cards[0].badge, Point::new(93.0, 1.0));
+        assert_eq!(cards[0].badge, Point::new(96.0, 1.0));
         place_badges(&mut cards, &mut [along(97.0)], Vec::new(), (8.0, 1.0));
-        assert_eq!(cards[0].badge, Point::new(7.0, 1.0));
+        assert_eq!(cards[0].badge, Point::new(4.0, 1.0));
     }
 
     #[test]

@@ -159,7 +159,8 @@ impl<'a> Timeline<'a> {
         let mut head = Group::named("playhead");
         let unit = self.page.unit;
         let (left, right) = (self.x(shown.start), self.x(shown.end));
-        let top = self.strip().top() - 2.0 * unit;
+        // Below the names of the phases.
+        let top = self.plot.y - 2.0 * unit;
         let place = Rect::new(left, top, right - left, self.plot.bottom() - top);
         head.shape(Shape::line(
             Form::Rect(place, (2.0 * unit).min(place.w / 2.0)),

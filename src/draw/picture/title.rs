@@ -69,23 +69,26 @@ impl<'a> Title<'a> {
         let empty = frame.empty.map_or_else(String::new, |time| {
             format!("{} without a message", words::duration(time.nanos()))
         });
+        let fits = |text: &str, size: f64| {
+            self.width(&self.fonts.shown(text), size, Weight::SemiBold) <= room.0
+        };
+        // Rather all words a little smaller than some of them.
+        let whole = |text: &str| {
+            let mut sizes = SMALLER.map(|part| size * part).into_iter();
+            sizes.find(|size| fits(text, *size)).unwrap_or(size)
+        };
         if frame.caption.is_empty() {
             let main = match frame.empty {
                 Some(_) => &empty,
                 None => &frame.note,
             };
             below.extend(frame.empty.map(|_| &*frame.note));
+            let size = whole(main);
             let text = self.cut(main, size, Weight::Regular, room.0);
             note.text(self.text(text, LINES.0, (size, Weight::Regular), style.quiet));
         } else {
-            let fits = |text: &str, size: f64| {
-                self.width(&self.fonts.shown(text), size, Weight::SemiBold) <= room.0
-            };
             headline.title = frame.fitting(|_| true);
-            // Rather all words a little smaller than some of them.
-            let sizes = SMALLER.map(|part| size * part);
-            let whole = sizes.into_iter().find(|size| fits(&headline.title, *size));
-            let size = whole.unwrap_or(size);
+            let size = whole(&headline.title);
             let text = frame.fitting(|text| fits(text, size));
             let text = self.cut(&text, size, Weight::SemiBold, room.0);
             headline.text(self.text(text, LINES.0, (size, Weight::SemiBold), self.color(frame)));

@@ -127,7 +127,7 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     } else {
         changed.clamp(1, MOST)
     };
-    let is_whole = shown.mark.is_some_and(|mark| mark.class() == "removed");
+    let is_whole = shown.is_ghost();
     let mut rows: Vec<Row> = Vec::new();
     for row in shown.by_rate().take(most) {
         let name = names.get(row.topic as usize).map_or("", String::as_str);
