@@ -153,7 +153,7 @@ fn fixed(input: &Input) -> Error {
     Error::Unsupported {
         path: input.name().into(),
         what: "it cannot be followed while it grows".to_owned(),
-        hint: "name a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder"
+        hint: "give a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder"
             .to_owned(),
     }
 }

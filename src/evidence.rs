@@ -1,7 +1,7 @@
 //! Evidence of who publishes and subscribes to what: one file per kind of evidence in `source/`, one row each in [`SOURCES`].
 //!
-//! A source reads messages whose layout it knows, or the announcement of a connection, or draws conclusions from the
-//! whole mission; what it finds are observations.
+//! A source reads messages whose layout it knows, or the announcement of a connection, or draws conclusions
+//! from the whole mission; its findings are observations.
 
 pub(crate) mod clock;
 #[cfg(feature = "source")]
@@ -186,7 +186,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "dynamic_reconfigure",
-        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 are one node's",
+        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 belong to one node",
         conclude: &[dynamic_reconfigure::conclude],
         ..NOTHING
     },
@@ -239,19 +239,19 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "payload",
-        about: "messages passed on byte by byte from input to output",
+        about: "messages forwarded byte by byte from input to output",
         conclude: &[payload::conclude, selected::conclude],
         ..NOTHING
     },
     Source {
         word: "equal_stamps",
-        about: "header stamps passed on from input to output (with `--infer stamps`)",
+        about: "header stamps copied from input to output (with `--infer stamps`)",
         conclude: &[equal_stamps::conclude],
         ..NOTHING
     },
     Source {
         word: "tf_pair",
-        about: "a listener of `/tf` also listens to `/tf_static`, and vice versa",
+        about: "a subscriber of `/tf` also subscribes to `/tf_static`, and vice versa",
         conclude: &[tf_pair::conclude],
         ..NOTHING
     },
@@ -280,7 +280,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "rosout_rule",
-        about: "every node of ROS 1 publishes `/rosout`; the node `/rosout` passes it on to `/rosout_agg`",
+        about: "every node of ROS 1 publishes `/rosout`; the node `/rosout` forwards it to `/rosout_agg`",
         conclude: &[rosout_rule::conclude],
         ..NOTHING
     },

@@ -30,11 +30,11 @@ pub(crate) use build::{
 };
 pub use per_element::PerElement;
 
-/// A node's place in [`Elements::nodes`].
+/// A node's index in [`Elements::nodes`].
 pub type NodeId = u32;
-/// A topic's place in [`Elements::topics`].
+/// A topic's index in [`Elements::topics`].
 pub type TopicId = u32;
-/// An edge's place in [`Elements::publishes`] or [`Elements::subscribes`].
+/// An edge's index in [`Elements::publishes`] or [`Elements::subscribes`].
 pub type EdgeId = u32;
 
 /// A node, over the whole mission.
@@ -46,11 +46,11 @@ pub struct Node {
     pub role: Arc<str>,
     /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// The time of its first sign of life in the mission.
+    /// The time of its first sign in the mission.
     pub first: Option<Stamp>,
-    /// The time of its last sign of life in the mission.
+    /// The time of its last sign in the mission.
     pub last: Option<Stamp>,
-    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
     pub runs: Vec<Span>,
 }
 
@@ -76,13 +76,13 @@ pub struct Topic {
     pub types: Vec<Arc<str>>,
     /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// The time of its first message or sign of life.
+    /// The time of its first message or other sign.
     pub first: Option<Stamp>,
-    /// The time of its last message or sign of life.
+    /// The time of its last message or other sign.
     pub last: Option<Stamp>,
     /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
     pub qos: Option<Arc<str>>,
-    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
     pub runs: Vec<Span>,
     /// The number of publishers that the bag counts but does not name, ≥ 0; `None` if it does not count publishers.
     /// They are not nodes: a picture may show them as one small box.
@@ -90,12 +90,13 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// Whether it is a service: its clients write to it, and its server reads it. A topic of the same name counts more.
+    /// Whether it is a service: its clients write to it, and its server reads it. A topic of the same name
+    /// takes precedence.
     pub fn is_service(&self) -> bool {
         !self.types.is_empty() && self.types.iter().all(|kind| is_service(kind))
     }
 
-    /// Whether many nodes publish to topics of its type in turn, so that a new publisher takes over nothing.
+    /// Whether many nodes publish to topics of its type in turn, so that a new publisher is not a takeover.
     pub(crate) fn is_shared(&self) -> bool {
         let mut types = self.types.iter();
         types.any(|kind| SHARED.contains(&kind.rsplit('/').next().unwrap_or(kind)))
@@ -123,11 +124,11 @@ pub struct Edge {
     pub topic: TopicId,
     /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// The time of its first message or sign of life.
+    /// The time of its first message or other sign.
     pub first: Option<Stamp>,
-    /// The time of its last message or sign of life.
+    /// The time of its last message or other sign.
     pub last: Option<Stamp>,
-    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
     pub runs: Vec<Span>,
 }
 
@@ -152,9 +153,9 @@ worded! {
         /// Messages or evidence in the window.
         #[default]
         Active = "active",
-        /// Alive without a message.
+        /// Present without a message.
         Silent = "silent",
-        /// Alive by a latched or transient-local message.
+        /// Present through a latched or transient-local message.
         Latched = "latched",
         /// Known from a header or metadata only.
         Declared = "declared",
@@ -170,13 +171,13 @@ pub struct NodeState {
     pub state: State,
     /// The strength of the evidence for it in this window.
     pub confidence: Confidence,
-    /// The sum of the rates of its publications, in messages per second; `None` where not known.
+    /// The sum of the rates of its publications, in messages per second; `None` if unknown.
     pub hz: Option<f64>,
     /// The lifecycle state, if it has one: `inactive`, `active`, …
     pub lifecycle: Option<Arc<str>>,
 }
 
-/// What is known of the messages of a topic, or over an edge, in one window besides their number.
+/// Measurements of the messages of a topic or edge in one window, besides their number.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Measures {
     /// The number of messages that a subscriber lost, as statistics of the middleware count them.
@@ -185,8 +186,8 @@ pub struct Measures {
     /// The standard deviation of the time between messages in seconds; `None` with fewer than three messages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jitter_s: Option<f64>,
-    /// The mean time from a message's header stamp to its recording, or to its arrival where statistics say so, in
-    /// seconds; negative where clocks differ.
+    /// The mean time from a message's header stamp to its recording, or to its arrival according to
+    /// statistics, in seconds; negative if clocks differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,
 }
@@ -225,7 +226,7 @@ pub struct EdgeState {
     pub confidence: Confidence,
     /// The number of messages over this edge in the window, if known.
     pub count: Option<u64>,
-    /// The messages per second over this edge; `None` where not known.
+    /// The messages per second over this edge; `None` if unknown.
     pub hz: Option<f64>,
     /// The payload bytes of these messages, if known.
     pub bytes: Option<u64>,
@@ -247,7 +248,7 @@ pub struct Graph {
     pub subscribes: Vec<EdgeState>,
 }
 
-/// How busy a node is in one window: the messages of its topics.
+/// The traffic of a node in one window: the messages of its topics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct NodeLoad {
@@ -266,7 +267,7 @@ pub struct NodeLoad {
 }
 
 impl Graph {
-    /// How busy each node is, in the order of [`Graph::nodes`].
+    /// The traffic of each node, in the order of [`Graph::nodes`].
     pub fn loads(&self, elements: &Elements) -> Vec<NodeLoad> {
         let idle = NodeLoad {
             bytes_in: Some(0),
@@ -329,7 +330,7 @@ impl Element {
     pub(crate) const KINDS: [fn(u32) -> Self; 4] =
         [Self::Node, Self::Topic, Self::Publish, Self::Subscribe];
 
-    /// The place of its kind among [`Element::KINDS`], and its id.
+    /// The index of its kind in [`Element::KINDS`], and its id.
     pub(crate) fn place(self) -> (usize, usize) {
         match self {
             Self::Node(id) => (0, id as usize),
@@ -350,7 +351,7 @@ impl Element {
     }
 }
 
-/// A value of the record of an element, of whichever kind it is; `None` for one that is not there.
+/// A value of an element's record, for any kind of element; `None` if the element does not exist.
 macro_rules! of_record {
     ($elements:expr, $get:ident, $element:expr, $record:ident => $value:expr) => {{
         let id = $element.place().1;
@@ -382,7 +383,7 @@ impl Elements {
         publishes.chain((0..).map(Element::Subscribe).zip(&self.subscribes))
     }
 
-    /// The names of the node and the topic of an element: both of an edge, one of the others.
+    /// The names of the node and the topic of an element: both for an edge, otherwise one.
     pub(crate) fn names(&self, element: Element) -> (Option<&str>, Option<&str>) {
         let (node, topic) = self.ends(element);
         let node = node.and_then(|id| self.nodes.get(id as usize));
@@ -433,7 +434,7 @@ impl Elements {
         self.subscription(topic, node).map(Element::Subscribe)
     }
 
-    /// The node and the topic of an element: both of an edge, one of the others.
+    /// The node and the topic of an element: both for an edge, otherwise one.
     pub fn ends(&self, element: Element) -> (Option<NodeId>, Option<TopicId>) {
         let ends = |edge: Option<&Edge>| (edge.map(|e| e.node), edge.map(|e| e.topic));
         match element {
@@ -455,18 +456,18 @@ impl Elements {
         of_record!(self, get, element, it => it.evidence).unwrap_or(Evidence::NONE)
     }
 
-    /// The intervals in which an element exists, in order, half-open; empty where only windows are known.
+    /// The intervals in which an element exists, in order, half-open; empty if only windows are known.
     pub fn runs(&self, element: Element) -> &[Span] {
         of_record!(self, get, element, it => it.runs.as_slice()).unwrap_or_default()
     }
 
-    /// As [`Elements::runs`], to change them; `None` for an element that is not there.
+    /// As [`Elements::runs`], to change them; `None` if the element does not exist.
     pub(crate) fn runs_mut(&mut self, element: Element) -> Option<&mut Vec<Span>> {
         of_record!(self, get_mut, element, it => &mut it.runs)
     }
 
-    /// The only publication of each topic; `None` where none or several are known, or where the bag counts publishers
-    /// that it does not name.
+    /// The only publication of each topic; `None` if none or several are known, or if the bag counts
+    /// publishers that it does not name.
     pub(crate) fn sole_publishers(&self) -> Vec<Option<EdgeId>> {
         let mut found = vec![(0, None); self.topics.len()];
         for (id, edge) in (0..).zip(&self.publishes) {
@@ -480,7 +481,7 @@ impl Elements {
             .collect()
     }
 
-    /// The first and the last sign of life of an element, where known.
+    /// The first and the last sign of an element, if known.
     pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
         of_record!(self, get, element, it => (it.first, it.last)).unwrap_or_default()
     }

@@ -1,6 +1,7 @@
-//! The places of everything: one layout of the union of all windows, so that nothing moves between frames.
+//! The positions of all elements: one layout of the union of all windows, so that nothing moves between
+//! frames.
 //!
-//! An engine sees sizes and connections only, never colours, rates or changes.
+//! An engine receives sizes and connections only, not colours, rates or changes.
 
 mod grid;
 mod isotonic;
@@ -22,7 +23,7 @@ use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::worded;
 
-/// The outline that a route must end at.
+/// The outline at which a route ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outline {
     /// The ellipse inside the box.
@@ -34,8 +35,8 @@ pub enum Outline {
 }
 
 impl Outline {
-    /// The distance from the middle of a box of this size to its outline in one direction, `off` beside the middle in the
-    /// other; `along` and `across` are the sides of the box in these directions.
+    /// The distance from the middle of a box of this size to its outline in one direction, at an offset of
+    /// `off` from the middle in the other; `along` and `across` are the sides of the box in these directions.
     fn reach(self, along: f64, across: f64, off: f64) -> f64 {
         let half = along / 2.0;
         match self {
@@ -67,30 +68,31 @@ pub struct Vertex {
     pub size: Size,
     /// The outline at which routes meet it.
     pub outline: Outline,
-    /// The innermost cluster that contains it: a place in [`Plan::clusters`].
+    /// The innermost cluster that contains it: an index into [`Plan::clusters`].
     pub cluster: Option<usize>,
 }
 
 /// An edge to route. Parallel edges and self loops are allowed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Link {
-    /// The vertex it begins at: a place in [`Plan::vertices`].
+    /// The vertex it begins at: an index into [`Plan::vertices`].
     pub from: usize,
-    /// The vertex it ends at: a place in [`Plan::vertices`].
+    /// The vertex it ends at: an index into [`Plan::vertices`].
     pub to: usize,
     /// The size of the widest label it ever shows, if any.
     pub label: Option<Size>,
-    /// The number of its fork: edges with the same one begin at the same vertex and part after their label, as far as
-    /// labels have room of their own and no cycle is broken among them.
+    /// The number of its fork: edges with the same number begin at the same vertex and separate after their
+    /// label, if labels have reserved space and no cycle is broken among them.
     pub fork: Option<usize>,
-    /// Whether it leaves the clusters around its ends as soon as it can, so that its label is outside of them.
+    /// Whether it leaves the clusters around its ends as soon as possible, so that its label is outside of
+    /// them.
     pub is_outside: bool,
 }
 
 /// A namespace to draw as a box around its members.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
-    /// The cluster around it: a place in [`Plan::clusters`], smaller than its own.
+    /// The cluster around it: an index into [`Plan::clusters`], smaller than its own.
     pub parent: Option<usize>,
     /// The size of its title, which is at the top left inside.
     pub title: Size,
@@ -105,8 +107,8 @@ impl Cluster {
     }
 }
 
-/// The input of an engine. The order of vertices and links is the order of names, and part of the input: the same plan
-/// gives the same layout on every machine. Links come publish edges first, then subscribe edges.
+/// The input of an engine. Vertices and links are sorted by name, and their order is part of the input: the
+/// same plan gives the same layout on every machine. Publish edges precede subscribe edges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     /// The boxes.
@@ -115,7 +117,8 @@ pub struct Plan {
     pub links: Vec<Link>,
     /// The namespaces; parents before children.
     pub clusters: Vec<Cluster>,
-    /// Whether every label has room of its own beside its edge, so that none is left out and no other edge meets it.
+    /// Whether every label has reserved space beside its edge, so that none is omitted and no other edge
+    /// crosses it.
     pub is_labelled: bool,
 }
 
@@ -131,31 +134,31 @@ worded! {
     }
 }
 
-/// The wishes of the caller for a layout.
+/// The caller's preferences for a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayoutOptions {
-    /// The page to fill, in pixels: its aspect steers packing and the choice of orientation.
+    /// The page to fill, in pixels: its aspect ratio determines packing and the choice of orientation.
     pub page: Size,
-    /// The orientation; `None` takes the better one.
+    /// The orientation; `None` chooses the better one.
     pub orientation: Option<Orientation>,
     /// Whether a drawing that fills the page is better than one of short edges without crossings.
     pub is_tight: bool,
 }
 
-/// Everything placed; the top left corner of the whole is (0, 0).
+/// The finished layout; its top left corner is (0, 0).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
     /// The direction in which the edges run.
     pub orientation: Orientation,
-    /// The size of the whole, margins excluded.
+    /// The total size, without margins.
     pub size: Size,
     /// A box per vertex; none overlap.
     pub boxes: Vec<Rect>,
-    /// A route per link; none runs through a box that is neither of its ends.
+    /// A route per link; none runs through a box other than its ends.
     pub routes: Vec<Route>,
-    /// A box per cluster: nested as their parents say, disjoint otherwise.
+    /// A box per cluster: inside that of its parent, otherwise disjoint.
     pub clusters: Vec<Rect>,
-    /// Remarks for the user, such as a cruder fallback; lower case, no period.
+    /// Remarks for the user, such as the use of a fallback; lower case, no period.
     pub remarks: Vec<String>,
 }
 
@@ -163,28 +166,26 @@ pub struct Layout {
 pub trait Engine {
     /// Places every box and routes every edge.
     ///
-    /// # Errors
-    /// A plan that the engine cannot do; the caller may then take another.
+    /// # Errors The engine does not support the plan; the caller may then use another.
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout>;
 }
 
 /// The largest depth of nested clusters; members of deeper ones are drawn in an ancestor.
 const DEEPEST: usize = 16;
 
-/// Every engine: its word on the command line, and itself. The first is the default.
+/// Every engine with its name on the command line. The first is the default.
 pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
     ("layered", &layered::Layered),
     ("layout-rs", &layout_rs::LayoutRs),
     ("ring", &ring::Ring),
 ];
 
-/// The most boxes that the engine `ring` takes.
+/// The most boxes that the engine `ring` supports.
 pub(crate) const RING: usize = ring::MOST;
 
-/// The engine of this word.
+/// The engine with this name.
 ///
-/// # Errors
-/// [`Error::Usage`] for a word that no engine has.
+/// # Errors [`Error::Usage`] for an unknown name.
 pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
     let found = ENGINES.iter().find(|(name, _)| *name == word);
     found.map(|(_, engine)| *engine).ok_or_else(|| {
@@ -196,9 +197,9 @@ pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
     })
 }
 
-/// The layout of this plan by this engine; where the engine cannot, by the default one with a remark.
+/// The layout of this plan by this engine; if the engine fails, by the default one with a remark.
 ///
-/// Impossible numbers are taken for zero; links and clusters that name no existing vertex or cluster are left out.
+/// Impossible numbers are replaced by zero; links and clusters with invalid references are left out.
 pub fn lay_out(plan: &Plan, options: &LayoutOptions, engine: &dyn Engine) -> Layout {
     let (plan, options) = (plan.sane(), options.sane());
     engine.lay_out(&plan, &options).unwrap_or_else(|error| {
@@ -208,10 +209,11 @@ pub fn lay_out(plan: &Plan, options: &LayoutOptions, engine: &dyn Engine) -> Lay
     })
 }
 
-/// The layout of this plan with the boxes of an earlier one where they were: `known` has a place per vertex, `None` for
-/// a new one. New boxes are placed near those that they are linked to; frames and routes are recomputed.
+/// The layout of this plan with the boxes of an earlier one at their positions: `known` has a position per
+/// vertex, `None` for a new one. New boxes are placed near those that they are linked to; frames and routes
+/// are recomputed.
 ///
-/// Where nothing moved and nothing is new, this is the layout of [`lay_out`].
+/// If nothing moved and nothing is new, this is the layout of [`lay_out`].
 pub fn extend(
     plan: &Plan,
     options: &LayoutOptions,
@@ -280,7 +282,7 @@ impl Plan {
         }
     }
 
-    /// This plan as if no cluster were there.
+    /// This plan without its clusters.
     fn without_clusters(&self) -> Self {
         let mut plan = self.clone();
         plan.clusters.clear();
@@ -290,7 +292,7 @@ impl Plan {
         plan
     }
 
-    /// The places of the links with two existing ends.
+    /// The indices of the links with two existing ends.
     fn valid_links(&self) -> impl Iterator<Item = usize> {
         let n = self.vertices.len();
         (0..self.links.len()).filter(move |&i| self.links[i].from < n && self.links[i].to < n)
@@ -298,13 +300,13 @@ impl Plan {
 }
 
 impl Layout {
-    /// Every label that has a place.
+    /// Every label that is placed.
     fn labels(&self, plan: &Plan) -> impl Iterator<Item = Rect> {
         let both = self.routes.iter().zip(&plan.links);
         both.filter_map(|(route, link)| Some(Rect::around(route.label?, link.label?)))
     }
 
-    /// Makes `whole` the whole: its corner becomes (0, 0), its size the size.
+    /// Makes `whole` the extent of the layout: its corner becomes (0, 0), its size the total size.
     fn cropped(&mut self, whole: Rect) {
         let by = Point::new(-whole.x, -whole.y);
         for rect in self.boxes.iter_mut().chain(&mut self.clusters) {
@@ -315,7 +317,7 @@ impl Layout {
     }
 }
 
-/// Enlarges the bounds of several rectangles by one more.
+/// Extends the bounds of several rectangles to one more.
 fn include(around: &mut Option<Rect>, rect: Rect) {
     *around = Some(around.map_or(rect, |all| all.union(&rect)));
 }
@@ -343,7 +345,7 @@ impl LayoutOptions {
     }
 }
 
-/// A length that arithmetic survives: 0 to 100,000 pixels.
+/// A length that is safe in arithmetic: 0 to 100,000 pixels.
 fn sane_size(size: Size) -> Size {
     let sane = |length: f64| {
         if length.is_finite() {
@@ -355,32 +357,32 @@ fn sane_size(size: Size) -> Size {
     Size::new(sane(size.w), sane(size.h))
 }
 
-/// Vertices that belong together, by links or by a shared namespace. Everything in it is given by places in `vertices`;
+/// Vertices that belong together, by links or by a shared namespace. Vertices are indices into `vertices`;
 /// cluster `i + 1` is `clusters[i]` of the plan, and 0 is the outside.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Component {
-    /// The places of its vertices in the plan, growing.
+    /// The indices of its vertices in the plan, ascending.
     pub(crate) vertices: Vec<usize>,
-    /// The places of its links in the plan, growing.
+    /// The indices of its links in the plan, ascending.
     pub(crate) links: Vec<usize>,
-    /// The places of its clusters in the plan, growing.
+    /// The indices of its clusters in the plan, ascending.
     pub(crate) clusters: Vec<usize>,
     /// The ends of each link.
     ends: Vec<(usize, usize)>,
     /// The innermost cluster of each vertex.
     home: Vec<usize>,
-    /// The cluster around each cluster; the outside is its own.
+    /// The cluster around each cluster; the outside contains itself.
     parent: Vec<usize>,
-    /// The first vertex that links join with each vertex.
+    /// The first vertex of each vertex's connected component.
     pieces: Vec<usize>,
 }
 
-/// The kind of thing that an item of a layer represents.
+/// The kind of an item of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LayerItem {
     /// A vertex of the plan.
     Vertex,
-    /// A long edge on its way through a layer.
+    /// A bend of a long edge that passes through a layer.
     Bend,
     /// The first border of a cluster in a layer.
     Top,
@@ -391,8 +393,9 @@ enum LayerItem {
 /// The items of each layer, in order across.
 type LayerRows = Vec<Vec<usize>>;
 
-/// One part cut into layers, which the steps of the layered engine hand on. `along` is the direction in which the edges
-/// run, `across` the direction along a layer. Items `0..vertices` are the vertices; bends and borders follow.
+/// One part cut into layers, which the steps of the layered engine pass on. `along` is the direction in which
+/// the edges run, `across` the direction along a layer. Items `0..vertices` are the vertices; bends and
+/// borders follow.
 #[derive(Clone, Debug, Default)]
 struct Layers {
     /// The number of items that are vertices.
@@ -407,9 +410,9 @@ struct Layers {
     up: Vec<Vec<usize>>,
     /// The neighbours of each item in the layer after.
     down: Vec<Vec<usize>>,
-    /// The items that each edge passes, by growing rank; empty for a self loop.
+    /// The items that each edge passes, by ascending rank; empty for a self loop.
     chains: Vec<Vec<usize>>,
-    /// The cluster around each cluster; the outside is its own.
+    /// The cluster around each cluster; the outside contains itself.
     parent: Vec<usize>,
     /// The first and last layer of each cluster.
     span: Vec<(usize, usize)>,
@@ -419,7 +422,7 @@ struct Layers {
     ranks: usize,
 }
 
-/// The first bend that an edge passes, seen from where it begins: after the first item if it runs with the ranks.
+/// The first bend that an edge passes from its start: after the first item if it runs with the ranks.
 fn first_bend(chain: &[usize], is_forward: bool) -> Option<usize> {
     let bends = chain.get(1..chain.len().checked_sub(1)?)?;
     if is_forward {
@@ -431,7 +434,7 @@ fn first_bend(chain: &[usize], is_forward: bool) -> Option<usize> {
 }
 
 impl Layers {
-    /// The same layers without borders and as if no cluster were there.
+    /// The same layers without borders and clusters.
     fn without_clusters(&self) -> Self {
         let border = |kind: &LayerItem| matches!(kind, LayerItem::Top | LayerItem::Bottom);
         let n = self.kind.iter().position(border).unwrap_or(self.kind.len());

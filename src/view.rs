@@ -125,7 +125,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
     }
 }
 
-/// The kind of thing that a box of the picture represents.
+/// The kind of element that a box of the picture represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ItemKind {
     /// A node: drawn as an ellipse.
@@ -151,19 +151,19 @@ impl ItemKind {
 /// A box of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// The kind of thing it represents.
+    /// The kind of element it represents.
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
-    /// The name as it is drawn, in full: that of a node without the part that is new in every run.
+    /// The full name as drawn: for a node, without the part that differs from run to run.
     pub label: Arc<str>,
     /// The nodes and topics it represents, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
-    /// Whether its members are the same thing in several equal namespaces.
+    /// Whether its members are the counterparts of each other in several equal namespaces.
     pub is_replica: bool,
     /// Whether it is a service: its clients write to it, and its server reads it.
     pub is_service: bool,
-    /// The innermost namespace whose box contains it: a place in [`View::namespaces`].
+    /// The innermost namespace whose box contains it: an index into [`View::namespaces`].
     pub cluster: Option<usize>,
 }
 
@@ -183,7 +183,7 @@ impl Item {
 pub struct Namespace {
     /// The full path: `/robot1/nav`.
     pub name: Arc<str>,
-    /// The namespace around it: a place in [`View::namespaces`], smaller than its own.
+    /// The namespace around it: an index into [`View::namespaces`], smaller than its own.
     pub parent: Option<usize>,
     /// The indices of the equal namespaces drawn as this one: `01`, `02`; empty where it represents only itself.
     pub replicas: Vec<Arc<str>>,
@@ -192,7 +192,7 @@ pub struct Namespace {
 /// Nodes and topics that are listed as words in a namespace, because no line leads to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AlsoHere {
-    /// The innermost namespace with a box around them: a place in [`View::namespaces`].
+    /// The innermost namespace with a box around them: an index into [`View::namespaces`].
     pub cluster: Option<usize>,
     /// The nodes, then the topics, each sorted by name.
     pub items: Vec<Item>,
@@ -203,18 +203,18 @@ pub struct AlsoHere {
 /// The presence of one of several equal namespaces in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Attendance {
-    /// Not there.
+    /// Absent.
     Away,
-    /// There from the beginning to the end.
+    /// Present from the beginning to the end.
     Here,
-    /// Not there at the beginning, there at the end.
+    /// Absent at the beginning, present at the end.
     Joined,
-    /// There at the beginning, no longer at the end.
+    /// Present at the beginning, absent at the end.
     Left,
 }
 
 impl Attendance {
-    /// Whether it is there at the end.
+    /// Whether it is present at the end.
     pub(crate) fn is_here(self) -> bool {
         matches!(self, Self::Here | Self::Joined)
     }
@@ -225,7 +225,7 @@ impl Attendance {
 pub enum ArrowKind {
     /// From a node to a topic that it publishes.
     Publish,
-    /// From a topic to a node that subscribes it.
+    /// From a topic to a node that subscribes to it.
     Subscribe,
     /// From a node to a node over this topic (mode *nodes only*).
     Direct(Arc<str>),
@@ -248,16 +248,16 @@ impl ArrowKind {
 /// An arrow of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrow {
-    /// The item it begins at: a place in [`View::items`].
+    /// The item it begins at: an index into [`View::items`].
     pub from: u32,
-    /// The item it ends at: a place in [`View::items`].
+    /// The item it ends at: an index into [`View::items`].
     pub to: u32,
     /// The kind of connection it represents.
     pub kind: ArrowKind,
     /// The edges it represents, sorted.
     pub members: Vec<Element>,
-    /// The names of the topics of a bundle, sorted, with those of an action or a family of images as one; empty for all
-    /// else.
+    /// The names of the topics of a bundle, sorted, with those of an action or of an image's transports as
+    /// one; empty for all other arrows.
     pub topics: Vec<Arc<str>>,
     /// Whether it represents only calls of services.
     pub is_service: bool,
@@ -272,7 +272,7 @@ impl Arrow {
         format!("{}{service}", self.kind.word())
     }
 
-    /// The number that decides its thickness: messages or kilobytes per second.
+    /// The number that determines its thickness: messages or kilobytes per second.
     pub(crate) fn flow(&self, shown: &Shown) -> Option<f64> {
         shown.steady_hz.map(|hz| hz * self.kilobytes.unwrap_or(1.0))
     }
@@ -305,8 +305,8 @@ impl Arrow {
     }
 }
 
-/// The number of headlines of each kind in a window, for chips and captions. They count the whole graph, whatever is
-/// drawn as one box.
+/// The number of headlines of each kind in a window, for badges and captions. They count the whole graph,
+/// even if several elements are drawn as one box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// The number of nodes that started.
@@ -317,11 +317,11 @@ pub struct Counts {
     pub topics_added: usize,
     /// The number of topics of unknown publisher that vanished.
     pub topics_removed: usize,
-    /// The number of connections that living nodes made.
+    /// The number of new connections of running nodes.
     pub edges_added: usize,
-    /// The number of connections that living nodes gave up.
+    /// The number of connections that running nodes closed.
     pub edges_removed: usize,
-    /// The number of nodes that ended and came back.
+    /// The number of nodes that ended and returned.
     pub restarted: usize,
     /// The number of nodes and topics that paused.
     pub silent: usize,
@@ -352,7 +352,7 @@ pub struct View {
     pub arrows: Vec<Arrow>,
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
-    /// The topics that are rows in boxes.
+    /// The topics that are listed as rows in boxes.
     pub rows: Vec<CardRow>,
     /// The nodes and topics that are listed as words, by namespace.
     pub also: Vec<AlsoHere>,
@@ -362,8 +362,8 @@ pub struct View {
     pub items_shown: Vec<Showing>,
     /// The looks of each arrow, window by window.
     pub arrows_shown: Vec<Showing>,
-    /// Whether two missions are compared, A and B, so that no time, no window and no timeline means anything; of two
-    /// windows the first is A alone.
+    /// Whether two missions are compared, A and B, so that times, windows and the timeline are meaningless;
+    /// the first of the two windows is A alone.
     pub compares: bool,
 }
 
@@ -382,11 +382,11 @@ impl View {
     /// The namespaces with a box around an item, the innermost first.
     pub(crate) fn around(&self, item: u32) -> impl Iterator<Item = usize> + '_ {
         let first = self.items.get(item as usize).and_then(|item| item.cluster);
-        // Parents have smaller places, so that this ends.
+        // Parents have smaller indices, so this terminates.
         std::iter::successors(first, |at| self.namespaces.get(*at)?.parent)
     }
 
-    /// For each namespace with a box, whether anything inside it is seen.
+    /// For each namespace with a box, whether anything inside it is visible.
     pub(crate) fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let mut inhabited = vec![false; self.namespaces.len()];
         for at in seen.items.iter().flat_map(|shown| self.around(shown.id)) {
@@ -395,7 +395,7 @@ impl View {
         inhabited
     }
 
-    /// Whether there is time to show: not between two missions that are compared, and not in one window.
+    /// Whether there is a time axis to show: not for two compared missions, and not for one window.
     pub(crate) fn has_time(&self) -> bool {
         !self.compares && self.frames.len() > 1
     }
@@ -405,7 +405,7 @@ impl View {
         self.frames.get(k).is_some_and(Frame::is_changed)
     }
 
-    /// The items and arrows seen in the window at place `k`; none past the last one.
+    /// The items and arrows visible in window `k`; none past the last one.
     pub fn seen(&self, k: usize) -> SeenWindow {
         let of = |all: &[Showing]| {
             let there = all.iter().filter_map(|one| one.at(k));
@@ -417,7 +417,7 @@ impl View {
         }
     }
 
-    /// The look of something in window `k` as it is drawn there, without a colour if that is on the frame of a crowd.
+    /// The look of an element in window `k` as drawn, without a colour if the frame of a crowd has it.
     pub(crate) fn calm_at(&self, shown: &Showing, k: usize) -> Option<Shown> {
         let mut shown = shown.at(k)?.clone();
         self.frames.get(k)?.calm(&mut shown);
@@ -432,7 +432,8 @@ impl View {
         all.chain(also).chain(rows).flat_map(Showing::looks)
     }
 
-    /// The place of the window with most headlines, the first of several; [`View::busiest`] where there are none.
+    /// The index of the window with most headlines, the first of several; [`View::busiest`] if there are
+    /// none.
     pub(crate) fn busiest_change(&self) -> usize {
         let mut best = (self.busiest(), 0);
         for (at, frame) in self.frames.iter().enumerate() {
@@ -443,17 +444,18 @@ impl View {
         best.0
     }
 
-    /// Whether a part of it represents several things that could be drawn one by one: a namespace, a fleet, a bundle.
+    /// Whether a part of it represents several elements that could be drawn separately: a namespace, a fleet,
+    /// a bundle.
     pub(crate) fn is_folded(&self) -> bool {
         let is_one = |i: &Item| i.kind == ItemKind::Namespace || i.is_replica;
         let is_bundle = |a: &Arrow| a.kind == ArrowKind::Bundle;
         self.items.iter().any(is_one) || self.arrows.iter().any(is_bundle)
     }
 
-    /// The place of the window that shows most; the first of several.
+    /// The index of the window that shows most; the first of several.
     pub fn busiest(&self) -> usize {
         let is_there = |s: &Shown| s.mark != Some(Mark::Removed);
-        // By how many more are there than in the window before.
+        // The increase since the previous window.
         let mut more = vec![0_i64; self.frames.len()];
         let rows = self.rows.iter().map(|row| &row.shown);
         for showing in self

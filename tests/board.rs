@@ -1,4 +1,4 @@
-//! Tests of the topic board and of page sizes: what is drawn, refused and legible.
+//! Tests of the topic timeline and of page sizes: drawn, refused and legible content.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -36,7 +36,7 @@ fn smallest(svg: &str) -> f64 {
     px.fold(f64::MAX, f64::min)
 }
 
-/// The x and the width of the head of a frame.
+/// The x and the width of the playhead of a frame.
 fn head(svg: &str) -> (f64, f64) {
     let head = svg.split("id=\"playhead\"").nth(1).unwrap();
     let of = |name: &str| -> f64 {
@@ -47,7 +47,7 @@ fn head(svg: &str) -> (f64, f64) {
 }
 
 #[test]
-fn a_mission_without_known_publishers_is_a_board_of_topics() {
+fn a_mission_without_known_publishers_is_a_topic_timeline() {
     let (folder, done) = rendered(
         "courier.mcap",
         &[],
@@ -78,7 +78,7 @@ fn a_mission_without_known_publishers_is_a_board_of_topics() {
 }
 
 #[test]
-fn the_user_chooses_between_graph_and_board() {
+fn the_user_chooses_between_graph_and_topic_timeline() {
     let (folder, done) = rendered("courier.mcap", &["--view", "graph"], &["{n}.svg"]);
     assert!(done.status.success());
     assert!(!said(&done).contains("board"));
@@ -86,7 +86,7 @@ fn the_user_chooses_between_graph_and_board() {
         text(&folder, "0.svg").contains("class=\"node"),
         "a graph has nodes"
     );
-    // Options for graphs select a graph, and are refused with a board.
+    // Options for graphs select a graph, and are refused with a topic timeline.
     let (_folder, done) = rendered("courier.mcap", &["--orientation", "TB"], &["{n}.svg"]);
     assert!(done.status.success() && !said(&done).contains("board"));
     for flags in [

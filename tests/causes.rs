@@ -1,4 +1,5 @@
-//! One cause, one headline: what the log of a recording says of events that belong together, and of what nothing proves.
+//! Tests that one cause is one headline: related events in the log of a recording, and events without
+//! evidence.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -43,7 +44,7 @@ fn at(bag: &mut Recording, publisher: usize, second: i64, payload: Vec<u8>) {
 }
 
 #[test]
-fn a_connection_that_flaps_is_one_line() {
+fn a_flapping_connection_is_one_line() {
     let mut bag = minute(&[("/view", "/state", 0, 60)]);
     let log = bag.publisher("/base", "/rosout", "rosgraph_msgs/Log");
     LOG.clone_into(&mut bag.publishers[log].definition);
@@ -114,7 +115,7 @@ fn the_end_of_an_input_does_not_end_its_relay() {
 }
 
 #[test]
-fn seldom_messages_do_not_make_a_topic_appear() {
+fn rare_messages_do_not_make_a_topic_appear() {
     let mut bag = minute(&[]);
     let goal = bag.publisher("", "/goal", "std_msgs/Empty");
     let keys = bag.publisher("/teleop", "/keys", "std_msgs/Empty");
@@ -127,14 +128,14 @@ fn seldom_messages_do_not_make_a_topic_appear() {
     let text = log(&mission, LogFormat::Text, LogOptions::default());
     assert!(text.contains("/goal first message"), "{text}");
     assert!(!text.contains("/teleop"), "{text}");
-    // The summary gives the node the same life.
+    // The summary shows the same lifetime of the node.
     let info = info(&mission);
     let teleop = info.nodes.iter().find(|node| node.name == "/teleop");
     assert_eq!(teleop.unwrap().first_ns, Some(info.start_ns));
 }
 
 #[test]
-fn the_note_about_a_clock_set_back_is_true_of_a_pipe() {
+fn the_note_about_a_clock_set_back_is_correct_for_a_pipe() {
     let mut bag = Recording::default();
     let places = ["/a", "/b"].map(|topic| bag.publisher("/base", topic, "std_msgs/Empty"));
     for second in (0..60).chain(30..90) {

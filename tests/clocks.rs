@@ -266,7 +266,7 @@ fn clock_faults_are_attributed_to_the_recorder() {
 }
 
 #[test]
-fn two_robots_with_the_same_names_are_told_apart_by_a_namespace() {
+fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
     let healthy = Healthy::new();
     let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});
     let both = [
@@ -286,7 +286,7 @@ fn two_robots_with_the_same_names_are_told_apart_by_a_namespace() {
             .filter(|e| e.kind == kind && e.is_headline())
             .count()
     };
-    // A restart that has the very headers of another is taken for one of a relay.
+    // A restart with the same headers as another is attributed to a relay.
     for kind in [Kind::Stopped, Kind::HandedOver, Kind::Rate] {
         assert_eq!(
             count(&both, kind),
@@ -300,7 +300,7 @@ fn two_robots_with_the_same_names_are_told_apart_by_a_namespace() {
 }
 
 #[test]
-fn the_offset_of_a_clock_is_estimated_from_what_two_recorded() {
+fn the_offset_of_a_clock_is_estimated_from_common_messages() {
     let healthy = Healthy::new();
     let late = |topic: &str, at: i64| (topic != "/robot1/scan").then_some(at + 350_000_000);
     let recordings = [

@@ -33,7 +33,7 @@ fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
         .collect()
 }
 
-/// The groups of an SVG whose class begins with this word, with the entries that they name.
+/// The groups of an SVG whose class begins with this word, with the events that they name.
 fn groups<'a>(svg: &'a str, class: &'a str) -> impl Iterator<Item = Vec<u64>> + 'a {
     let starts = svg
         .match_indices("<g class=\"")
@@ -129,7 +129,8 @@ fn frame(svg: &str, shown: &BTreeSet<u64>, at: &str) {
     assert_eq!(shown.is_empty(), svg.contains("no change"), "words of {at}");
 }
 
-/// A node that is drawn as active is one of the window's nodes in the data: of an anonymous one, a run of it.
+/// A node that is drawn as active is one of the window's nodes in the data: for an anonymous one, a run of
+/// it.
 fn alive(svg: &str, window: &Value, at: &str) {
     let nodes = window["nodes"].as_array().unwrap();
     let names: Vec<&str> = nodes.iter().map(|n| n["name"].as_str().unwrap()).collect();
@@ -158,7 +159,7 @@ fn timeline(svg: &str, expected: &[BTreeSet<u64>], at: &str) {
     assert_eq!(marks, all, "timeline of {at}");
 }
 
-/// The data of the page's chips and jumps, and the elements that it marks in each window.
+/// The data of the page's badges and jumps, and the elements that it marks in each window.
 fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
     let (_, rest) = html
         .split_once(" id=\"data\"")
@@ -211,7 +212,7 @@ fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]),
     let numbers = shown
         .split(' ')
         .filter_map(|word| word.parse::<usize>().ok());
-    let (_, changed) = second.split_once(", of which ").unwrap();
+    let (_, changed) = second.rsplit_once(", ").unwrap();
     let changed: usize = changed.split(' ').next().unwrap().parse().unwrap();
     assert_eq!(changed, windows, "{at}: {second}");
     assert_eq!(numbers.sum::<usize>(), all, "{at}: {first}");

@@ -17,7 +17,7 @@ use crate::support::{ORIGIN, Recording};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// Everything that is recorded in a recording.
+/// Everything in a recording.
 fn recorded(bag: &Recording, options: CollectOptions) -> Recorded {
     let mut collector = Collector::new(options);
     let mut progress = |_, _| ();
@@ -63,7 +63,7 @@ fn concluded(bag: &Recording, options: CollectOptions) -> (Built, Vec<EvidenceLi
     (built, lines)
 }
 
-/// Every edge that a kind of evidence proves: `/node > /topic confidence` or `/topic > /node confidence`.
+/// Every edge supported by a kind of evidence: `/node > /topic confidence` or `/topic > /node confidence`.
 fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
     let (built, _) = concluded(bag, options);
     let all = &built.elements;
@@ -147,7 +147,7 @@ fn log2(logger: &str, text: &str, file: &str) -> Vec<u8> {
     record.u32(7).done()
 }
 
-/// `rcl_interfaces/msg/ParameterEvent` with new parameters, all of them truth values.
+/// `rcl_interfaces/msg/ParameterEvent` with new parameters, all of them Boolean.
 fn parameters(node: &str, set: &[(&str, bool)]) -> Vec<u8> {
     let mut event = Cdr::default().time(SECOND).text(node);
     event = event.u32(u32::try_from(set.len()).unwrap());
@@ -158,7 +158,7 @@ fn parameters(node: &str, set: &[(&str, bool)]) -> Vec<u8> {
     event.u32(0).u32(0).done()
 }
 
-/// A camera at 10 Hz; a throttle that passes every second image on.
+/// A camera at 10 Hz; a throttle that forwards every second image.
 fn throttled() -> Recording {
     let mut bag = Recording::default();
     let input = bag.publisher("/camera", "/image", "sensor_msgs/Image");
@@ -225,7 +225,7 @@ fn a_mux_subscribes_to_all_its_inputs() {
 }
 
 #[test]
-fn the_turn_of_a_mux_is_a_hand_over_and_no_step_of_a_rate() {
+fn a_mux_switching_its_input_is_a_hand_over_and_not_a_rate_change() {
     let mut bag = Recording::default();
     let teleop = bag.publisher("/teleop", "/cmd_teleop", "geometry_msgs/Twist");
     let nav = bag.publisher("/nav", "/cmd_nav", "geometry_msgs/Twist");
@@ -741,8 +741,8 @@ fn unknown_names_are_reported_with_the_nearest() {
     assert_eq!(
         notices,
         [
-            "robot.csv line 2: no node of the bag is called `/lidra`; the nearest name is `/lidar`",
-            "robot.csv line 2: no topic of the bag is called `/scna`; the nearest name is `/scan`"
+            "robot.csv line 2: the bag has no node `/lidra`; the nearest name is `/lidar`",
+            "robot.csv line 2: the bag has no topic `/scna`; the nearest name is `/scan`"
         ]
     );
 }
@@ -815,7 +815,7 @@ fn the_aggregated_log_is_only_read_without_another() {
 }
 
 #[test]
-fn a_client_makes_rosbridge_subscribe() {
+fn rosbridge_subscribes_for_its_clients() {
     let mut bag = Recording::default();
     let odom = bag.topic2("/odom", "nav_msgs/msg/Odometry");
     bag.send(odom, (0, 30_000), 100, &[0, 1, 0, 0]);
@@ -839,7 +839,7 @@ fn a_complete_list_decides_between_two_copies() {
         let output = bag.publisher("/relay", "/again", "sensor_msgs/Image");
         let log = bag.publisher("/camera", "/rosout", "rosgraph_msgs/Log");
         for n in 0..60_u32 {
-            // The recorder gets every second copy before its original.
+            // The recorder receives every second copy before its original.
             let (at, early) = (i64::from(n) * 100, n % 2 == 0);
             let payload = n.to_le_bytes().repeat(50);
             bag.at(input, at, payload.clone());
@@ -856,7 +856,7 @@ fn a_complete_list_decides_between_two_copies() {
 }
 
 #[test]
-fn a_mux_says_what_it_passes_on() {
+fn a_mux_reports_its_selected_input() {
     let mut bag = Recording::default();
     for (node, topic) in [
         ("/teleop", "/cmd_teleop"),
@@ -892,8 +892,8 @@ fn a_mux_says_what_it_passes_on() {
     );
 }
 
-/// The windows in which a node is there that a launch file declares beside two robots: `/r1/base` from 0 to 10 s, and
-/// `/r2/base` and a viewer with an anonymous name from 5 to 10 s.
+/// The windows that contain a node declared by a launch file beside two robots: `/r1/base` from 0 to 10 s,
+/// and `/r2/base` and a viewer with an anonymous name from 5 to 10 s.
 fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
     let mut bag = Recording::default();
     for (node, topic, from) in [
@@ -932,7 +932,7 @@ fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
 }
 
 #[test]
-fn a_declared_node_lives_as_long_as_its_namespace() {
+fn a_declared_node_exists_as_long_as_its_namespace() {
     let lives = |node: &str| launched(NamedElement::Node(node.to_owned()), node).0;
     assert_eq!(lives("/r1/planner"), [true; 5]);
     assert_eq!(lives("/r2/planner"), [false, false, true, true, true]);

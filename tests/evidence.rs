@@ -150,7 +150,7 @@ fn assert_promise(counts: &[[u32; 2]; 4], of: &str) {
 }
 
 #[test]
-fn every_degree_has_its_stated_precision() {
+fn every_confidence_has_its_stated_precision() {
     let (warehouse, mini) = ("warehouse/truth_windows.json", "mini/truth_windows.json");
     let recordings = [
         ("warehouse/warehouse.bag", warehouse),
@@ -344,7 +344,7 @@ fn headers_of_a_rewritten_bag_are_not_trusted() {
     }
 }
 
-/// The windows in which a node is alive.
+/// The windows in which a node is running.
 fn life(built: &Built, node: &str) -> Vec<usize> {
     let there = |window: &usize| {
         names(built, *window)[0]

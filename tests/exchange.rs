@@ -24,7 +24,7 @@ fn written(bag: &Recording, folder: &Path, name: &str) -> std::path::PathBuf {
     path
 }
 
-/// A lidar of which the recorder loses five seconds, and which is incompatible with reliable subscribers.
+/// A lidar that is incompatible with reliable subscribers, and of which the recorder loses five seconds.
 fn lossy() -> Recording {
     let mut bag = Recording::default();
     let scan = bag.publisher("", "/scan", "sensor_msgs/msg/LaserScan");
@@ -64,7 +64,7 @@ fn lossy() -> Recording {
 }
 
 #[test]
-fn losses_starved_subscribers_and_double_names_are_events_and_findings() {
+fn losses_starved_subscribers_and_duplicate_names_are_events_and_findings() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(&lossy(), folder.path(), "lossy.mcap");
     let run = |args: &[&str]| {
@@ -131,7 +131,7 @@ fn text(text: &str) -> Vec<u8> {
     packed(&[&len, text.as_bytes()])
 }
 
-/// Seconds and nanoseconds, as times and durations have them.
+/// Seconds and nanoseconds, as in times and durations.
 fn time(nanos: i64) -> Vec<u8> {
     let part = |n: i64| i32::try_from(n).unwrap().to_le_bytes();
     packed(&[&part(nanos / SECOND), &part(nanos % SECOND)])
@@ -141,8 +141,8 @@ const STATISTICS: &str = "string topic\nstring node_pub\nstring node_sub\ntime w
     int32 delivered_msgs\nint32 dropped_msgs\nint32 traffic\nduration period_mean\nduration period_stddev\n\
     duration period_max\nduration stamp_age_mean\nduration stamp_age_stddev\nduration stamp_age_max\n";
 
-/// 40 s of a lidar at 10 Hz: 1000 bytes a scan, stamped 50 ms before, every other one 20 ms late; of each second two
-/// scans are lost on the way to the mapper, where they are 70 ms old.
+/// 40 s of a lidar at 10 Hz: 1000 bytes a scan, stamped 50 ms before, every other one 20 ms late; two scans
+/// per second are lost on the way to the mapper, where they are 70 ms old.
 fn measured() -> Recording {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");

@@ -57,7 +57,7 @@ fn lifetimes_are_labelled_with_events() {
     for expected in [
         "8 nodes throughout",
         "lidar_driver restarted, away for 6.8 s",
-        "topic changes hands",
+        "topic is taken over",
     ] {
         assert!(svg.contains(expected), "{expected}");
     }
@@ -204,7 +204,7 @@ fn a_latex_figure_has_a_caption_and_compiles() {
         "\\includegraphics{lives.pdf}",
         "warehouse.bag",
         "2 (+4) from 0:38",
-        "cross: ends",
+        "cross: end",
     ] {
         assert!(tex.contains(expected), "{expected}: {tex}");
     }

@@ -248,7 +248,7 @@ fn existing_counts_are_kept_and_outdated_ones_replaced() {
     let table = dir.path().join("t");
     let before = rows(&table, "counts");
     let said = ends(dir.path(), &args, 0);
-    assert!(said.contains("0 bags (7 there already)"), "{said}");
+    assert!(said.contains("0 bags (7 already there)"), "{said}");
     assert_eq!(rows(&table, "counts"), before);
     // A table with another period replaces the old one.
     let said = ends(dir.path(), &[&args[..], &["--period", "5s"]].concat(), 3);
@@ -262,7 +262,7 @@ fn existing_counts_are_kept_and_outdated_ones_replaced() {
     )
     .unwrap();
     let said = ends(dir.path(), &[&args[..], &["--period", "5s"]].concat(), 0);
-    assert!(said.contains("1 bag (6 there already)"), "{said}");
+    assert!(said.contains("1 bag (6 already there)"), "{said}");
     let uris = texts(&table, "bags", "uri");
     assert_eq!(uris.len(), 7);
     assert_eq!(uris.iter().collect::<BTreeSet<_>>().len(), 7, "a bag twice");

@@ -1,4 +1,4 @@
-//! Tests of what each command takes a folder for: one recording, several, a copy, or nothing.
+//! Tests of how each command treats a folder: as one recording, several, a copy, or none.
 
 use std::fs;
 use std::path::Path;
@@ -80,7 +80,7 @@ const COMMANDS: &[&str] = &[
     "diff F F",
 ];
 
-/// The exit code, and what was printed on standard error and output.
+/// The exit code, and the text on standard error and output.
 fn bagreel(folder: &Path, line: &str, what: &str) -> (i32, String, String) {
     let args = line
         .split(' ')
@@ -98,7 +98,7 @@ fn bagreel(folder: &Path, line: &str, what: &str) -> (i32, String, String) {
     )
 }
 
-/// Every folder of the table, made.
+/// Creates every folder of the table.
 fn made() -> tempfile::TempDir {
     let all = tempfile::tempdir().unwrap();
     for (name, make, ..) in FOLDERS {

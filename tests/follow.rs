@@ -61,7 +61,7 @@ fn holds(name: &str, what: &str, recorder: Recorder, seed: u64) {
         if follower.is_none() && steps > 1 {
             follower = Some(follow(folder, what));
         }
-        // As long as a recorder waits between two writes.
+        // The time that a recorder waits between two writes.
         sleep(Duration::from_millis(chance.below(60) as u64));
         (Some(steps) != end).then_some(())
     });
@@ -143,7 +143,8 @@ fn following_a_database_never_locks_it() {
         assert!(written > 100, "{written}");
         db.close().unwrap();
         assert!(follower.wait().unwrap().success());
-        // If the follower reads while the recorder closes, SQLite leaves its journal to whoever opens the database next.
+        // If the follower reads while the recorder closes, SQLite leaves its journal until the database is
+        // opened again.
         let db = Connection::open(&path).unwrap();
         let rows = db.query_row("SELECT count(*) FROM messages", [], |row| row.get(0));
         assert!(rows.is_ok_and(|rows: i64| rows > written));

@@ -71,7 +71,7 @@ fn findings(folder: &Path, bag: &str, expect: &str) -> Vec<String> {
         .collect()
 }
 
-/// A robot of three minutes: a lidar, a merger, a controller, and a log that names who subscribes.
+/// A robot of three minutes: a lidar, a merger, a controller, and a log that names the subscribers.
 #[derive(Clone, Copy)]
 struct Robot {
     /// Milliseconds between scans.
@@ -358,7 +358,7 @@ fn exit_codes_of_check_match_its_help() {
     let dir = outcomes();
     let here = dir.path();
     let table: [(&[&str], i32, &str); 14] = [
-        (&["run.bag", "--expect", "kept.yaml"], 0, "1 rule kept"),
+        (&["run.bag", "--expect", "kept.yaml"], 0, "1 rule passed"),
         (
             &["run.bag", "--expect", "warned.yaml"],
             0,
@@ -509,7 +509,7 @@ fn allowances_expire_and_unused_ones_are_reported() {
     assert_eq!(code, 0, "{said}");
     let (code, said) = check("finding: topic-rate-low, name: /scan, until: 2023-12-31, why: x");
     assert_eq!(
-        (code, said.contains("held for bags before 2024-01-01")),
+        (code, said.contains("applied to bags before 2024-01-01")),
         (1, true),
         "{said}"
     );

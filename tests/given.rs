@@ -1,4 +1,5 @@
-//! Tests of graphs from beside the bag and of what is written from them: services, starved subscribers, `NoDL`, bundles.
+//! Tests of graphs from files besides the bag and of outputs made from them: services, starved subscribers,
+//! `NoDL`, bundles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -12,7 +13,7 @@ use crate::support::{ORIGIN, Recording, mcap};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// Runs the command in a folder; returns its exit code, its results and what else it said.
+/// Runs the command in a folder; returns its exit code, its results and its messages.
 fn bagreel(folder: &Path, args: &str) -> (Option<i32>, String, String) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
     let done = run
@@ -89,7 +90,7 @@ fn services_and_actions_of_a_file_are_drawn_between_nodes_and_hidden_on_request(
         "render r.mcap --topology t.yaml -p all -o - --format dot --dot-profile plain",
     );
     assert!(dot.contains("label=\"/plan\", shape=hexagon"), "{dot}");
-    // Recorders leave services out: that none is in the bag is no news.
+    // Recorders leave services out, so their absence in the bag is not reported.
     let (_, _, said) = bagreel(folder, "info r.mcap --topology t.yaml -v");
     assert!(!said.contains("/plan"), "{said}");
 }
@@ -134,7 +135,7 @@ fn node(cdr: Cdr, name: &str, sends: Option<&str>, hears: Option<(&str, u8)>) ->
     (0..4).fold(cdr, |cdr, _| cdr.u32(0))
 }
 
-/// A graph in which `/slam` asks for more than `/lidar` offers, with bytes after its end.
+/// A graph in which `/slam` requests more than `/lidar` offers, with bytes after its end.
 fn graph(spare: usize) -> Vec<u8> {
     let cdr = node(Cdr::default().u32(3), "/lidar", Some("/scan"), None);
     let cdr = node(cdr, "/slam", None, Some(("/scan", 1)));
@@ -156,8 +157,8 @@ fn graphs(spare: usize) -> Recording {
 }
 
 #[test]
-fn a_starved_subscription_ends_in_a_bar_and_a_graph_tells_qualities_and_parameters() {
-    // Some serializers leave room at the end.
+fn a_starved_subscription_ends_in_a_bar_and_a_graph_has_qualities_and_parameters() {
+    // Some serializers append unused bytes.
     for spare in [0, 32] {
         let folder = folder(&graphs(spare), &ros2());
         let folder = folder.path();
@@ -201,7 +202,7 @@ fn a_recorded_graph_is_a_topology_for_another_bag() {
     assert!(why.contains("graph.mcap"), "{why}");
     let (code, _, said) = bagreel(folder, "info graph.mcap --topology r.mcap");
     assert!(
-        code == Some(1) && said.contains("no graph is recorded"),
+        code == Some(1) && said.contains("it contains no recorded graph"),
         "{code:?} {said}"
     );
 }
@@ -286,7 +287,7 @@ fn skew_is_the_coefficient_of_variation_of_the_rate() {
         .map(|row| (row[at("topic")], row[at("skew")].parse().unwrap()))
         .collect();
     assert!(skews["/even"] < 0.01, "{skews:?}");
-    // Of 15.2, 14.8 and 5 messages per second in the whole windows.
+    // From 15.2, 14.8 and 5 messages per second in the whole windows.
     assert!((skews["/uneven"] - 0.4043).abs() < 0.001, "{skews:?}");
 }
 
@@ -363,7 +364,7 @@ fn a_bundle_is_the_same_twice_and_its_numbers_follow_from_the_windows() {
     ] {
         assert!(a.contains_key(name), "{name}: {:?}", a.keys());
     }
-    // Computed anew from the windows of the mission's JSON.
+    // Computed again from the windows of the mission's JSON.
     let json = done(
         folder,
         "render runs/w.bag -p 10 -o - --format json --json windows",

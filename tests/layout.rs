@@ -161,7 +161,7 @@ fn is_inside(plan: &Plan, inner: usize, outer: usize) -> bool {
     at.is_some()
 }
 
-/// Whether a point is on the outline of a vertex, give or take a pixel.
+/// Whether a point is on the outline of a vertex, within a pixel.
 fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
     let (rect, centre) = (layout.boxes[v], layout.boxes[v].centre());
     let within = |by: f64| {

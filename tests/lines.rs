@@ -8,7 +8,7 @@ use serde_json::Value;
 /// The elements of class `class` in a picture: attributes, and the words inside.
 type Elements = Vec<(BTreeMap<String, String>, Vec<String>)>;
 
-/// The README's film as a picture per window, and its mission as JSON.
+/// The README's animation as a picture per window, and its mission as JSON.
 fn film() -> (Value, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let out = |name: &str| folder.path().join(name);
@@ -100,7 +100,7 @@ fn two_boxes_share_one_line_that_names_its_topics() {
 }
 
 #[test]
-fn plumbing_has_no_lines_and_nodes_without_lines_are_text() {
+fn hubs_have_no_lines_and_nodes_without_lines_are_text() {
     let (_, pictures) = film();
     for picture in &pictures {
         for (edge, _) in groups(picture, "edge")

@@ -118,7 +118,7 @@ fn complaint(address: &str) -> String {
     line
 }
 
-/// Answers every call with the same bytes, one at a time if it `drips`.
+/// Answers every call with the same bytes, one byte at a time if it `drips`.
 fn answering(answer: String, drips: bool) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("ros1://{}", listener.local_addr().unwrap());
@@ -141,7 +141,7 @@ fn answering(answer: String, drips: bool) -> String {
 }
 
 #[test]
-fn what_is_not_a_master_is_reported() {
+fn a_server_that_is_not_a_master_is_reported() {
     let ok = "HTTP/1.0 200 OK\r\n\r\n";
     let attributes: Vec<String> = (0..200_000).map(|at| format!(" a{at}=''")).collect();
     let answers = [
@@ -248,7 +248,7 @@ mod bridge {
     }
 
     #[test]
-    fn what_was_not_seen_did_not_stop_and_what_no_change_names_did() {
+    fn unreachable_elements_do_not_stop_and_unreported_stops_are_found() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = format!("ws://{}", listener.local_addr().unwrap());
         let server = spawn(move || {
@@ -262,7 +262,7 @@ mod bridge {
                     sleep(Duration::from_millis(4500));
                     continue;
                 }
-                // The lidar left, of which servers say nothing, since its topic still has a subscriber.
+                // The lidar left, which servers do not report, since its topic still has a subscriber.
                 assert_eq!(hear(&mut client)["op"], "unsubscribeConnectionGraph");
                 assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
                 let mut whole = update(&[]);
@@ -289,7 +289,7 @@ mod bridge {
     }
 
     #[test]
-    fn hostile_bridges_are_left() {
+    fn hostile_bridges_are_disconnected() {
         let channel = |at| json!({"id": at, "topic": format!("/topic{at}"), "schemaName": "a/B"});
         let channels =
             json!({"op": "advertise", "channels": (0..400_000).map(channel).collect::<Vec<_>>()});
@@ -297,7 +297,10 @@ mod bridge {
         let many = json!({"op": "connectionGraphUpdate", "publishedTopics": (0..70_000).map(topic).collect::<Vec<_>>()});
         let texts = [
             (r#"{"op": "connectionGr"#.to_owned(), "EOF while parsing"),
-            (channels.to_string(), "too much at once"),
+            (
+                channels.to_string(),
+                "description of the graph is too large",
+            ),
             (many.to_string(), "more than 65536 names"),
         ];
         for (text, why) in texts {

@@ -169,7 +169,7 @@ fn shown(log: &Log, svg: &str, at: &str) -> BTreeSet<u64> {
     all
 }
 
-/// What follows the name in the sentence of an event with numbers: `30 → 5 Hz`.
+/// The text after the name in the sentence of an event with numbers: `30 → 5 Hz`.
 fn numbers(sentence: &str) -> Option<String> {
     let (before, after) = sentence
         .split_once(" → ")

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::support::browser;
 
-/// Runs `bagreel render` on this evolution and returns the folder with `x.` and each of the extensions.
+/// Runs `bagreel render` on this mission and returns the folder with `x.` and each of the extensions.
 fn rendered(mission: &Value, extensions: &[&str]) -> TempDir {
     let folder = TempDir::new().unwrap();
     let input = folder.path().join("in.json");
@@ -457,7 +457,7 @@ fn pages_stay_within_their_size() {
         .and_then(|s| s.split("</style>").next())
         .unwrap();
     assert!(fonts.starts_with("@font-face"));
-    // Of which script and CSS are 66,000.
+    // Including 66,000 of script and CSS.
     assert!(
         page.len() - fonts.len() <= 125_000,
         "{}",

@@ -197,7 +197,7 @@ fn expected(folder: &Path, bag: &str) {
     );
 }
 
-/// What happens to a run.
+/// A fault of a run.
 type Fault = fn(&mut Recording);
 
 #[test]
@@ -426,7 +426,7 @@ fn a_rewritten_bag_without_publishers_proves_no_node_missing() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(
-        said.contains("/teleop is there: the connections of this bag name no senders"),
+        said.contains("/teleop is present: the connections of this bag name no senders"),
         "{said}"
     );
     let output = bagreel(here, &["diff", "first.bag", "bare.bag"]);

@@ -126,7 +126,8 @@ fn there(graph: &Graph) -> BTreeSet<Element> {
         .collect()
 }
 
-/// Whether the changes of every window turn the previous window's elements into its own, each with a matching entry.
+/// Whether the changes of every window turn the previous window's elements into its own, each with a matching
+/// event.
 fn follows(mission: &Mission) -> Result<(), TestCaseError> {
     let mut before: Option<BTreeSet<Element>> = None;
     for (window, graph) in mission.each() {
@@ -157,7 +158,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn changes_yield_each_next_window_and_the_ledger_ignores_the_period(bag in recording()) {
+    fn changes_yield_each_next_window_and_the_event_log_ignores_the_period(bag in recording()) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.bag");
         std::fs::write(&path, rosbag1::write(&bag, Pack::None, 4096)).unwrap();

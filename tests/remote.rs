@@ -596,7 +596,7 @@ fn refused_objects_are_reported_and_counted_later() {
     let (code, said) = run();
     assert_eq!(code, Some(1), "{said}");
     assert!(
-        said.contains("0 bags (2 not to be had)") && said.matches("error: ").count() == 2,
+        said.contains("0 bags (2 not available)") && said.matches("error: ").count() == 2,
         "{said}"
     );
     server.state().refuses = None;
@@ -605,5 +605,5 @@ fn refused_objects_are_reported_and_counted_later() {
     assert!(said.contains("2 bags, "), "{said}");
     let (code, said) = run();
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("0 bags (2 there already)"), "{said}");
+    assert!(said.contains("0 bags (2 already there)"), "{said}");
 }

@@ -65,7 +65,8 @@ fn bagreel(folder: &Path, words: &[&str]) -> Output {
     command.current_dir(folder).args(words).output().unwrap()
 }
 
-/// Every edge that `info` knows with the workspace, as `node -> topic` or `topic -> node`; log topics left out.
+/// Every edge that `info` lists with the workspace, as `node -> topic` or `topic -> node`; log topics left
+/// out.
 fn edges(folder: &Path, more: &[&str]) -> BTreeSet<String> {
     let words = [
         &["info", "run.mcap", "--format", "json", "--source", "ws"],
@@ -305,7 +306,7 @@ fn the_code_as_of_the_recording_is_read_from_git() {
     }
 }
 
-/// Everything that a repository could make git or bagreel execute would leave a file.
+/// Any code that a repository makes git or bagreel execute would leave a file.
 #[cfg(unix)]
 #[test]
 fn a_hostile_repository_executes_nothing() {
@@ -460,7 +461,10 @@ fn a_git_file_must_be_referenced_by_its_repository() {
         }
         let said = read(way);
         assert!(said.contains("1 file of 1 package read;"), "{said}");
-        assert!(said.contains("does not know this folder"), "{said}");
+        assert!(
+            said.contains("does not refer back to this folder"),
+            "{said}"
+        );
     }
 }
 
@@ -529,7 +533,7 @@ fn reasons_against_a_declaration_are_reported() {
     );
     for (nodes, code, says) in [
         (&["/other"][..], &logging, "its node would have logged"),
-        (&[], &many, "several places match"),
+        (&[], &many, "several declarations match"),
         (&[], &few, "most of its node's topics are not in the bag"),
     ] {
         let folder = folder(
@@ -544,14 +548,14 @@ fn reasons_against_a_declaration_are_reported() {
         // A node that may not have run has no certain subscriptions.
         if says.starts_with("several") {
             assert!(found.is_empty(), "{found:?}");
-            let why = "what its node publishes may come from elsewhere";
+            let why = "the topics of its node may have another publisher";
             assert!(text.contains(why), "{text}");
         }
     }
 }
 
 #[test]
-fn a_node_that_did_not_run_is_left_out_whole() {
+fn all_edges_of_a_node_that_did_not_run_are_left_out() {
     let talker = node("talker", "out", "in");
     let other_type = talker.replace(
         "\n\ndef",
@@ -565,7 +569,7 @@ fn a_node_that_did_not_run_is_left_out_whole() {
             &["/boss"][..],
             &*publisher,
             &*talker,
-            "what its node publishes may come from elsewhere",
+            "the topics of its node may have another publisher",
         ),
         (
             &[],
@@ -573,12 +577,7 @@ fn a_node_that_did_not_run_is_left_out_whole() {
             &other_type,
             "a topic of its node has another type in the bag",
         ),
-        (
-            &[],
-            "",
-            old,
-            "its node is written for the other version of ROS",
-        ),
+        (&[], "", old, "its node is for the other version of ROS"),
     ] {
         let topics = [
             ("/out", STRING),
@@ -598,7 +597,7 @@ fn a_node_that_did_not_run_is_left_out_whole() {
 }
 
 #[test]
-fn slashless_topics_of_an_own_writer_are_at_the_root() {
+fn topics_without_a_slash_from_a_custom_writer_are_at_the_root() {
     let files = [PACKAGE, ("p/p/talker.py", &*node("talker", "out", "in"))];
     let folder = folder(&[("out", STRING), ("/in", STRING)], &["/talker"], &files);
     assert_eq!(
@@ -628,7 +627,10 @@ fn types_owned_by_another_program_are_not_inferred() {
     let topics = [("/turtle1/pose", "turtlesim/msg/Pose")];
     let folder = folder(&topics, &[], &[PACKAGE, ("p/p/fake.py", &code)]);
     let text = said(folder.path(), &["--infer", "source"]);
-    assert!(text.contains("its type is another program's own"), "{text}");
+    assert!(
+        text.contains("its type belongs to another program"),
+        "{text}"
+    );
     let found = edges(folder.path(), &["--infer", "source"]);
     assert!(!found.contains("/fake ? -> /turtle1/pose"), "{found:?}");
 }
@@ -642,7 +644,7 @@ fn code_outside_git_is_read_and_reported_as_such() {
         &[PACKAGE, ("p/p/n.py", &code)],
     );
     let text = said(folder.path(), &[]);
-    let note = "the code was read as it lies, for it is in no git repository; it may have changed since 2024-01-01";
+    let note = "the code was read from the working tree, since it is not in a git repository; it may have changed since 2024-01-01";
     assert!(text.contains(note), "{text}");
     let asked = said(folder.path(), &["--source-at", "worktree"]);
     assert!(!asked.contains("as it lies"), "{asked}");
@@ -674,7 +676,10 @@ fn a_simulation_is_rejected_if_another_launch_file_starts_the_same_nodes() {
     let both = folder(&recorded, &["/steer"], &files);
     assert_eq!(edges(both.path(), &["--infer", "source"]), set(&named));
     let text = said(both.path(), &["--infer", "source"]);
-    assert!(text.contains("another launch file fits better"), "{text}");
+    assert!(
+        text.contains("another launch file matches better"),
+        "{text}"
+    );
     let alone = folder(&recorded, &["/steer"], &files[..5]);
     let found = edges(alone.path(), &["--infer", "source"]);
     assert!(found.contains("/sim ? -> /out"), "{found:?}");
@@ -683,7 +688,7 @@ fn a_simulation_is_rejected_if_another_launch_file_starts_the_same_nodes() {
     let shared = set(&["/steer ? -> /in", "/out -> /steer ?"]);
     assert_eq!(edges(neither.path(), &["--infer", "source"]), shared);
     let text = said(neither.path(), &["--infer", "source"]);
-    let why = "a launch file that fits too does without its node";
+    let why = "a matching launch file does not start its node";
     assert!(text.contains(why), "{text}");
 }
 
@@ -742,7 +747,7 @@ fn inapplicable_options_are_refused() {
         (&["info", "run.mcap", "--source-at", "HEAD"], "--source"),
         (
             &["info", "run.mcap", "--infer", "source"],
-            "`--infer source` has no source code",
+            "`--infer source` requires source code",
         ),
         (&["info", "x.json", "--source", "ws"], "is a mission's JSON"),
     ] {

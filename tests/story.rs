@@ -118,7 +118,7 @@ fn a_mission_read_from_json_has_the_same_log() {
 }
 
 #[test]
-fn every_window_difference_refers_to_its_log_entry() {
+fn every_window_difference_refers_to_its_event() {
     for seconds in [1, 10, 60] {
         let mission = mission("warehouse.bag", seconds);
         let later = mission.graphs.iter().skip(1);

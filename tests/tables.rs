@@ -251,7 +251,7 @@ fn invalid_requests_are_refused() {
     };
     refused(&["-o", "x.gif"], "`gif` is not a format of tables");
     refused(&["-o", "x"], "has no known extension");
-    refused(&["-o", "-", "--fields"], "standard output is one");
+    refused(&["-o", "-", "--fields"], "do not fit on standard output");
     refused(&["-o", "{n}.csv"], "a file per window");
     refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
 }
@@ -418,7 +418,7 @@ mod parquet {
         schema.columns().to_vec()
     }
 
-    /// The text of a field as CSV has it.
+    /// The text of a field as in CSV.
     fn cell((_, field): (&String, &Field)) -> String {
         match field {
             Field::Null => String::new(),

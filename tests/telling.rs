@@ -71,7 +71,7 @@ fn settled(seen: &SeenWindow) -> Vec<String> {
 }
 
 #[test]
-fn a_window_without_a_headline_looks_like_the_one_before() {
+fn a_window_without_a_headline_looks_like_the_previous_one() {
     let view = example("warehouse.bag", Some("10"));
     let quiet = (1..view.frames.len()).filter(|k| view.frames[*k].caption.is_empty());
     for k in quiet {
@@ -140,7 +140,7 @@ fn an_element_shows_the_rates_of_its_event_instead_of_their_mean() {
 fn a_node_that_restarts_keeps_its_arrows() {
     let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let mut reading = Reading::of([bag]);
-    // Away from 4:06 to 4:13: gone when the window from 4:00 to 4:10 ends.
+    // Away from 4:06 to 4:13, so it is absent at the end of the window from 4:00 to 4:10.
     reading.division.length = bagreel::internals::base::time::Period::parse("10").map_or(
         reading.division.length,
         bagreel::internals::graph::window::Length::Fixed,

@@ -58,7 +58,7 @@ fn all_counts_match_an_independent_reader() {
     );
 }
 
-/// Whether a node is alive in the window that begins at this second of the mission.
+/// Whether a node is running in the window that begins at this second of the mission.
 fn alive(mission: &Mission, node: &str, second: usize) -> bool {
     let graph = mission.graphs.get(second / 10).unwrap();
     graph.nodes.iter().any(|n| {
@@ -83,7 +83,8 @@ fn nodes_start_and_stop_at_the_true_times() {
     assert_eq!(life("/robot1/planner"), seconds(30, 170));
     assert_eq!(life("/robot1/emergency_stop"), seconds(90, 150));
     assert_eq!(life("/robot2/base_driver"), seconds(160, 320));
-    // Killed at 4:26 and back at 4:41 under another anonymous name: alive in every window of ten seconds but one.
+    // Killed at 4:26 and back at 4:41 under another anonymous name: running in every window of ten seconds
+    // but one.
     assert_eq!(
         life("/robot1/object_detector_"),
         [seconds(170, 260), seconds(280, 290)].concat()

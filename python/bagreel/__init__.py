@@ -1,8 +1,8 @@
 """See how a robot's software reconfigures during a mission, straight from its bag files.
 
-`show` plays a mission in a notebook, `read` reads bags into a `Mission`, `render` draws it. `baseline`, `check` and `diff` judge
-missions, `events` lists what happened, `extract` writes messages as tables. `tables` counts one bag by its index, wherever it
-lies; `merge` and `finish` make a mission of what was counted. Tables are Arrow: pyarrow, pandas, polars and DuckDB take them
+`show` plays a mission in a notebook, `read` reads bags into a `Mission`, `render` draws it. `baseline`, `check` and `diff` compare
+missions, `events` returns the event log, `extract` writes messages as tables. `tables` counts one bag by its index, local or
+remote; `merge` and `finish` make a mission from the counts. Tables are Arrow: pyarrow, pandas, polars and DuckDB use them
 without copying.
 """
 
@@ -71,13 +71,13 @@ def tables(
 ) -> dict[str, Table]:
     """Counts one bag by its index: the tables `counts` (a row per publisher, topic and window) and `bags` (one row).
 
-    A bag that cannot be read has its row in `bags` with an `error`. Only part of the bag's time is counted with
-    `start_ns` and `end_ns` (half-open); `merge` makes the whole of such parts. `mission` is the mission's name;
-    `origin_ns` a moment at which windows begin, as `plan` gives it.
+    A bag that cannot be read has its row in `bags` with an `error`. `start_ns` and `end_ns` (half-open) select
+    a part of the bag's time; `merge` combines such parts. `mission` is the mission's name; `origin_ns` is the start of
+    one of the windows, as returned by `plan`.
 
     Raises:
-        StoreError: the store refused or could not be reached; trying again may help.
-        ValueError: an option makes no sense, or `uri` is not one bag.
+        StoreError: the store failed or could not be reached; a retry may help.
+        ValueError: an option is invalid, or `uri` is not one bag.
     """
     return _bagreel.tables(os.fspath(uri), **given(locals(), "uri"))
 
@@ -91,12 +91,12 @@ def _batches(counts: Any) -> list[Table]:
     if hasattr(counts, "__arrow_c_array__"):
         return [Table(counts)]
     if not isinstance(counts, Iterable):
-        raise TypeError(f"give Arrow tables or record batches, not `{type(counts).__name__}`")
+        raise TypeError(f"pass Arrow tables or record batches, not `{type(counts).__name__}`")
     return [batch for one in counts for batch in _batches(one)]
 
 
 def merge(counts: Any) -> Table:
-    """Makes one table `counts` of those of all parts of one or more bags, in any order.
+    """Merges the tables `counts` of all parts of one or more bags, in any order.
 
     `counts` is an Arrow table or record batch (of any library), or any number of them. Exact for parts that do not
     overlap in time.
@@ -105,21 +105,21 @@ def merge(counts: Any) -> Table:
 
 
 def finish(counts: Any) -> Mission:
-    """Makes the mission that the counts of its bags tell of: states, rates, what changed from window to window.
+    """Makes the mission from the counts of its bags: states, rates, changes from window to window.
 
     Raises:
-        ValueError: the counts are of several missions, or of none.
+        ValueError: the counts are from several missions, or empty.
     """
     return _bagreel.finish(_batches(counts))
 
 
 def read(uris: Paths, *, period: str | None = None, align: Literal["clock", "bag"] = "bag") -> Mission:
-    """Reads bags, or a mission's own JSON, as one mission, with all evidence that payloads hold."""
+    """Reads bags, or a mission's JSON, as one mission, with all evidence in payloads."""
     return _bagreel.read(texts(uris), period=period, align=align)
 
 
 def to_dict(mission: Mission) -> dict[str, Any]:
-    """The mission as `render -o x.json` writes it: `windows`, `ledger`, `phases` and more."""
+    """The mission in the form of `render -o x.json`: `windows`, `events`, `phases` and more."""
     return json.loads(mission.to_json())
 
 
@@ -183,8 +183,8 @@ def render(
     link: Iterable[str] = (),
     phases: str | os.PathLike[str] | None = None,
 ) -> Rendered:
-    """Draws and writes outputs, as `bagreel render` does; the options are those of the command, a list where one may be
-    repeated. Returns the files, of which a notebook shows the first. Raises `BagreelError` with what the command said.
+    """Draws and writes outputs, as `bagreel render` does; the options are those of the command, lists for repeatable
+    ones. Returns the files, of which a notebook shows the first. Raises `BagreelError` with the command's message.
     """
     offset, ns, topology = list(offset), list(ns), list(topology)
     collapse, expand, link = list(collapse), list(expand), list(link)
@@ -220,8 +220,8 @@ def figure(
     source_at: str | None = None,
     infer: str | None = None,
 ) -> Rendered:
-    """Draws a figure for a paper, as `bagreel figure` does: life lines, a map of publishers and subscribers, or the
-    reconfigurations one by one, as wide as `width` says (88mm).
+    """Draws a figure for a paper, as `bagreel figure` does: lifelines, a map of publishers and subscribers, or the
+    reconfigurations one by one; `width` is its width on paper (default 88mm).
     """
     offset, ns, topology = list(offset), list(ns), list(topology)
     options = given(locals(), "bags", "outputs")
@@ -254,8 +254,7 @@ def show(
 ) -> Shown:
     """A player of bags, or of a mission, for a notebook; `height` is in pixels.
 
-    Where a viewer removes pages inside pages, as some do that show notebooks of others, a still picture of the whole
-    mission stays.
+    If a notebook viewer removes embedded pages, a still picture of the whole mission is shown instead.
     """
     collapse = list(collapse)
     options = given(locals(), "bags", "height")
@@ -282,9 +281,9 @@ def events(
     topology: Iterable[str | os.PathLike[str]] = (),
     infer: str | None = None,
 ) -> list[dict[str, Any]]:
-    """What started, stopped, restarted, changed rate or hands, and when, in order of time; a dict each.
+    """The event log: starts, stops, restarts, rate changes, takeovers, in order of time; a dict each.
 
-    `parts` adds what each entry consists of, `all` housekeeping and the recorder.
+    `parts` adds the parts of each event, `all` housekeeping and the recorder.
     """
     offset, ns, topology = list(offset), list(ns), list(topology)
     _, text = run("events", bags, format="ndjson", **given(locals(), "bags"))
@@ -325,7 +324,7 @@ def check(
 ) -> Check:
     """Checks a mission against an expectation: `assert bagreel.check("run.bag", "graph.yaml").ok`.
 
-    Raises `BagreelError` where the bag or the expectation cannot be read.
+    Raises `BagreelError` if the bag or the expectation cannot be read.
     """
     topology, link = list(topology), list(link)
     options = given(locals(), "bags")
@@ -346,7 +345,7 @@ def diff(
     roles: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
 ) -> Diff:
-    """What differs between two missions; `outputs` are reports and pictures of it to write, as `bagreel diff -o` does."""
+    """The differences between two missions; `outputs` are reports and pictures to write, as with `bagreel diff -o`."""
     topology = list(topology)
     options = given(locals(), "first", "second", "outputs")
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:

@@ -1,4 +1,4 @@
-"""The command: `python -m bagreel`, and `bagreel` on the path."""
+"""The command: `python -m bagreel`, and `bagreel` in the path."""
 
 import sys
 

@@ -1,13 +1,13 @@
-"""What is written in Rust."""
+"""The part written in Rust."""
 
 from os import PathLike
 from typing import Any, final
 
 class BagreelError(RuntimeError):
-    """A bag could not be read, or a table not be made."""
+    """A bag could not be read, or a table could not be created."""
 
 class StoreError(BagreelError):
-    """A store refused, or could not be reached: trying again may help."""
+    """A store failed or could not be reached; a retry may help."""
 
 __version__: str
 
@@ -25,13 +25,13 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any: ...
     def __len__(self) -> int: ...
     def to_pyarrow(self) -> Any:
-        """As `pyarrow.RecordBatch`; no row is copied."""
+        """As `pyarrow.RecordBatch`, without copying."""
     def to_pandas(self) -> Any:
         """As `pandas.DataFrame`."""
 
 @final
 class Mission:
-    """A mission: its windows, what is in them, what changed."""
+    """A mission: its windows with their graphs and changes."""
 
     def tables(self) -> dict[str, Table]:
         """By name: edges, topics, nodes, changes, ledger, phases, bags."""
@@ -44,7 +44,7 @@ class Mission:
         """The names of its topics, sorted."""
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What happened, in order of time: `kind`, `what`, `name`, `time_ns` and more."""
+        """The event log, in order of time: `kind`, `what`, `name`, `time_ns` and more."""
     @property
     def windows(self) -> list[dict[str, Any]]:
         """Its windows: `index`, `start_ns`, `end_ns`, `partial`, `messages`, `changes`."""
@@ -59,7 +59,7 @@ class Mission:
         """The names of its bags."""
     def _repr_html_(self) -> str: ...
     def __len__(self) -> int:
-        """Windows."""
+        """The number of windows."""
 
 def plan(
     sources: list[str], *, period: str = "10s", align: str = "clock", mission: str | None = None

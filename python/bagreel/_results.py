@@ -1,4 +1,4 @@
-"""What the commands give, as values that show themselves in a notebook."""
+"""The results of the commands, as values that notebooks can display."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _IMAGES = {
 
 
 def image(path: Path) -> str:
-    """A picture inside a page of HTML, apart from the page's own styles."""
+    """A picture for embedding in HTML, independent of the page's styles."""
     data = base64.b64encode(path.read_bytes()).decode()
     return f'<img alt="{html.escape(path.stem)}" style="max-width:100%" src="data:{_IMAGES[path.suffix]};base64,{data}">'
 
 
 def player(page: str, still: str, height: int) -> str:
-    """A page that plays inside another one, before a still picture that stays where pages inside pages are removed."""
+    """A page embedded in another one, on top of a still picture for viewers that remove embedded pages."""
     frame = "position:absolute;inset:0;width:100%;height:100%;border:0;background:#fff"
     return (
         f'<div style="position:relative;height:{height}px;overflow:hidden">{still}'
@@ -33,7 +33,7 @@ def player(page: str, still: str, height: int) -> str:
 
 
 class Shown:
-    """A player that a notebook shows; `html` is what it shows, for pages of one's own."""
+    """A player for notebooks; `html` is its HTML, for your own pages."""
 
     def __init__(self, html: str) -> None:
         self.html = html
@@ -76,8 +76,8 @@ class Rendered(Sequence[Path]):
 class Check:
     """The outcome of a check.
 
-    `ok` says whether nothing is broken, `findings` lists what is (and what could not be decided, as `severity` says),
-    `errors`, `warnings` and `unknown` count them, and `data` is all of it, as `check --format json` writes it.
+    `ok` is whether all rules passed, `findings` lists the broken and the undecidable ones (see `severity`), `errors`,
+    `warnings` and `unknown` count them, and `data` is the whole report in the form of `check --format json`.
     """
 
     def __init__(self, ok: bool, data: dict[str, Any], text: str, markdown: str) -> None:
@@ -113,9 +113,9 @@ class Check:
 
 
 class Diff(Sequence[dict[str, Any]]):
-    """What differs between two missions, a dict each: `kind`, `name`, `in`, `first`, `second`, `known`.
+    """The differences between two missions, a dict each: `kind`, `name`, `in`, `first`, `second`, `known`.
 
-    `same` says whether nothing is known to differ.
+    `same` is whether no difference is known.
     """
 
     def __init__(self, same: bool, differences: list[dict[str, Any]], text: str, markdown: str) -> None:

@@ -9,14 +9,14 @@ import os
 
 
 def _take_all(parser: argparse.ArgumentParser) -> None:
-    """Lets `parser` hand over everything behind the command's name as it was typed, options and `--help` too."""
-    # No argument begins with this, so none is taken for an option of the parser's own.
+    """Makes `parser` pass on everything after the command's name unchanged, including options and `--help`."""
+    # No argument begins with this, so none is mistaken for an option of the parser.
     parser.prefix_chars = "\0"
     parser.add_argument("args", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
 
 
 def _run(args: list[str]) -> int:
-    """Runs the command in this process where the wheel is installed, else the one on the path; its exit code."""
+    """Runs the command in this process if the wheel is installed, else the one in the path; returns its exit code."""
     try:
         from bagreel._bagreel import main
     except ImportError:
@@ -31,11 +31,11 @@ class Command:
     EXTENSION_POINT_VERSION = "0.1"
 
     def add_arguments(self, parser, cli_name):
-        """Takes every argument."""
+        """Accepts every argument."""
         _take_all(parser)
 
     def main(self, *, parser, args) -> int:
-        """Runs `bagreel` with them; its exit code."""
+        """Runs `bagreel` with them; returns its exit code."""
         return _run(args.args)
 
 
@@ -46,9 +46,9 @@ class Graph:
     EXTENSION_POINT_VERSION = "0.1"
 
     def add_arguments(self, parser, cli_name):
-        """Takes every argument."""
+        """Accepts every argument."""
         _take_all(parser)
 
     def main(self, *, args) -> int:
-        """Runs `bagreel render` with them; its exit code."""
+        """Runs `bagreel render` with them; returns its exit code."""
         return _run(["render", *args.args])

@@ -1,8 +1,8 @@
 """Bags as a data source of Apache Spark 4 (and of Sail): `spark.read.format("bagreel")`.
 
-Options: `path` (paths, folders, URLs or prefixes, with commas between them), `table` (`counts` or `bags`), `period`,
-`align`, `mission`, `tier`, as `bagreel.tables` takes them, and `shards`, into how many tasks the bags are dealt
-(default 64; four per core of the cluster is a good number). The wheel must be installed where the workers run.
+Options: `path` (paths, folders, URLs or prefixes, separated by commas), `table` (`counts` or `bags`), `period`,
+`align`, `mission`, `tier`, as for `bagreel.tables`, and `shards`, the number of tasks among which the bags are divided
+(default 64; four per core of the cluster is a good number). The wheel must be installed on the workers.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Shard(InputPartition):
 
 
 class BagreelDataSource(DataSource):
-    """The tables `counts` and `bags` of a fleet. A bag that cannot be read is a row of `bags`, never an exception; what
-    a store refuses is one, so that Spark tries the task again."""
+    """The tables `counts` and `bags` of a fleet. An unreadable bag is a row of `bags`, never an exception; a
+    failing store raises one, so that Spark retries the task."""
 
     @classmethod
     def name(cls) -> str:
@@ -44,7 +44,7 @@ class BagreelDataSource(DataSource):
     def schema(self) -> str:
         table = self.options.get("table", "counts")
         if table not in _COLUMNS:
-            raise ValueError(f"`{table}` is no table of bagreel: counts, bags")
+            raise ValueError(f"`{table}` is not a table of bagreel: counts, bags")
         return ", ".join(f"`{column}` {_type(column)}" for column in _COLUMNS[table].split())
 
     def reader(self, schema) -> DataSourceReader:
@@ -52,7 +52,7 @@ class BagreelDataSource(DataSource):
 
 
 class Reader(DataSourceReader):
-    """Deals the bags to tasks, and counts those of one."""
+    """Divides the bags among tasks, and counts those of one."""
 
     def __init__(self, options: dict) -> None:
         self.table = options.get("table", "counts")
@@ -80,5 +80,5 @@ class Reader(DataSourceReader):
 
 
 def register(spark) -> None:
-    """Makes `spark.read.format("bagreel")` known to a session."""
+    """Registers `spark.read.format("bagreel")` in a session."""
     spark.dataSource.register(BagreelDataSource)

@@ -1,4 +1,4 @@
-//! The functions that Python sees; all that takes time runs without the interpreter's lock.
+//! The functions exported to Python; slow work runs without the interpreter's lock.
 
 mod table;
 
@@ -20,16 +20,16 @@ pyo3::create_exception!(
     _bagreel,
     BagreelError,
     PyRuntimeError,
-    "A bag could not be read, or a table not be made."
+    "A bag could not be read, or a table could not be created."
 );
 pyo3::create_exception!(
     _bagreel,
     StoreError,
     BagreelError,
-    "A store refused, or could not be reached: trying again may help."
+    "A store failed or could not be reached; a retry may help."
 );
 
-/// The error as Python knows it, with the way out behind it.
+/// The error as a Python exception, followed by its hint.
 fn raised(error: &Error) -> PyErr {
     let hint = error.hint();
     let text = match hint.is_empty() {
@@ -46,7 +46,7 @@ fn raised(error: &Error) -> PyErr {
 fn period(text: &str) -> PyResult<Period> {
     let bad = || {
         PyValueError::new_err(format!(
-            "`{text}` is no period: write `60`, `30s`, `1m` or `500ms`"
+            "`{text}` is not a period: write `60`, `30s`, `1m` or `500ms`"
         ))
     };
     Period::parse(text).ok_or_else(bad)
@@ -71,7 +71,7 @@ fn detail(text: &str) -> PyResult<CountDetail> {
     })
 }
 
-/// Every bag of some paths, folders, URLs and prefixes, with its mission and where its windows begin.
+/// Every bag of some paths, folders, URLs and prefixes, with its mission and the start of one of its windows.
 #[pyfunction]
 #[pyo3(signature = (sources, *, period="10s", align="clock", mission=None))]
 fn plan<'py>(
@@ -99,7 +99,7 @@ fn plan<'py>(
         .collect()
 }
 
-/// What one bag, or a part of its time, says: the tables `counts` and `bags`.
+/// The tables `counts` and `bags` of one bag, or of a part of its time.
 #[pyfunction]
 #[pyo3(signature = (uri, *, period="10s", align="clock", mission=None, origin_ns=None, tier="auto", start_ns=None, end_ns=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
@@ -163,7 +163,7 @@ fn one(uri: String, mission: Option<String>, planning: &Planning) -> Result<Plan
         }),
         _ => Err(Error::usage(
             format!("`{uri}` is not one bag"),
-            "list its bags with `plan`, and give each",
+            "list its bags with `plan`, and pass each of them",
         )),
     }
 }
@@ -176,7 +176,7 @@ fn counts(tables: Vec<Table>) -> PyResult<Vec<fleet::Count>> {
     Ok(all)
 }
 
-/// One table `counts` of those of all parts of one or more bags.
+/// The merged table `counts` of all parts of one or more bags.
 #[pyfunction]
 fn merge(py: Python<'_>, tables: Vec<Table>) -> PyResult<Table> {
     let counts = counts(tables)?;
@@ -184,7 +184,7 @@ fn merge(py: Python<'_>, tables: Vec<Table>) -> PyResult<Table> {
     merged.map(Table).map_err(|e| raised(&e))
 }
 
-/// The mission that the counts of its bags tell of.
+/// The mission made from the counts of its bags.
 #[pyfunction]
 fn finish(py: Python<'_>, tables: Vec<Table>) -> PyResult<Mission> {
     let counts = counts(tables)?;
@@ -192,7 +192,7 @@ fn finish(py: Python<'_>, tables: Vec<Table>) -> PyResult<Mission> {
     mission.map(Mission).map_err(|e| raised(&e))
 }
 
-/// Reads bags, or a mission's own JSON, as one mission.
+/// Reads bags, or a mission's JSON, as one mission.
 #[pyfunction]
 #[pyo3(signature = (uris, *, period=None, align="bag"))]
 fn read(py: Python<'_>, uris: Vec<String>, period: Option<&str>, align: &str) -> PyResult<Mission> {
@@ -207,13 +207,13 @@ fn read(py: Python<'_>, uris: Vec<String>, period: Option<&str>, align: &str) ->
     mission.map(Mission).map_err(|e| raised(&e))
 }
 
-/// Runs the command with these arguments, the program's name first; its exit code.
+/// Runs the command with these arguments, the program's name first; returns its exit code.
 #[pyfunction]
 fn main(py: Python<'_>, args: Vec<OsString>) -> u8 {
     py.detach(|| bagreel::run_command(args))
 }
 
-/// A mission: its windows, what is in them, what changed.
+/// A mission: its windows with their graphs and changes.
 #[pyclass(frozen, module = "bagreel")]
 struct Mission(Read);
 
@@ -226,7 +226,7 @@ impl Mission {
         Ok(tables.map(|(word, batch)| (word, Table(batch))).collect())
     }
 
-    /// The mission as the text that `render -o x.json` writes.
+    /// The mission as JSON, equal to the output of `render -o x.json`.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         let mut text = Vec::new();
         py.detach(|| bagreel::write_json(&self.0, &mut text))
@@ -256,7 +256,7 @@ impl Mission {
             .collect()
     }
 
-    /// What happened, in order of time, as `bagreel events --format ndjson` prints it.
+    /// The event log, in order of time, as printed by `bagreel events --format ndjson`.
     #[getter]
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let text = py.detach(|| log(&self.0, LogFormat::Ndjson, LogOptions::default()));
@@ -305,7 +305,7 @@ impl Mission {
             .call_method1("html", (slf,))
     }
 
-    /// Windows.
+    /// The number of windows.
     fn __len__(&self) -> usize {
         self.0.windows.len()
     }

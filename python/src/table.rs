@@ -1,4 +1,4 @@
-//! A table that other libraries take over without copying, by Arrow's PyCapsule interface.
+//! A table that other libraries use without copying, by Arrow's PyCapsule interface.
 //!
 //! The interface: <https://arrow.apache.org/docs/format/CDataInterface/PyCapsuleInterface.html>.
 
@@ -17,7 +17,8 @@ const SCHEMA: &CStr = c"arrow_schema";
 const ARRAY: &CStr = c"arrow_array";
 const STREAM: &CStr = c"arrow_array_stream";
 
-/// An Arrow record batch. `pyarrow.record_batch(table)`, `polars.DataFrame(table)` and DuckDB take it as it is.
+/// An Arrow record batch. `pyarrow.record_batch(table)`, `polars.DataFrame(table)` and DuckDB accept it
+/// directly.
 #[pyclass(frozen, module = "bagreel", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct Table(pub(crate) RecordBatch);
@@ -28,7 +29,7 @@ fn arrow(error: impl std::fmt::Display) -> PyErr {
 
 #[pymethods]
 impl Table {
-    /// Takes over any object that is an Arrow record batch.
+    /// Imports any object that is an Arrow record batch.
     #[new]
     fn new(from: &Bound<'_, PyAny>) -> PyResult<Self> {
         taken(from)
@@ -60,7 +61,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        // A consumer casts what it does not like itself.
+        // Consumers cast types by themselves.
         let _ = requested_schema;
         let data = StructArray::from(self.0.clone()).to_data();
         let (array, schema) = to_ffi(&data).map_err(arrow)?;
@@ -93,7 +94,7 @@ impl Table {
         )
     }
 
-    /// As `pyarrow.RecordBatch`; no row is copied.
+    /// As `pyarrow.RecordBatch`, without copying.
     fn to_pyarrow<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let pyarrow = slf.py().import("pyarrow")?;
         pyarrow.call_method1("record_batch", (slf,))
@@ -105,12 +106,12 @@ impl Table {
     }
 }
 
-/// A record batch that somebody else made.
+/// A record batch from another library.
 fn taken(from: &Bound<'_, PyAny>) -> PyResult<Table> {
     if let Ok(table) = from.cast::<Table>() {
         return Ok(table.get().clone());
     }
-    let wrong = || PyTypeError::new_err("give a record batch: an object with `__arrow_c_array__`");
+    let wrong = || PyTypeError::new_err("pass a record batch: an object with `__arrow_c_array__`");
     let pair = from
         .call_method0("__arrow_c_array__")
         .map_err(|_| wrong())?;
@@ -119,8 +120,8 @@ fn taken(from: &Bound<'_, PyAny>) -> PyResult<Table> {
         .pointer_checked(Some(SCHEMA))?
         .cast::<FFI_ArrowSchema>();
     let array = array.pointer_checked(Some(ARRAY))?.cast::<FFI_ArrowArray>();
-    // SAFETY: capsules of these names hold these structures. What is moved out of the array leaves it released, as the
-    // interface asks of a consumer; the schema is only read.
+    // SAFETY: capsules of these names hold these structures. Moving out of the array leaves it released, as
+    // the interface requires of a consumer; the schema is only read.
     let data = unsafe { from_ffi(FFI_ArrowArray::from_raw(array.as_ptr()), schema.as_ref()) };
     Ok(Table(RecordBatch::from(StructArray::from(
         data.map_err(arrow)?,

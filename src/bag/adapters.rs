@@ -79,13 +79,14 @@ pub(crate) struct Gather {
     touched: Vec<ConnectionId>,
     held: usize,
     last: Stamp,
-    /// For each place where time went back, the number of stamps held per connection.
+    /// For each point at which time went back, the number of stamps batched per connection.
     cuts: Vec<Vec<usize>>,
     /// Whether some stamps were flushed early.
     spilled: bool,
 }
 
-/// The most places in one batch where time goes back that are reported: beyond that, messages are just out of order.
+/// The most points in one batch at which time goes back that are reported; with more, messages are merely out
+/// of order.
 pub(crate) const MOST_CUTS: usize = 64;
 /// The most stamps in a batch: 3 MB.
 const MOST_GATHERED: usize = 1 << 18;
@@ -116,13 +117,13 @@ impl Gather {
         }
     }
 
-    /// The number of messages held for a connection.
+    /// The number of messages batched for a connection.
     pub(crate) fn count(&self, id: ConnectionId) -> u64 {
         let run = self.runs.get(id.0 as usize);
         run.map_or(0, |run| run.0.len() as u64)
     }
 
-    /// Whether exactly these stamps are held for a connection, in any order.
+    /// Whether exactly these stamps are batched for a connection, in any order.
     pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
         let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
         let sorted = |stamps: &[Stamp]| {
@@ -133,7 +134,8 @@ impl Gather {
         held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
     }
 
-    /// Drops the stamps held for a connection; returns their number, or `None` if some were already flushed.
+    /// Drops the stamps batched for a connection; returns their number, or `None` if some were already
+    /// flushed.
     pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
         if self.spilled {
             return None;

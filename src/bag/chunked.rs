@@ -338,10 +338,10 @@ impl<G: Grammar> Indexed<G> {
         }
         let found = self.forward(sink);
         Report {
-            // Without an index the first reading went the same way.
+            // Without an index, the first reading did the same.
             complete: found.complete && self.plan.is_ok(),
             tier_reason: Some(format!(
-                "the second reader refuses ({why}); read from the front instead"
+                "the second reader cannot read it ({why}); read from the front instead"
             )),
             ..self.report(Tier::Verify, &found.compression)
         }

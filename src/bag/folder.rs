@@ -42,7 +42,7 @@ pub(crate) fn only_recording(folder: &Path) -> Result<PathBuf> {
                 all.len(),
                 words::some_of(&names, LISTED)
             );
-            let hint = "name one, or all of them for one mission; `bagreel info` and `bagreel tables` take folders of recordings";
+            let hint = "give one, or all of them for one mission; `bagreel info` and `bagreel tables` take folders of recordings";
             Err(Error::usage(what, hint))
         }
     }

@@ -59,7 +59,8 @@ pub enum Want {
     Sizes,
     /// As [`Want::Head`], unless the bag has an index and no other connection's payloads are wanted.
     Beside(usize),
-    /// The first bytes of each payload: at least this many, or all of a shorter payload; more may come.
+    /// The first bytes of each payload: at least this many, or all of a shorter payload; more may be
+    /// delivered.
     Head(usize),
     /// Each payload whole.
     Payload,
@@ -106,7 +107,7 @@ pub trait Sink {
         None
     }
 
-    /// Marks that all stamps that follow come later in the file than all before.
+    /// Marks that all following stamps are later in the file than all previous ones.
     fn part(&mut self) {
         if let Some(sink) = self.behind() {
             sink.part();
@@ -117,8 +118,8 @@ pub trait Sink {
     /// wanted), contains each payload's size in bytes and is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
-    /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is
-    /// known: instead of their stamps, and only where [`OpenOptions::chunk_counts`] asks for it.
+    /// Takes the number of messages of one connection in the window that begins at `window`, without their
+    /// stamps; only if [`OpenOptions::chunk_counts`] requests it.
     fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
         if let Some(sink) = self.behind() {
             sink.chunk_count(connection, window, count);
@@ -197,7 +198,8 @@ pub trait Reader: Send {
     }
 
     /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index contains it.
-    /// `None` if only reading the bag can determine it. A large bag with a wrong tail may hold stamps outside.
+    /// `None` if only reading the bag can determine it. A large bag with a wrong tail may contain stamps
+    /// outside.
     fn span(&mut self) -> Result<Option<Span>>;
 
     /// Reads the bag once, front to back or by its index, into `sink`. With `range` only messages inside it are
@@ -209,7 +211,7 @@ pub trait Reader: Send {
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report>;
 }
 
-/// The outcome of one look at a growing recording.
+/// The outcome of one poll of a growing recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Growth {
     /// Nothing new could be read.
@@ -262,7 +264,7 @@ impl ChunkCounts {
     }
 }
 
-/// The longest payload or connection record held in memory, in bytes.
+/// The longest payload or connection record kept in memory, in bytes.
 pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
 
 /// Reports to `sink` that data was lost because of a system error.

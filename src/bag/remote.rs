@@ -23,13 +23,13 @@ const FIRST: u64 = 64 << 10;
 const SMALL: u64 = 512 << 10;
 /// The smallest request, in bytes: smaller ones are not faster.
 const LEAST: u64 = 4 << 10;
-/// The end of an object is fetched in one piece: after a footer comes what it points to.
+/// The end of an object is fetched in one piece: after a footer, the data that it points to is needed.
 const TAIL: u64 = 32 << 10;
 /// The largest read-ahead of sequential reads, in bytes.
 const MOST_AHEAD: u64 = 4 << 20;
 /// Ranges at most this far apart, in bytes, share a request: reading the gap is faster than another round trip.
 const GAP: u64 = 16 << 10;
-/// The most of an object held in memory, in bytes.
+/// The most bytes of an object kept in memory.
 const MOST_HELD: u64 = 32 << 20;
 /// The most concurrent requests per waiting thread.
 const TOGETHER: usize = 16;
@@ -57,7 +57,7 @@ struct ObjectPart {
     bytes: Vec<u8>,
 }
 
-/// An object as a source, and the place for its first failure.
+/// An object as a source, and the storage for its first failure.
 struct Opened {
     source: FileSource,
     etag: Option<String>,
@@ -236,7 +236,7 @@ impl ObjectPart {
     }
 }
 
-/// Sorts the ranges, merges those that lie close, and clips them at the end.
+/// Sorts the ranges, merges those that are close to each other, and clips them at the end.
 fn together(mut ranges: Vec<Range<u64>>, end: u64) -> Vec<Range<u64>> {
     ranges.sort_by_key(|range| range.start);
     let mut all: Vec<Range<u64>> = Vec::new();

@@ -61,8 +61,9 @@ impl Grammar for Rosbag1 {
         Err(Error::Unsupported {
             path: path.to_owned(),
             what: format!("it is of an old format, `{line}`"),
-            hint: "`rosbag fix old.bag new.bag` of a ROS 1 installation converts it to version 2"
-                .to_owned(),
+            hint:
+                "convert it to version 2 with `rosbag fix old.bag new.bag` of a ROS 1 installation"
+                    .to_owned(),
         })
     }
 
@@ -89,7 +90,7 @@ impl Grammar for Rosbag1 {
     }
 
     fn is_chunk(bytes: &[u8]) -> bool {
-        // Real headers take 40 to 60 bytes; the test is made at every byte.
+        // Real headers take 40 to 60 bytes, and this is tested at every byte.
         let len = records::u32_at(bytes, 0).filter(|n| (20..200).contains(n));
         let header = len.and_then(|n| bytes.get(4..4 + n as usize));
         matches!(header.and_then(records::parse), Some(Header::Chunk { .. }))

@@ -140,7 +140,7 @@ impl BagFolder {
             if instead {
                 self.note(
                     NoticeKind::Note,
-                    format!("{why}; read what lies there instead"),
+                    format!("{why}; read the existing files instead"),
                 );
             } else {
                 self.note(

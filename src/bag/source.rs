@@ -139,7 +139,7 @@ pub(crate) struct Temporary {
 }
 
 impl Temporary {
-    /// Makes one in the system's folder for temporary files.
+    /// Creates one in the system's folder for temporary files.
     ///
     /// # Errors
     /// An error of the system.
@@ -149,7 +149,7 @@ impl Temporary {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
         let folder = builder.tempdir();
-        let folder = folder.map_err(Error::io("make a folder in", &std::env::temp_dir()))?;
+        let folder = folder.map_err(Error::io("create a folder in", &std::env::temp_dir()))?;
         Ok(Self {
             _left: Leftover::at(folder.path()),
             folder,

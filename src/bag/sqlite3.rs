@@ -60,7 +60,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             return Err(Error::Unsupported {
                 path: name.into(),
                 what: "a database cannot be read from a pipe".to_owned(),
-                hint: "name the file itself".to_owned(),
+                hint: "give the file itself".to_owned(),
             });
         }
     };
@@ -139,7 +139,7 @@ fn broken(path: &Path, why: &Refusal) -> Error {
         offset: 0,
         expected: format!("a database that SQLite can read ({why})"),
         hint: format!(
-            "the recording was cut or damaged; `sqlite3 {} .recover` may bring rows back",
+            "the recording was cut or damaged; `sqlite3 {} .recover` may recover rows",
             file_name(path)
         ),
     }

@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 /// The longest step back that begins a run: a longer one means that the clock was not set yet.
 const LONGEST_NS: i64 = 365 * 86_400_000_000_000;
 
-/// The place in a bag where a new run begins.
+/// The point in a bag at which a new run begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Seam {
     /// The last time of the previous run and the first of this run, as recorded.
@@ -79,7 +79,8 @@ impl<'a> Watched<'a> {
                 suspect.seam.after = suspect.seam.after.min(time);
             }
             if let (Some(last), None) = (line.last, line.next) {
-                // Connections that were silent lately may continue after the step as if nothing had happened.
+                // Connections that were silent recently may continue after the step as if nothing had
+                // happened.
                 let would_fall = last.since(suspect.seam.after) > OUT_OF_ORDER_NS;
                 let fell = last.since(time) > OUT_OF_ORDER_NS;
                 suspect.fell += u64::from(would_fall && fell);
@@ -164,7 +165,7 @@ impl Sink for Watched<'_> {
     }
 }
 
-/// A place where a recorder's clock was set back.
+/// A point at which a recorder's clock was set back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ClockFall {
     /// The last time of the previous run.
@@ -199,7 +200,7 @@ fn shifts(seams: &[Seam]) -> Vec<i64> {
     shifts
 }
 
-/// The places of seams on the time axis: without overlaps, if the runs were moved.
+/// The positions of seams on the time axis: without overlaps, if the runs were moved.
 pub(crate) fn falls(seams: &[Seam], is_moved: bool) -> impl Iterator<Item = ClockFall> + '_ {
     let fall = move |(seam, shift): (&Seam, i64)| ClockFall {
         time: seam.before.plus(if is_moved { shift } else { 0 }),

@@ -9,7 +9,7 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     let (looks_like, hint) = if folder {
         (
             "a folder without a recording",
-            "name a `.bag`, `.db3` or `.mcap` file, or the folder that contains `metadata.yaml`",
+            "give a `.bag`, `.db3` or `.mcap` file, or the folder that contains `metadata.yaml`",
         )
     } else {
         guess(head)
@@ -54,35 +54,35 @@ fn guess(head: &[u8]) -> (&'static str, &'static str) {
         (
             b"rosbag2_bagfile",
             "the metadata of a recording",
-            "name the folder that it lies in",
+            "give the folder that contains it",
         ),
         (
             b"<!DOCTYPE",
             "a web page",
-            "the download went wrong; fetch the bag again",
+            "the download failed; fetch the bag again",
         ),
         (
             b"<html",
             "a web page",
-            "the download went wrong; fetch the bag again",
+            "the download failed; fetch the bag again",
         ),
     ];
     if head.is_empty() {
         return (
             "empty",
-            "the recording or the copy went wrong; record or copy it again",
+            "the recording or the copy failed; record or copy it again",
         );
     }
     if head.iter().all(|b| *b == 0) {
         return (
             "all zeros",
-            "the copy went wrong, or the disk was full; copy it again",
+            "the copy failed, or the disk was full; copy it again",
         );
     }
     let found = KNOWN.iter().find(|(magic, ..)| head.starts_with(magic));
     found.map_or(
         (
-            "of another kind",
+            "of an unrecognized format",
             "bags are ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, and folders that contain `metadata.yaml`",
         ),
         |(_, what, hint)| (*what, *hint),

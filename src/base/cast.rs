@@ -1,12 +1,12 @@
-//! Numbers with a fraction as whole ones, without the fraction: one too large or too small becomes the nearest that the
-//! type has, and one that is no number becomes 0.
+//! Conversions of floating-point numbers to integers: the fraction is dropped, values out of range become the
+//! nearest one of the type, and NaN becomes 0.
 
 macro_rules! casts {
     ($($name:ident: $whole:ty),*) => {
         $(#[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "what becomes of any number is said above"
+            reason = "the module documents the result for every number"
         )]
         pub(crate) fn $name(value: f64) -> $whole {
             value as $whole

@@ -60,7 +60,7 @@ fn cause(error: csv::Error) -> io::Error {
     }
 }
 
-/// Writes the value at place `at` of a level: a list, or below all lists a single value.
+/// Writes value `at` of a level: a list, or below all lists a single value.
 fn field(column: &TableColumn, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
     let in_list = level > 0;
     let Some(ends) = column.lists.get(level) else {
@@ -181,8 +181,7 @@ pub(crate) type CsvRow = (usize, Vec<String>);
 /// Every row of a text, including the header, with its line, ≥ 1; rows may differ in length, and empty lines are
 /// skipped.
 ///
-/// # Errors
-/// The line, and what is wrong there.
+/// # Errors The line, and the mistake in it.
 pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
     each_record(text).collect()
 }

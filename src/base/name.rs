@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 /// The node that writes `graph.mcap`: its topics are about the robot and not part of it.
 pub(crate) const OWN_NODE: &str = "/_bagreel";
-/// Its topic that has a message each second while a live system is connected.
+/// Its topic with a message each second while a live system is connected.
 pub(crate) const HEARTBEAT: &str = "/_bagreel/connected";
 /// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
 pub(crate) const UNKNOWN_NODE: &str = "/_unknown";

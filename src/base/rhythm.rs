@@ -21,8 +21,8 @@ pub(crate) const UNUSUAL: i64 = 3;
 pub(crate) const OFTEN: usize = 4;
 /// The length of a silence as a multiple of the longest pause that the same sender made before.
 pub(crate) const LONGER: i64 = 2;
-/// The number of intervals before a silence that show the usual one: enough to hold a pause, few enough to forget an
-/// earlier rate.
+/// The number of intervals before a silence that show the usual one: enough to include a pause, few enough to
+/// exclude an earlier rate.
 pub(crate) const RECENT: usize = 20;
 
 /// The number of messages without a gap, and the time that they take, which show a rhythm even if they are not even: a
@@ -67,8 +67,9 @@ pub(crate) const BEGUN_AGAIN: u32 = 5;
 /// The time in which a recorder has found the topics that exist when it starts; their messages come a period later at
 /// the latest. It looks once a second, and connects within another.
 pub(crate) const FOUND_NS: i64 = 2 * SECOND;
-/// The longest time from a node's start to the first of its messages in the bag: a recorder looks for new topics once a
-/// second, and a node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4 s.
+/// The longest time from a node's start to the first of its messages in the bag: a recorder looks for new
+/// topics once a second, and a node takes as long to start. Measured on real missions: 0.8 to 1.3 s, at most
+/// 2.4 s.
 pub(crate) const DISCOVERY_NS: i64 = 2 * SECOND + SECOND / 2;
 /// The time after its first sign in which a node has registered its topics.
 pub(crate) const REGISTRATION_NS: i64 = SECOND;
@@ -88,11 +89,11 @@ pub(crate) const FEWEST_INTERVALS: usize = 5;
 pub(crate) const GAP: i64 = 5;
 /// The shortest gap: shorter pauses are scheduling jitter.
 pub(crate) const GAP_NS: i64 = SECOND;
-/// The ratio of medians below which rates are the same: the least that `--rate-change` can usefully show.
+/// The ratio of medians below which rates are equal: the least useful value of `--rate-change`.
 pub(crate) const SAME_RATE: f64 = 1.1;
 /// The largest ratio of the quartiles of even intervals.
 pub(crate) const EVEN: f64 = 1.8;
-/// The fewest messages of a rate that is an event: five intervals.
+/// The fewest messages at a rate for it to be an event: five intervals.
 pub(crate) const FEWEST_OF_RATE: u64 = 6;
 /// The shortest duration of a rate that is an event.
 pub(crate) const RATE_HOLDS_NS: i64 = 3 * SECOND;
@@ -107,7 +108,7 @@ pub(crate) const FEWEST_OF_SENDER: u64 = 3;
 pub(crate) const OVERLAP_NS: i64 = 5 * SECOND;
 /// The longest time by which it begins after that; unlimited if the old one never sends again.
 pub(crate) const TAKEN_NS: i64 = 60 * SECOND;
-/// The shortest time before the old one comes back.
+/// The shortest time before the old one returns.
 pub(crate) const BACK_NS: i64 = 5 * SECOND;
 /// The shortest duration of a larger share of a topic's messages.
 pub(crate) const SHARE_HOLDS_NS: i64 = 5 * SECOND;
@@ -122,7 +123,7 @@ pub(crate) const CLOSE_NS: i64 = 2 * SECOND;
 /// The longest time between events that are one: connections that a node makes together, silences that begin together, a
 /// silence that begins before its input's by the clock of the recorder.
 pub(crate) const CROWD_NS: i64 = SECOND;
-/// The fewest times for which an element comes and goes that are one entry.
+/// The fewest repeated appearances of an element that are combined into one event.
 pub(crate) const FLAPS: usize = 3;
 /// The largest ratio of two steps of rates with one cause.
 pub(crate) const SAME_STEP: f64 = 1.2;

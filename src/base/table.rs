@@ -55,7 +55,7 @@ impl TextColumn {
         self.ends.push(length(self.bytes.len()));
     }
 
-    /// The text at place `at`.
+    /// The text at index `at`.
     pub(crate) fn get(&self, at: usize) -> &[u8] {
         &self.bytes[span(&self.ends, at)]
     }
@@ -75,7 +75,7 @@ pub(crate) struct WordColumn {
 }
 
 impl WordColumn {
-    /// The text at place `at`.
+    /// The text at index `at`.
     pub(crate) fn get(&self, at: usize) -> &[u8] {
         self.words.get(self.numbers[at] as usize)
     }

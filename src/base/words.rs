@@ -19,7 +19,7 @@ macro_rules! worded {
             $($(#[$meaning])* $variant,)+
         }
 
-        #[allow(dead_code, reason = "not each is listed, or read by its word")]
+        #[allow(dead_code, reason = "not every enum is listed or parsed")]
         impl $name {
             /// All of them, in order.
             $vis const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];

@@ -23,7 +23,7 @@ pub(crate) struct BadYaml {
     pub(crate) reason: String,
 }
 
-/// The document as JSON data: mappings as objects with keys in order, scalars typed as YAML 1.2 has it.
+/// The document as JSON data: mappings as objects with keys in order, scalars typed as in YAML 1.2.
 ///
 /// # Errors
 /// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB or 250,000 values, or
@@ -80,7 +80,7 @@ impl From<Location> for YamlPlace {
 const MISTAKES: [(&str, &str); 12] = [
     (
         "budget",
-        "it contains too many values, or nests them too deep",
+        "it contains too many values, or they are nested too deeply",
     ),
     (
         "tabs disallowed",
@@ -88,7 +88,7 @@ const MISTAKES: [(&str, &str); 12] = [
     ),
     (
         "did not find expected key",
-        "the line is indented otherwise than those it belongs to",
+        "the indentation of the line differs from that of its siblings",
     ),
     (
         "expected '-' indicator",
@@ -100,7 +100,7 @@ const MISTAKES: [(&str, &str); 12] = [
     ),
     (
         "unknown anchor",
-        "`*` refers to an anchor that is not there; put text that begins with `*` in quotes",
+        "`*` refers to an undefined anchor; put text that begins with `*` in quotes",
     ),
     (
         "mapping values are not allowed",
@@ -114,12 +114,12 @@ const MISTAKES: [(&str, &str); 12] = [
         "unknown escape character",
         "`\\` begins no known escape; put the text in single quotes",
     ),
-    ("misplaced bracket", "a bracket closes that was not opened"),
+    ("misplaced bracket", "a closing bracket has no opening one"),
     (
         "multiline quoted scalar",
         "a quote is not closed, or the line after it is not indented",
     ),
-    ("recursion", "it nests values too deep"),
+    ("recursion", "values are nested too deeply"),
 ];
 
 /// The mistake as advice that a user can act on.

@@ -35,7 +35,7 @@ impl Given {
         }
     }
 
-    /// The first of `options`, with blanks between them, that was typed.
+    /// The first of `options` (separated by blanks) that was given.
     fn any<'a>(&self, options: &'a str) -> Option<&'a str> {
         options.split(' ').find(|name| self.0.contains(*name))
     }
@@ -141,7 +141,7 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "strip",
         takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
-        what: "it applies to pictures of the whole: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
+        what: "it applies to pictures of the whole mission: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
     },
     AppliesTo {
         options: "max-bytes",

@@ -19,7 +19,7 @@ use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Cut, Length};
 use values::{align, cut, length, moment, namespace, offset, period, share};
 
-/// The version, and in packages the commit that they are built of: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
+/// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
 const VERSION: &str = match option_env!("BAGREEL_VERSION") {
     Some(named) => named,
     None => env!("CARGO_PKG_VERSION"),
@@ -59,7 +59,8 @@ pub(super) enum Command {
     /// Draw a mission: animations, frames, pages, figures and data, from one pass over the bag.
     #[command(after_long_help = render::outputs_help())]
     Render(Box<render::RenderArgs>),
-    /// Draw a figure for a paper: what was alive when, who publishes to whom, or the reconfigurations one by one.
+    /// Draw a figure for a paper: when each node ran, who publishes to whom, or the reconfigurations one by
+    /// one.
     Figure(Box<figure::FigureArgs>),
     /// Summarize a bag: contents, evidence, and what it cannot tell you; for a folder, one row per bag.
     Info(Box<InfoArgs>),

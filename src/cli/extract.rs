@@ -47,15 +47,15 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
     target.must_be_one("all messages are in one table, or one folder of tables")?;
     if args.fields && target == Target::Stdout {
         return Err(Error::usage(
-            "the fields of all topics are several tables, standard output is one",
-            "name a folder: `-o tables/`",
+            "`--fields` writes several tables, which do not fit on standard output",
+            "give a folder: `-o tables/`",
         ));
     }
     let format = format(args, &target)?;
     if args.nested && format == TableFormat::Csv {
         return Err(Error::usage(
             "CSV has no structures for `--nested`",
-            "leave `--nested` out, or write Parquet",
+            "omit `--nested`, or write Parquet",
         ));
     }
     Ok(Extract {

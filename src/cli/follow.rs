@@ -23,8 +23,8 @@ use crate::pipeline::live::Live;
 const MOST: u64 = 1_000_000;
 /// The pause between two analyses as a multiple of their duration: three percent of a core.
 const REST: f64 = 33.0;
-/// The shortest pause in seconds between two, in general and after something new appeared, which people are waiting
-/// for.
+/// The shortest pause in seconds between two analyses: in general, and after something new appeared, when
+/// people are waiting for the output.
 const LEAST: f64 = 1.0;
 const LEAST_NEW: f64 = 0.2;
 
@@ -118,7 +118,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
 
 fn server(at: std::net::SocketAddr, args: &FollowArgs, terminal: &mut Terminal) -> Result<Server> {
     if !args.bind && !at.ip().is_loopback() {
-        let what = format!("`--serve {at}` would show the mission to other machines");
+        let what = format!("`--serve {at}` would make the mission visible to other machines");
         return Err(Error::usage(
             what,
             "serve at 127.0.0.1, or allow it with `--bind`",

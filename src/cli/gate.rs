@@ -191,7 +191,10 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
         return Ok(DONE);
     }
     let Some(expect) = args.expect.clone() else {
-        return Err(Error::usage("`--expect` is missing", "name a graph.yaml"));
+        return Err(Error::usage(
+            "`--expect` is missing",
+            "give the path of a graph.yaml",
+        ));
     };
     let job = Check {
         reading: judged(&args.bags, &args.time, &args.graph)?,
@@ -280,8 +283,8 @@ fn unknown_kind(word: &str) -> Error {
     let near = suggestion(word, words());
     let all: Vec<&str> = words().collect();
     Error::usage(
-        format!("there is no finding `{word}`{near}"),
-        format!("they are {}", all.join(", ")),
+        format!("unknown kind of finding `{word}`{near}"),
+        format!("choose one of {}", all.join(", ")),
     )
 }
 
@@ -326,7 +329,7 @@ fn report(output: &OsStr) -> Result<ReportJob> {
     let unknown = || {
         Error::usage(
             format!("`{name}` has no known extension"),
-            "end it in .md, .xml, .json, .sarif or .txt, or write the format before it: `gitlab:FILE`",
+            "use the extension .md, .xml, .json, .sarif or .txt, or put the format in front: `gitlab:FILE`",
         )
     };
     Ok(ReportJob {

@@ -19,8 +19,8 @@ pub(super) fn completions(
 
 /// Prints the manual page of the command `name`, or that of all commands.
 pub(super) fn manual(name: Option<&str>, terminal: &mut Terminal) -> Result<(), Error> {
-    // Not the grammar, whose short help omits options. Building it gives the commands their full names, such as
-    // `bagreel-render`.
+    // The plain grammar would omit the options that short help hides. Building gives the commands their full
+    // names, such as `bagreel-render`.
     let mut command = Typed::documented().disable_help_subcommand(true);
     command.build();
     if let Some(name) = name {

@@ -237,7 +237,7 @@ fn link(text: &str) -> Result<(String, String)> {
     let scheme = scheme.filter(|s| s.chars().all(is_word));
     if scheme.is_some_and(|s| !matches!(s.as_str(), "http" | "https")) {
         return Err(Error::usage(
-            format!("`--link {text}` is not an address that can be opened"),
+            format!("`--link {text}` is not a valid address"),
             "write `--link player=https://…`, or a path",
         ));
     }

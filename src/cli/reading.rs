@@ -58,8 +58,8 @@ fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
     let Some(folder) = graph.source.clone() else {
         return if infers {
             Err(Error::usage(
-                "`--infer source` has no source code to read",
-                "add `--source DIR`, a workspace or repository",
+                "`--infer source` requires source code",
+                "add `--source DIR` for a workspace or repository",
             ))
         } else {
             Ok(None)

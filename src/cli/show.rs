@@ -33,7 +33,8 @@ pub(super) fn events(
         terminal.note(&note);
     }
     if args.graph.source.is_some() {
-        terminal.note("what only source code declares has no times and is not in the log");
+        terminal
+            .note("elements that only source code declares have no times and are not in the log");
     }
     let mission = read(&reading, terminal)?;
     let options = LogOptions {
@@ -62,7 +63,7 @@ pub(super) fn events(
     not(feature = "parquet"),
     expect(
         clippy::match_wildcard_for_single_variants,
-        reason = "with Parquet there are two tables"
+        reason = "with Parquet, there are two tables"
     )
 )]
 pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -78,7 +79,7 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
     {
         if !args.why.is_empty() {
             let what = "`--why` explains one mission, but a folder of bags contains many";
-            return Err(Error::usage(what, "name one of the bags"));
+            return Err(Error::usage(what, "give one of the bags"));
         }
         let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
         match args.format {

@@ -39,7 +39,7 @@ impl Stop {
         stop
     }
 
-    /// The exit code for the signal that came; `None` if none did.
+    /// The exit code for the received signal, if any.
     pub(super) fn code(&self) -> Option<u8> {
         match self.signal.load(Ordering::Relaxed) {
             0 => None,
@@ -47,7 +47,7 @@ impl Stop {
         }
     }
 
-    /// Whether a signal came; resets it.
+    /// Whether a signal was received; resets the flag.
     pub(super) fn take(&self) -> bool {
         self.signal.swap(0, Ordering::Relaxed) != 0
     }
@@ -117,7 +117,7 @@ fn is_hangup_ignored() -> bool {
 
 #[cfg(not(unix))]
 fn listen(stop: &Stop) {
-    /// The number of Ctrl-C on other systems; it has none here.
+    /// The number for Ctrl-C on other systems, which have no signals.
     const INTERRUPT: u8 = 2;
     let stop = stop.clone();
     // Without a handler, Ctrl-C ends the process at once.

@@ -46,13 +46,13 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
 /// The most failures reported one by one: a store that is down fails for every bag of a fleet.
 const MOST_REPORTED: usize = 8;
 
-/// `12 bags (1 unreadable, 3 there already), 4711 messages`.
+/// `12 bags (1 unreadable, 3 already there), 4711 messages`.
 fn summary(done: &Tabled) -> String {
     let of = [
         (done.unreadable, "unreadable"),
         (done.incomplete, "damaged"),
-        (done.kept, "there already"),
-        (done.refused.len(), "not to be had"),
+        (done.kept, "already there"),
+        (done.refused.len(), "not available"),
     ];
     let of: Vec<String> = of
         .iter()

@@ -169,7 +169,7 @@ impl Terminal {
         self.stop.is_noted.store(on, Ordering::Relaxed);
     }
 
-    /// Whether a signal came; resets it, as the work ends as requested.
+    /// Whether a signal was received; resets the flag, as the work ends as requested.
     pub(crate) fn take_signal(&self) -> bool {
         self.stop.take()
     }
@@ -277,7 +277,7 @@ fn summary(notices: &[Notice]) -> String {
         (
             of(NoticeKind::Glyph).count(),
             "font",
-            " that lacks characters",
+            " about missing characters",
         ),
     ];
     let parts = parts.iter().filter(|(count, ..)| *count > 0);

@@ -1,5 +1,5 @@
-//! The topic board: the picture of a mission with few known publishers. Rows are topics over the whole time, with types
-//! and the rate now; a head marks the window of a frame; nodes are pills below.
+//! The topic timeline: the picture of a mission with few known publishers. Rows are topics over the whole
+//! time, with types and current rates; a playhead marks the window of a frame; nodes are labels below.
 
 use std::collections::BTreeSet;
 
@@ -21,14 +21,14 @@ use crate::draw::text::Fonts;
 use crate::graph::{Element, NodeId};
 use crate::view::{Frame, View};
 
-/// The least and the largest number of pixels per millimetre of the drawing: for small text of at least 9 pixels, and
-/// for text not larger than titles.
+/// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
+/// 9 pixels and text is not larger than titles.
 const SCALE: (f64, f64) = (4.26, 5.6);
-/// The width of a page that the user did not choose: its text can be read in a column of a web page.
+/// The width of the page if the user chose none: its text is legible in a column of a web page.
 const NARROW: f64 = 960.0;
-/// The largest page that a board grows to where the user chose none.
+/// The largest page that a timeline grows to if the user chose none.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
-/// The widths of types and of rates, in millimetres, and the room between columns.
+/// The widths of types and of rates, in millimetres, and the space between columns.
 const TYPES: f64 = 58.0;
 const RATES: f64 = 15.0;
 const BETWEEN: f64 = 2.4;
@@ -37,7 +37,7 @@ const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
 const PILL: f64 = 3.5;
 
-/// A board ready to be drawn, one scene per window.
+/// A topic timeline ready to be drawn, one scene per window.
 pub(crate) struct Board<'a> {
     view: &'a View,
     source: &'a FigureSource<'a>,
@@ -52,26 +52,26 @@ pub(crate) struct Board<'a> {
     /// The window of the mission that each frame shows.
     windows: Vec<usize>,
     ground: Vec<Group>,
-    /// The number of topics without room for a row.
+    /// The number of topics that have no row because they do not fit.
     left_out: usize,
 }
 
-/// The whole board in one drawing, and the place of the head in each window.
+/// The whole timeline in one drawing, and the position of the playhead in each window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
-    /// The board with all messages sent, without a head.
+    /// The timeline with all messages, without a playhead.
     pub scene: Scene,
-    /// The head in pixels, per window.
+    /// The playhead in pixels, per window.
     pub heads: Vec<Rect>,
-    /// The colour of the head.
+    /// The colour of the playhead.
     pub color: Color,
     /// The title of the picture.
     pub title: String,
 }
 
 impl<'a> Board<'a> {
-    /// The board of the nodes and topics that pass the filters of `source`. Where `is_sized` is false the page grows
-    /// until all topics can be read; topics that then find no room are counted.
+    /// The timeline of the nodes and topics that pass the filters of `source`. Unless `is_sized`, the page
+    /// grows until all topics are legible; topics that still do not fit are counted.
     pub(crate) fn new(
         source: &'a FigureSource<'a>,
         view: &'a View,
@@ -97,7 +97,7 @@ impl<'a> Board<'a> {
         let page = PageFrame::new(style, &options, 0, true);
         let (place, scale) = placed(&lives, &page, &options, fonts);
         if !is_sized {
-            // A short board leaves no empty page below; videos need an even number of rows.
+            // A short timeline has no empty space below; videos need an even number of rows.
             let canvas = PaperCanvas::new(fonts, sizes, scale);
             let end = (place.top + lives.height(&canvas) + BELOW) * scale;
             options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);
@@ -132,8 +132,8 @@ impl<'a> Board<'a> {
         (self.left_out > 0).then_some(remark).into_iter().collect()
     }
 
-    /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is the part of the way that its head
-    /// has moved there.
+    /// The timeline in window `k` of the view; `phase`, above 0 to 1, is the fraction of the playhead's
+    /// movement to it.
     pub(crate) fn scene(&self, k: usize, phase: f64) -> Scene {
         let mut scene = self.empty();
         let Some(frame) = self.view.frames.get(k) else {
@@ -209,8 +209,8 @@ impl<'a> Board<'a> {
         PaperCanvas::new(self.fonts, self.sizes, self.scale)
     }
 
-    /// The parts that are the same in every frame: band, pale bars, starts and ends, types, axis, and the reason why
-    /// this is not a graph.
+    /// The parts that are equal in every frame: band, pale bars, starts and ends, types, axis, and the reason
+    /// why this is not a graph.
     fn ground(&self) -> Vec<Group> {
         let mut canvas = self.canvas();
         let end = self.lives.draw(&mut canvas, &self.place);
@@ -227,7 +227,7 @@ impl<'a> Board<'a> {
         groups
     }
 
-    /// The reason why this is not a graph, and the way to learn more.
+    /// The reason why this is not a graph, and how to get one.
     fn why(&self) -> String {
         let elements = &self.source.mission.elements;
         let why = if self.source.knows_publishers() {
@@ -298,7 +298,8 @@ impl<'a> Board<'a> {
         }
     }
 
-    /// Draws the known nodes as pills in a row as far as there is room; those for which `is_there` is true are emphasized.
+    /// Draws as many of the known nodes as fit, as labels in a row; those for which `is_there` is true are
+    /// emphasized.
     fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
@@ -358,7 +359,7 @@ impl<'a> Board<'a> {
         groups
     }
 
-    /// The style's colour in place of a colour of figures, which are on white paper.
+    /// The style's colour for a colour of figures, which are on white paper.
     fn color(&self, of: Color) -> Color {
         let style = self.style;
         let table = [
@@ -397,7 +398,7 @@ fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
     rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
 }
 
-/// The part of the page for the board.
+/// The part of the page for the timeline.
 fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     let margin = page.graph.x;
     let top = page.title.bottom().max(margin / 2.0) + margin / 2.0;
@@ -410,7 +411,7 @@ fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     )
 }
 
-/// The number of rows that can be read on this page.
+/// The number of rows that are legible on this page.
 fn most_rows(
     lives: &LivesFigure<'_>,
     style: &Style,
@@ -425,7 +426,7 @@ fn most_rows(
     cast::to_usize((free / canvas.sizes.pitch()).max(1.0))
 }
 
-/// The places of everything in millimetres, and the number of pixels per millimetre.
+/// The positions of all parts in millimetres, and the number of pixels per millimetre.
 fn placed(
     lives: &LivesFigure<'_>,
     page: &PageFrame,

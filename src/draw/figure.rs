@@ -1,7 +1,7 @@
 //! Figures for papers, exact in width and never with text below 6 pt: lives, map and steps.
 //!
-//! A figure that does not fit with nodes is tried with groups, and else refused with a filter that would fit; text is
-//! never scaled.
+//! A figure that does not fit with nodes is tried with groups; if that fails, the error suggests a filter.
+//! Text is never scaled.
 
 pub(crate) mod band;
 pub(crate) mod canvas;
@@ -41,14 +41,14 @@ worded! {
     /// The kind of figure.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum FigureKind {
-        /// Life lines: when each row was alive, how busy it was, and what changed.
+        /// Lifelines: when each row existed, how busy it was, and its changes.
         #[default]
         Lives = "lives",
         /// The graph of nodes over the whole mission, with the phases in which each exists.
         Map = "map",
         /// A panel per change of phase, with only the differences.
         Steps = "steps",
-        /// A map per phase, all at the same places, with the changes of the phase in colour.
+        /// A map per phase, with fixed positions and the changes of the phase in colour.
         Changes = "changes",
     }
 }
@@ -66,12 +66,12 @@ impl FigureKind {
 }
 
 worded! {
-    /// The kind of thing that rows and boxes represent.
+    /// The kind of element that rows and boxes represent.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum RowKind {
         /// Nodes, by role.
         Nodes = "nodes",
-        /// Nodes of one namespace that live in the same phases.
+        /// Nodes of one namespace that exist in the same phases.
         Groups = "groups",
         /// Topics.
         Topics = "topics",
@@ -98,7 +98,7 @@ pub struct FigureOptions {
     pub width_mm: f64,
     /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
     pub text_pt: f64,
-    /// The kind of thing that rows and boxes represent; `None` for the most detailed that fits.
+    /// The kind of element that rows and boxes represent; `None` for the most detailed that fits.
     pub rows: Option<RowKind>,
     /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, ≥ 2; the largest if empty.
     pub steps: Vec<usize>,
@@ -138,9 +138,8 @@ pub(crate) const MOST_HEIGHT: f64 = 225.0;
 
 /// Draws a figure of the nodes and topics that pass the filters.
 ///
-/// # Errors
-/// [`Error::Usage`] if nothing is left, or if it does not fit even as groups; the hint names a filter that would
-/// do.
+/// # Errors [`Error::Usage`] if nothing is left, or if it does not fit even as groups; the hint suggests a
+/// filter.
 pub(crate) fn figure(
     mission: &Mission,
     filters: (&NameFilter, &NameFilter),

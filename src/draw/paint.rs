@@ -1,5 +1,5 @@
-//! Painters, all alike: each turns a [`scene`](crate::draw::scene) into a form that can be written, and decides
-//! nothing.
+//! Painters: each turns a [`scene`](crate::draw::scene) into an output form, without any decisions about its
+//! content.
 
 pub(crate) mod animated;
 pub(crate) mod classes;

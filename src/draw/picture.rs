@@ -1,4 +1,4 @@
-//! The picture: a view, a layout and a style become one scene per window, with everything at the same place in each.
+//! The picture: a view, a layout and a style become one scene per window, with fixed positions.
 
 mod also;
 mod arrows;
@@ -56,9 +56,9 @@ pub struct PageOptions {
     pub title: Option<String>,
     /// The direction in which the edges run; `None` for the one that fits better.
     pub orientation: Option<Orientation>,
-    /// The mission's phase in each window, by place among the view's frames; empty for none.
+    /// The mission's phase in each window, by index of the view's frames; empty for none.
     pub phases: Vec<String>,
-    /// The scale of furniture; by the size of the page if `None`.
+    /// The scale of title, legend and timeline; by the size of the page if `None`.
     pub unit: Option<f64>,
     /// Whether there is a legend of the signs.
     pub has_legend: bool,
@@ -131,7 +131,7 @@ impl<'a> Measured<'a> {
         &self.graph.plan
     }
 
-    /// The wishes for the layout engine that follow from the page.
+    /// The options for the layout engine that follow from the page.
     pub fn layout_options(&self) -> layout::LayoutOptions {
         layout::LayoutOptions {
             page: Size::new(self.page.graph.w, self.page.graph.h),
@@ -175,18 +175,18 @@ pub struct Picture<'a> {
     measured: Measured<'a>,
     layout: Layout,
     fit: GraphFit,
-    /// The parts of each item that never change, then those of each arrow.
+    /// The constant parts of each item, then those of each arrow.
     cards: Vec<ItemBox>,
     tracks: Vec<ArrowPath>,
     /// The lines of namespaces that are drawn as one.
     gates: Vec<(Gate, ArrowPath)>,
-    /// The distance of each namespace's title from the left of its frame, to be clear of lines.
+    /// The distance of each namespace's title from the left of its frame, so that no line crosses it.
     shifts: Vec<f64>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
     title: Title<'a>,
     timeline: Timeline<'a>,
-    /// The groups that are the same in every frame, behind the graph and the moving parts.
+    /// The groups that are equal in every frame, behind the graph and the moving parts.
     ground: Vec<Group>,
 }
 
@@ -242,12 +242,12 @@ impl<'a> Picture<'a> {
         self.len() == 0
     }
 
-    /// The places of everything, in the layout's own pixels.
+    /// All positions, in the layout's own pixels.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The name of the phase of the window at place `k`, if phases have names.
+    /// The name of the phase of window `k`, if phases have names.
     pub fn phase(&self, k: usize) -> Option<&str> {
         self.measured.options.phases.get(k).map(String::as_str)
     }
@@ -257,7 +257,7 @@ impl<'a> Picture<'a> {
         self.measured.text_px(&self.layout)
     }
 
-    /// The scene of the window at place `k` of the view, settled. An empty page past the last one.
+    /// The scene of window `k` of the view, without a transition. An empty page past the last one.
     pub fn scene(&self, k: usize) -> Scene {
         let measured = &self.measured;
         let mut scene = Scene {
@@ -285,8 +285,9 @@ impl<'a> Picture<'a> {
         scene
     }
 
-    /// The scene on the way from window `k - 1` to window `k`, `phase` (0..=1) of it done: first ending elements fade,
-    /// then changed ones cross-fade in place, then new ones appear. Nothing moves. At 1 it is [`Picture::scene`].
+    /// The scene at `phase` (0..=1) of the transition from window `k - 1` to window `k`: first ending
+    /// elements fade, then changed ones cross-fade in place, then new ones appear. Nothing moves. At 1 it is
+    /// [`Picture::scene`].
     pub fn between(&self, k: usize, phase: f64) -> Scene {
         let after = self.scene(k);
         if k == 0 || phase >= 1.0 {
@@ -369,7 +370,7 @@ impl<'a> Picture<'a> {
             titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, (view, k))));
         }
         let [lines, labels] = self.lines(seen);
-        // No line runs over words.
+        // Lines do not cross words.
         groups.extend(lines.into_iter().chain(titles).chain(labels));
         for shown in &seen.items {
             let at = shown.id as usize;
@@ -390,7 +391,7 @@ impl<'a> Picture<'a> {
     }
 }
 
-/// The parts of items and arrows that never change, with badges where there is room for them, and the shifts of titles.
+/// The parts of items and arrows that never change, with badges where they fit, and the shifts of titles.
 fn places(
     measured: &Measured<'_>,
     layout: &Layout,
@@ -398,7 +399,7 @@ fn places(
 ) -> (Vec<ItemBox>, Vec<ArrowPath>, Vec<f64>) {
     let mut cards = cards(measured, layout, fit);
     let mut tracks = tracks(measured, layout, fit);
-    // A hair beyond the badge's edge.
+    // Slightly beyond the badge's edge.
     let radius = measured.style.badge.radius * fit.pen + 1.0;
     let frames = layout.clusters.iter().zip(&measured.graph.plan.clusters);
     let titles = frames.map(|(frame, cluster)| (fit.rect(*frame), cluster.title.scaled(fit.scale)));

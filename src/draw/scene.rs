@@ -1,6 +1,7 @@
-//! A drawing with every place and colour decided: groups of shapes and texts, in the order they are painted.
+//! A drawing with all positions and colours determined: groups of shapes and texts, in the order they are
+//! painted.
 //!
-//! Lengths are pixels of the page, x to the right, y down. Painters see only this.
+//! Lengths are pixels of the page, x to the right, y down. Painters receive only this.
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Color;
@@ -11,17 +12,17 @@ use crate::draw::text::Weight;
 pub struct Scene {
     /// The size of the page in pixels.
     pub size: Size,
-    /// The width of the page on paper in millimetres, for vector output; else a pixel is a pixel.
+    /// The width of the page on paper in millimetres, for vector output; `None` for pixels only.
     pub width_mm: Option<f64>,
-    /// The colour behind everything.
+    /// The background colour.
     pub background: Color,
-    /// The content of the page in words, for readers that cannot see it.
+    /// The content of the page in words, for screen readers.
     pub title: String,
     /// The groups, from back to front. Each id occurs once.
     pub groups: Vec<Group>,
 }
 
-/// Pieces that belong together: an element of the graph or of the furniture.
+/// Pieces that belong together: an element of the graph, or of title, legend or timeline.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
     /// Unique on the page and the same on every page of a sequence; an XML name.
@@ -32,7 +33,7 @@ pub struct Group {
     pub data: Vec<(&'static str, String)>,
     /// Its content in words; empty for none.
     pub title: String,
-    /// Its opacity: 0 (nothing is seen) to 1 (opaque, as in every settled frame).
+    /// Its opacity: 0 (invisible) to 1 (opaque, as in every frame outside of transitions).
     pub fade: Fade,
     /// The shapes and texts, from back to front.
     pub pieces: Vec<Piece>,
@@ -92,7 +93,7 @@ pub enum Step {
     Close,
 }
 
-/// A line; a width of 0 or the colour `none` paints nothing.
+/// A line; a width of 0 or the colour `none` draws nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stroke {
     /// Its colour.
@@ -146,7 +147,7 @@ impl Step {
         }
     }
 
-    /// The points that shape it.
+    /// Its points and controls.
     pub fn points(&self) -> &[Point] {
         match self {
             Self::Move(p) | Self::Line(p) => std::slice::from_ref(p),
@@ -157,7 +158,7 @@ impl Step {
 }
 
 impl Anchor {
-    /// The part of a text of this width that lies before its point.
+    /// The length of a text of this width before its point.
     pub fn before(self, width: f64) -> f64 {
         match self {
             Self::Start => 0.0,
@@ -177,7 +178,7 @@ impl Shape {
         }
     }
 
-    /// A line without a filling.
+    /// A line without a fill.
     pub fn line(form: Form, stroke: Stroke) -> Self {
         Self {
             form,
@@ -206,7 +207,7 @@ impl Stroke {
         }
     }
 
-    /// The same line with everything `by` times as long and wide.
+    /// The same line with all lengths and widths scaled by `by`.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         Self {
@@ -223,7 +224,7 @@ impl Stroke {
 }
 
 impl Group {
-    /// A group of furniture: an id, which is its class too, and no content yet.
+    /// A group outside of the graph, such as a title: an id, which is also its class, and no content yet.
     pub fn named(id: &str) -> Self {
         Self {
             id: id.to_owned(),

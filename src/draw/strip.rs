@@ -15,13 +15,13 @@ use crate::mission::Mission;
 use crate::view::{Frame, View};
 pub use choice::Choice;
 
-/// The smallest text that can be read on paper, in points.
+/// The smallest legible text on paper, in points.
 const SMALLEST_PT: f64 = 6.0;
 /// Points per pixel, 96 pixels to the inch.
 const PT_PER_PX: f64 = 0.75;
 /// Pixels per millimetre, 96 to the inch.
 const PX_PER_MM: f64 = 96.0 / 25.4;
-/// The smallest text that can be read on a screen, in pixels.
+/// The smallest legible text on a screen, in pixels.
 const SMALLEST_PX: f64 = 9.0;
 /// The font size of times and captions in pixels: on paper (6.75 pt) and on a screen.
 const CAPTION: (f64, f64) = (9.0, 14.0);
@@ -48,18 +48,18 @@ pub struct StripSource<'a> {
     pub mission: &'a Mission,
     /// The view of the mission.
     pub view: &'a View,
-    /// The picture of the view, with the places of everything.
+    /// The picture of the view, with all positions.
     pub picture: &'a Picture<'a>,
     /// The style of the picture.
     pub style: &'a Style,
     /// The fonts for all text.
     pub fonts: &'a Fonts,
-    /// The engine for new layouts where room is scarce.
+    /// The engine for new layouts if space is scarce.
     pub engine: &'a dyn Engine,
 }
 
-/// The strip of `choice`. With `width_mm` the page is that wide on paper; otherwise as wide as it needs to be read on a
-/// screen, `width` pixels at least.
+/// The strip of `choice`. With `width_mm` the page has that width on paper; otherwise the width for a legible
+/// page on a screen, at least `width` pixels.
 ///
 /// # Errors
 /// [`Error::Usage`] for a window that does not exist.
@@ -74,7 +74,7 @@ pub fn strip(
     for layout in source.layouts(width_mm.is_some()) {
         let bare = source.bare(&layout);
         let page = PanelGrid::new(choice, windows.len(), &bare, width_mm, width);
-        // A page that is too high counts as if it were shrunk until it is not.
+        // A page that is too high is rated as if it were shrunk to fit.
         let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
         let text = page.text / (high / page.width / HIGHEST).max(1.0);
         if best.as_ref().is_none_or(|(most, ..)| text > *most) {
@@ -105,19 +105,19 @@ pub fn strip(
     })
 }
 
-/// The remark about a smallest text of `text_px` pixels on paper; `None` where it can be read.
+/// The remark about a smallest text of `text_px` pixels on paper; `None` if it is legible.
 fn remark(text_px: f64, mm: f64) -> Option<String> {
     let points = text_px * PT_PER_PX;
     (points < SMALLEST_PT).then(|| {
         let wide = libm::ceil(mm * SMALLEST_PT / points);
         format!(
             "the smallest text on the strip is {points:.1} pt; `--width {wide}mm`, fewer columns, or fewer elements \
-             (`--ns-filter`, `--collapse`) would bring it to {SMALLEST_PT} pt"
+             (`--ns-filter`, `--collapse`) would enlarge it to {SMALLEST_PT} pt"
         )
     })
 }
 
-/// The number of panels side by side: as given, else the fewest that keep the page from being too high.
+/// The number of panels side by side: as given, else the fewest with which the page is not too high.
 fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     if let Choice::Grid(columns, _) = choice {
         return (*columns).min(panels).max(1);
@@ -129,7 +129,7 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
 }
 
-/// The largest area of panels in square pixels that a strip on a screen may take for the sake of its text.
+/// The largest area of panels in square pixels that a strip on a screen may take for legible text.
 const LARGEST_STRIP: f64 = 24e6;
 
 /// The grid of panels.
@@ -187,7 +187,8 @@ impl PanelGrid {
 }
 
 impl<'a> StripSource<'a> {
-    /// Ways to lay out the graph: as in the picture, and on paper, where room is scarce, for other shapes of panels.
+    /// Alternative layouts of the graph: as in the picture, and on paper, where space is scarce, for other
+    /// shapes of panels.
     fn layouts(&self, on_paper: bool) -> Vec<Layout> {
         let mut layouts = vec![self.picture.layout().clone()];
         if on_paper {
@@ -206,7 +207,7 @@ impl<'a> StripSource<'a> {
         layouts
     }
 
-    /// The picture without furniture, at its natural size.
+    /// The picture without title, legend and timeline, at its natural size.
     fn bare(&self, layout: &Layout) -> Picture<'a> {
         let options = PageOptions {
             size: Size::new(layout.size.w * 1.06 + 8.0, layout.size.h * 1.06 + 8.0),
@@ -282,7 +283,8 @@ impl<'a> StripSource<'a> {
 
     /// Draws the shared legend from `y` on; returns its height.
     fn legend(&self, page: &PanelGrid, y: f64, groups: &mut Vec<Group>) -> f64 {
-        // A page so small that its legend has the smallest type, then enlarged to that of captions.
+        // Drawn on a page so small that its legend has the smallest type, then enlarged to the size of
+        // captions.
         let small = Size::new(page.width, 300.0);
         let size_on = |size: Size| {
             let options = PageOptions {

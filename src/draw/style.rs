@@ -1,4 +1,5 @@
-//! Styles: every colour, stroke and font size, read from `styles/*.toml`; there are no colour literals anywhere else.
+//! Styles: every colour, stroke and font size, read from `styles/*.toml`; no colour literals exist anywhere
+//! else.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -26,7 +27,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
 pub struct Color(Option<[u8; 3]>);
 
 impl Color {
-    /// The colour that paints nothing.
+    /// The colour that draws nothing.
     pub const NONE: Self = Self(None);
 
     /// The colour of red, green and blue.
@@ -34,7 +35,7 @@ impl Color {
         Self(Some(rgb))
     }
 
-    /// Red, green and blue; `None` where nothing is painted.
+    /// Red, green and blue; `None` for no colour.
     pub fn rgb(self) -> Option<[u8; 3]> {
         self.0
     }
@@ -52,7 +53,7 @@ impl Color {
         Some(Self(Some([byte(0)?, byte(2)?, byte(4)?])))
     }
 
-    /// `part` (0..=1) of the way from here to `other`; where one of them is none, the nearer.
+    /// The mixture with `part` (0..=1) of `other`; if one of them is none, the nearer.
     #[must_use]
     pub fn towards(self, other: Self, part: f64) -> Self {
         let (Some(a), Some(b)) = (self.0, other.0) else {
@@ -146,7 +147,7 @@ pub struct Style {
 }
 
 impl Style {
-    /// The look of a node that is away: the colour of what went, dotted as what is only known of.
+    /// The look of a node that is away: the colour of removed elements, dotted like declared ones.
     pub(crate) fn away(&self) -> Quiet {
         Quiet {
             fill: Color::NONE,
@@ -157,7 +158,7 @@ impl Style {
         }
     }
 
-    /// The look of something that ended as one of many: the dashes of what went, without its colour.
+    /// The look of an element that ended in a crowd: the dashes of removed elements, without their colour.
     pub(crate) fn gone(&self) -> Quiet {
         Quiet {
             fill: Color::NONE,
@@ -168,7 +169,8 @@ impl Style {
 }
 
 impl Body {
-    /// Whether nodes are pills; ellipses, as in `rqt_graph`, where the corners of other boxes are not rounded either.
+    /// Whether nodes are rounded boxes; otherwise ellipses, as in `rqt_graph`, if the corners of other boxes
+    /// are not rounded either.
     pub(crate) fn is_pill(&self) -> bool {
         self.radius > 0.0
     }
@@ -186,14 +188,13 @@ impl Body {
 impl Style {
     /// The built-in style of this name.
     ///
-    /// # Errors
-    /// [`Error::Usage`] where there is none; the hint lists them.
+    /// # Errors [`Error::Usage`] if there is none; the hint lists them.
     pub fn builtin(name: &str) -> Result<Self> {
         Self::from_toml(builtin_text(name)?, Path::new(name))
     }
 
-    /// The style that `text`, read from `path`, describes: its keys over those of the built-in style it names as
-    /// `base` (default `light`).
+    /// The style that `text`, read from `path`, describes: its keys override those of the built-in style
+    /// named as `base` (default `light`).
     ///
     /// # Errors
     /// [`Error::BadFile`] with the line, for a text that is not TOML, an unknown section or key, or a value of the
@@ -250,12 +251,11 @@ impl Style {
     }
 }
 
-const HINT: &str = "`bagreel styles light` prints a complete style with every key explained";
+const HINT: &str = "print a complete style with every key explained: `bagreel styles light`";
 
 /// The text of the built-in style of this name.
 ///
-/// # Errors
-/// [`Error::Usage`] where there is none; the hint lists them.
+/// # Errors [`Error::Usage`] if there is none; the hint lists them.
 pub fn builtin_text(name: &str) -> Result<&'static str> {
     let found = BUILTIN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text).ok_or_else(|| {
@@ -268,14 +268,14 @@ pub fn builtin_text(name: &str) -> Result<&'static str> {
     })
 }
 
-/// All keys of a built-in style: those it has over those of the first.
+/// All keys of a built-in style: its own override those of the first.
 fn complete(text: &str, path: &Path) -> Result<Table> {
     let mut keys: Table = BUILTIN[0].1.parse().unwrap_or_default();
     StyleFile::read(text, path)?.overlay(&mut keys)?;
     Ok(keys)
 }
 
-/// A style file with the places of its keys.
+/// A style file with the positions of its keys.
 struct StyleFile<'a> {
     text: &'a str,
     path: &'a Path,
@@ -316,7 +316,7 @@ impl<'a> StyleFile<'a> {
         }
     }
 
-    /// Puts this file's values over `keys`, which knows all sections, keys and their kinds.
+    /// Overrides `keys`, which contains all sections, keys and their kinds, with this file's values.
     fn overlay(&self, keys: &mut Table) -> Result<()> {
         for (section, value) in self.values.iter().filter(|(name, _)| *name != "base") {
             let known = keys.get_mut(section).and_then(Value::as_table_mut);
@@ -341,7 +341,7 @@ impl<'a> StyleFile<'a> {
     }
 }
 
-/// The kind of value that `new` should be to replace `old`; `None` if it is one.
+/// The kind of value required to replace `old`; `None` if `new` is of that kind.
 fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
     let length = |v: &Value| {
         #[expect(clippy::cast_precision_loss, reason = "only its range matters")]

@@ -1,4 +1,4 @@
-//! The fonts: the width of a label in the bundled font, and the way to show characters that it lacks.
+//! The fonts: the width of a label in the bundled font, and the representation of characters that it lacks.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -60,7 +60,7 @@ impl Face {
     }
 }
 
-/// The fonts that labels are measured and drawn with: the bundled one, then the user's. Cheap to clone.
+/// The fonts with which labels are measured and drawn: the bundled one, then the user's. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Fonts {
     regular: Arc<Face>,
@@ -94,10 +94,9 @@ impl Fonts {
         }
     }
 
-    /// The fonts with one more for characters that the ones before lack.
+    /// The fonts with one more for characters that the previous ones lack.
     ///
-    /// # Errors
-    /// [`Error::BadFile`] where `data`, read from `path`, is not a TrueType or OpenType font.
+    /// # Errors [`Error::BadFile`] if `data`, read from `path`, is not a TrueType or OpenType font.
     pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
         let face = Face::read(Cow::Owned(data));
         let face = face.ok_or_else(|| Error::BadFile {
@@ -118,7 +117,8 @@ impl Fonts {
             .map(|face| &*face.data)
     }
 
-    /// The place in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight where none has it.
+    /// The index in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight if no font
+    /// has it.
     pub fn file_of(&self, c: char, weight: Weight) -> usize {
         let (place, first) = match weight {
             Weight::Regular => (0, &self.regular),
@@ -131,7 +131,7 @@ impl Fonts {
         extra.map_or(place, |at| at + 2)
     }
 
-    /// The width of `c` in em; `None` where no font has it.
+    /// The width of `c` in em; `None` if no font has it.
     fn advance(&self, c: char, weight: Weight) -> Option<f32> {
         let first = match weight {
             Weight::Regular => &self.regular,
@@ -152,8 +152,8 @@ impl Fonts {
         em * size
     }
 
-    /// `text` as it can be drawn: control characters, invisible and direction marks, and characters that no font has,
-    /// are written as `\u{…}`, so that different names never look the same.
+    /// `text` in drawable form: control characters, invisible and direction marks, and characters that no
+    /// font has, are written as `\u{…}`, so that different names never look the same.
     pub fn shown<'a>(&self, text: &'a str) -> Cow<'a, str> {
         if text.chars().all(|c| self.can_show(c)) {
             return Cow::Borrowed(text);
@@ -185,12 +185,12 @@ impl Fonts {
         }
         let chars: Vec<char> = text.chars().collect();
         let short = |keep: usize| -> String {
-            // A name is reported by its end rather than by its beginning.
+            // The end of a name is more distinctive than its beginning.
             let head = keep * 2 / 5;
             let tail = &chars[chars.len() - (keep - head)..];
             chars[..head].iter().chain(&['…']).chain(tail).collect()
         };
-        // The more is kept the wider it is, so that the most that fits is found by halving.
+        // The width grows with the length, so the longest text that fits is found by bisection.
         let most_kept = chars.len().saturating_sub(2);
         let (mut fits, mut wide) = (most_kept.min(2), most_kept + 1);
         while wide - fits > 1 {

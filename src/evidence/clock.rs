@@ -22,17 +22,17 @@ struct DayCluster {
     messages: u64,
 }
 
-/// The judgement on the times of a mission.
+/// The assessment of the times of a mission.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Belief {
-    /// The times to believe, if some messages lie far from the bulk; `None` to believe all.
+    /// The credible times, if some messages are far from the bulk; `None` if all are credible.
     pub(crate) span: Option<Span>,
-    /// A sentence about jumps of the clock, where messages too many to be an accident lie far apart and stay on one
+    /// A sentence about clock jumps, if too many messages to be an accident are far apart and stay on one
     /// axis.
     pub(crate) jump: Option<String>,
 }
 
-/// Judges the times of a mission by the number of messages of each day.
+/// Assesses the times of a mission by the number of messages of each day.
 pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     let clusters = clusters(days);
     let Some(bulk) = clusters.iter().max_by_key(|c| c.messages) else {
@@ -79,7 +79,7 @@ fn clusters(days: &BTreeMap<i64, u64>) -> Vec<DayCluster> {
     clusters
 }
 
-/// The number of clusters that are named.
+/// The number of clusters that are listed.
 const NAMED: usize = 3;
 
 fn stated(clusters: &[DayCluster]) -> String {
@@ -93,7 +93,7 @@ fn stated(clusters: &[DayCluster]) -> String {
         parts.push(format!("{} more such jumps", clusters.len() - NAMED));
     }
     format!(
-        "the recorder's clock jumps by more than a year: {}; `--start` and `--end` choose a part",
+        "the recorder's clock jumps by more than a year: {}; select a part with `--start` and `--end`",
         parts.join(", ")
     )
 }

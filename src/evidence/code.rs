@@ -142,7 +142,7 @@ fn read_file(file: &SourceFile) -> FileRead {
         Some(FileKind::Cpp) => FileRead::Code(cpp::read(&file.text)),
         Some(FileKind::Launch) => {
             let path = Path::new(&file.path);
-            // An unreadable launch file starts nothing.
+            // An unreadable launch file starts no nodes.
             let tree = launch::tree_of(path, &file.text).ok().flatten();
             tree.map_or(FileRead::Nothing, |tree| {
                 FileRead::Launch(launch::nodes(path, &tree))

@@ -1,4 +1,4 @@
-//! A collector that takes in any number of bags: the times of all messages, and the observations of their contents.
+//! A collector of any number of bags: the times of all messages, and the observations in their contents.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -24,22 +24,24 @@ use crate::evidence::times::Stamps;
 /// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CollectOptions {
-    /// Whether to learn every payload's size, even if that means reading more than the index.
+    /// Whether to determine every payload's size, even if that means reading more than the index.
     pub sizes: bool,
     /// The names to keep every piece of evidence for: elements with all of these names (one: a node or topic; two: an
     /// edge).
     pub why: Vec<String>,
-    /// Whether to infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
+    /// Whether to infer subscriptions from header stamps that nodes copy; reads the first bytes of every
+    /// message.
     pub infer_stamps: bool,
-    /// The number of payload bytes to compare with each other and with log texts, from the beginnings of payloads; 0:
-    /// none, and none is read for it. [`u64::MAX`]: all, even in bags that are not read otherwise.
+    /// The number of payload bytes to compare with each other and with log texts, from the beginnings of
+    /// payloads; 0: none, and no payload is read for this. [`u64::MAX`]: all, even in bags whose payloads are
+    /// not read otherwise.
     pub payload_bytes: u64,
     /// The topic of strings whose texts are kept ([`Recorded::texts`]).
     pub texts_of: Option<String>,
 }
 
 impl CollectOptions {
-    /// Whether payloads are compared even where nothing else is read.
+    /// Whether payloads are compared even if they are read for nothing else.
     fn compares_all(&self) -> bool {
         self.payload_bytes == u64::MAX
     }
@@ -81,12 +83,13 @@ impl Default for CollectOptions {
     }
 }
 
-/// The default number of payload bytes that are compared, of all topics together: at most the first 16 KiB of each
-/// message, and 64 for each message besides. A tenth of a second of work, at most a fifth of all, and enough for an hour
-/// of a small robot without cameras. Bags that are larger on disk are not compared unless that is asked for: most of
-/// them are known by their index, an advantage that would be lost if every payload were read.
+/// The default number of payload bytes that are compared, of all topics together: at most the first 16 KiB of
+/// each message, plus 64 bytes per message. This is a tenth of a second of work, at most a fifth of the
+/// total, and enough for an hour of a small robot without cameras. Bags that are larger on disk are not
+/// compared unless requested: most of them are read by their index, an advantage that would be lost if every
+/// payload were read.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
-/// The most texts that are kept of a topic.
+/// The most texts of a topic that are kept.
 const MOST_TEXTS: usize = 10_000;
 /// The most characters kept of each text.
 const LONGEST_TEXT: usize = 200;
@@ -104,9 +107,9 @@ pub struct Collector {
     stamped: Vec<bool>,
     /// Whether the messages of each stream begin with a header, so that they have an age.
     aged: Vec<bool>,
-    /// The schema for taking the messages of each stream apart, where they hold words or numbers.
+    /// The schema for parsing the messages of each stream, if they contain words or numbers.
     schemas: Vec<Option<MessageSchema>>,
-    /// The numbers in the headers of each stream, by place; only of those that have any.
+    /// The numbers in the headers of streams that have any, by index.
     numbers: BTreeMap<usize, Numbers>,
     /// The number of payload bytes compared so far.
     compared: u64,
@@ -120,7 +123,7 @@ pub struct Collector {
     bags: Vec<Vec<usize>>,
     /// The namespace of the names in the last bag.
     space: String,
-    /// The bags with payloads that are read for more than comparisons.
+    /// The bags whose payloads are read for more than comparisons.
     read: BTreeSet<usize>,
 }
 
@@ -133,7 +136,7 @@ impl Collector {
         all
     }
 
-    /// The sink for the next bag; `progress` gets the reader's progress (bytes done, bytes in all).
+    /// The sink for the next bag; `progress` receives the reader's progress (bytes done, total bytes).
     pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
         self.bag_in("", progress)
     }
@@ -159,7 +162,8 @@ impl Collector {
         }
     }
 
-    /// Everything collected so far, with the times of messages from about `from` on. More may be collected then.
+    /// Everything collected so far, with the times of messages from about `from` on. Collecting may continue
+    /// afterwards.
     ///
     /// # Errors
     /// As [`Collector::finish`].
@@ -192,12 +196,12 @@ impl Collector {
         self.messages.extent()
     }
 
-    /// The number of connections and observations: it grows with everything that was not known before.
+    /// The number of connections and observations: it grows with every new fact.
     pub(crate) fn known(&self) -> usize {
         self.streams.len() + self.facts.list.len()
     }
 
-    /// Lets every source read the announcement of the newest stream.
+    /// Passes the announcement of the newest stream to every source.
     fn announced(&mut self) {
         let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
             return;
@@ -216,7 +220,7 @@ impl Collector {
         }
     }
 
-    /// Lets the sources that know its layout read a message.
+    /// Passes a message to the sources that know its layout.
     fn read(&mut self, place: usize, message: &Message<'_>) {
         if let Some(numbers) = self.numbers.get_mut(&place) {
             numbers.add(message.time, message.data);
@@ -254,7 +258,7 @@ impl Collector {
         }
     }
 
-    /// Keeps the text of a message, if those of its topic were asked for.
+    /// Keeps the text of a message, if those of its topic were requested.
     fn keep_text(&mut self, place: usize, message: &Message<'_>) {
         if !self.stated[place] || self.texts.len() >= MOST_TEXTS {
             return;
@@ -284,7 +288,7 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
-        // The number in the header is the publisher's own, in a copy too.
+        // The number in the header is set by the publisher, even in a copy.
         let own = if self.numbers.contains_key(&place) {
             4
         } else {
@@ -302,8 +306,8 @@ impl Collector {
         }
     }
 
-    /// Forgets the payloads of bags that were not read otherwise. Where such a bag has an index, none was compared;
-    /// the evidence of a bag must not depend on the way in which it is read.
+    /// Drops the payloads of bags that were not read otherwise. If such a bag has an index, none was
+    /// compared, and the evidence of a bag must not depend on the way in which it is read.
     fn forget_payloads(&mut self) {
         if !self.options.compares_all() {
             let (streams, read) = (&self.streams, &self.read);
@@ -314,10 +318,9 @@ impl Collector {
         }
     }
 
-    /// Ends the collecting.
+    /// Finishes collecting.
     ///
-    /// # Errors
-    /// If times had to be put into a temporary file and that failed.
+    /// # Errors If times had to be written to a temporary file and that failed.
     pub fn finish(mut self) -> Result<Recorded> {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
@@ -333,9 +336,8 @@ impl Collector {
             self.notices.add(Notice {
                 kind: NoticeKind::Damaged,
                 count: self.facts.dropped,
-                text:
-                    "there are more names, or longer ones, than any robot has: an observation was left out"
-                        .to_owned(),
+                text: "there are implausibly many or long names: an observation was left out"
+                    .to_owned(),
             });
         }
         self.texts.sort();
@@ -355,15 +357,15 @@ impl Collector {
     }
 }
 
-/// Whether the last message keeps its meaning after its time (latched). The logs of rospy and ROS 2 are latched too,
-/// but their last record is no evidence of when the node ended.
+/// Whether the last message keeps its meaning after its time (latched). The logs of rospy and ROS 2 are
+/// latched too, but their last record is not evidence of the time at which the node ended.
 fn is_held(connection: &Connection) -> bool {
     let qos = connection.qos.as_deref().unwrap_or_default();
     let kept = connection.latching || source::qos::is_transient_local(qos);
     kept && connection.topic.as_str() != "/rosout"
 }
 
-/// A notice that a stream, or a message of it, has another layout than its type promises.
+/// A notice that a stream, or a message of it, has another layout than its type implies.
 fn undecodable(stream: &Stream, why: &str) -> Notice {
     let (topic, kind) = (&stream.connection.topic, &stream.connection.type_name);
     Notice::new(
@@ -415,7 +417,8 @@ impl Sink for BagSink<'_> {
             times: all.messages.series(),
         };
         let (mut readers, foreign) = source::readers(&stream);
-        // The records of `/rosout` again, up to half a minute later: lists of topics would run backwards.
+        // It repeats the records of `/rosout` up to half a minute later, so that lists of topics would be out
+        // of order.
         let own = all.bags.get(self.bag).into_iter().flatten();
         let of = |name: &str| {
             let streams = own.clone().copied();
@@ -486,14 +489,14 @@ impl Sink for BagSink<'_> {
 pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
     pub(crate) messages: Stamps,
-    /// The numbers in the headers of streams, by place, as far as they were read.
+    /// The numbers in the headers of streams, by index, as far as they were read.
     pub(crate) numbers: BTreeMap<usize, Numbers>,
     pub(crate) facts: Observations,
-    /// The texts of the topic that was asked for, sorted by time.
+    /// The texts of the requested topic, sorted by time.
     pub texts: Vec<(Stamp, String)>,
     /// Problems that did not stop the reading.
     pub notices: Notices,
-    /// The places where a recorder's clock went back, sorted by time.
+    /// The points at which a recorder's clock went back, sorted by time.
     pub(crate) falls: Vec<ClockFall>,
     /// The credible times; `None` if all of them are.
     pub(crate) believed: Option<Span>,
@@ -508,8 +511,8 @@ impl Recorded {
         self.believed.is_none_or(|span| span.contains(time))
     }
 
-    /// Marks the streams without a message in the part of the recording that was read. In a part from the beginning on,
-    /// they have latched nothing yet.
+    /// Marks the streams without a message in the part of the recording that was read. In a part from the
+    /// beginning on, they have no latched message yet.
     pub(crate) fn mark_outside(&mut self, is_first: bool) {
         for stream in &mut self.streams {
             stream.is_outside = self.messages.bounds(stream.times).is_none();

@@ -1,5 +1,5 @@
-//! Conclusions from everything recorded: the inferences of all sources and of the user's files, stated values.
-//! Made once, for any windows.
+//! Conclusions from everything recorded: the inferences of all sources and of the user's files, and stated
+//! values. Made once, independent of windows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -62,7 +62,7 @@ pub struct Findings {
     pub lines: Vec<EvidenceLine>,
     /// Notices about the user's files.
     pub notices: Notices,
-    /// Edges that source code offers and that were not drawn, a line each.
+    /// Edges that source code declares and that were not drawn, one per line.
     pub undrawn: Vec<String>,
 }
 
@@ -167,8 +167,8 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     })
 }
 
-/// The conclusions of all sources, of the user's files and of source code; notices about the files, and what the code
-/// offers and was not drawn.
+/// The conclusions of all sources, of the user's files and of source code; notices about the files, and the
+/// declarations in the code that were not drawn.
 fn concluded<'a>(
     recorded: &'a Recorded,
     options: &ConcludeOptions,
@@ -244,7 +244,7 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
                 continue;
             };
             let near = nearest(name, all.iter().map(AsRef::as_ref));
-            // A bag hides nodes, which is why the user names them; topics it does not hide.
+            // A bag may lack nodes, which is why the user adds them; it does not lack topics.
             if near.is_some() || what == "topic" {
                 stated.entry((what, name)).or_insert((&entry.place, near));
             }
@@ -254,13 +254,13 @@ fn unmatched(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
         let near = near.map_or_else(String::new, |near| {
             format!("; the nearest name is `{near}`")
         });
-        let text = format!("{place}: no {what} of the bag is called `{name}`{near}");
+        let text = format!("{place}: the bag has no {what} `{name}`{near}");
         Notice::new(NoticeKind::Note, text)
     };
     stated.into_iter().map(notice).collect()
 }
 
-/// Explains inferences that rest on no single message, for elements that `why` asks about.
+/// Explains inferences that are not based on a single message, for elements requested by `why`.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let is_asked = |inference: &&Inference| {
         known.facts.is_watched(inference.what.ends())
@@ -283,7 +283,7 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     known.facts.pieces.extend(pieces);
 }
 
-/// The time and the words of an inference; `None` where observations with their own words made it.
+/// The time and text of an inference; `None` if it comes from observations with their own text.
 fn explained(
     known: &Conclusions<'_>,
     messages: &Stamps,
@@ -324,7 +324,7 @@ fn explained(
 fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
     let name = |name: Name| known.facts.text(name);
     match what {
-        ElementKey::Node(node) => format!("{} lives", name(node)),
+        ElementKey::Node(node) => format!("{} is running", name(node)),
         ElementKey::Topic(topic) => format!("{} exists", name(topic)),
         ElementKey::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
         ElementKey::Subscribe(topic, node) => {
@@ -358,7 +358,7 @@ fn stated(
         NamedElement::Type(..) => return,
     };
     let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
-    // The end itself is not in it any more.
+    // The end itself is exclusive.
     let last = |to: Option<i64>| to.map_or(mission.1, |ns| mission.0.plus(ns).plus(-1));
     let when = match (entry.from_ns, entry.to_ns) {
         (None, None) => Validity::Whole,
@@ -407,8 +407,8 @@ fn is_run_of(node: &str, stem: &str) -> bool {
     parts.next().is_some_and(is_number) && parts.next().is_some_and(is_number)
 }
 
-/// The node in the same namespace as a node, or as that of an edge, that publishes for the longest time; `None` at the
-/// root.
+/// The node that publishes for the longest time in the namespace of a node, or of an edge's node; `None` at
+/// the root.
 fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Option<Name> {
     let node = what.ends()[0]?;
     let text = known.text(node);
@@ -422,7 +422,7 @@ fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Op
     streams.max().map(|(_, of)| of)
 }
 
-/// Puts every node under the name of its role; returns the names that changed.
+/// Renames every node to its role; returns the names that changed.
 fn fold(inferences: &mut [Inference], facts: &mut Observations) -> BTreeMap<Name, Name> {
     let mut roles = BTreeMap::new();
     let mut to = |node: Name| {

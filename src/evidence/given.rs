@@ -1,4 +1,5 @@
-//! The graph that the user gives beside the bags: files of [`topology`], and recordings of graphs by other tools.
+//! The graph that the user supplies in addition to the bags: files of [`topology`], and recordings of graphs
+//! by other tools.
 
 use std::path::Path;
 
@@ -29,7 +30,7 @@ pub(crate) fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
     Ok(all)
 }
 
-/// Everything that graphs in an MCAP file ever show: `/rosgraph`, or the nodes that nodl observed.
+/// All elements of the graphs in an MCAP file: `/rosgraph`, or the nodes that nodl observed.
 fn recorded(path: &Path) -> Result<Topology> {
     let mut reader = bag::open(&Input::Path(path.to_owned()), &OpenOptions::default())?;
     let mut collector = Collector::new(CollectOptions {
@@ -70,7 +71,7 @@ fn recorded(path: &Path) -> Result<Topology> {
         return Err(topology::bad(
             path,
             0,
-            "no graph is recorded in it".to_owned(),
+            "it contains no recorded graph".to_owned(),
             "give a recording of `/rosgraph` or of `/nodl/observed_node`",
         ));
     }

@@ -1,4 +1,4 @@
-//! Proofs from the observations of a mission: every reason to believe in a node, a topic or an edge.
+//! Inferences from the observations of a mission: the evidence for each node, topic and edge.
 
 mod at_word;
 mod closed;
@@ -23,7 +23,7 @@ pub(crate) use incident::{Incident, IncidentKind};
 /// A connection of one of the bags.
 #[derive(Clone, Debug)]
 pub(crate) struct Stream {
-    /// The place of the bag among the inputs.
+    /// The index of the bag among the inputs.
     pub(crate) bag: usize,
     /// The connection as the reader announced it.
     pub(crate) connection: Connection,
@@ -37,12 +37,12 @@ pub(crate) struct Stream {
     pub(crate) trust: Reliability,
     /// The log times of its messages.
     pub(crate) times: SeriesId,
-    /// Whether a part of the recording is read and all its messages are in another.
+    /// Whether a part of the recording is read and all its messages are outside of it.
     pub(crate) is_outside: bool,
 }
 
 impl Stream {
-    /// Whether it is about the robot, written by this program, and no part of it.
+    /// Whether it was written by this program about the robot, and is not part of the robot.
     pub(crate) fn is_about(&self) -> bool {
         let node = self.connection.publisher.as_ref();
         node.is_some_and(|node| node.as_str() == OWN_NODE)
@@ -58,7 +58,7 @@ pub(crate) enum Reliability {
     First,
     /// It published every message, as far as other evidence shows.
     Likely,
-    /// It published messages of the topic earlier, and was gone before these.
+    /// It published messages of the topic earlier, and ended before these.
     Gone,
     /// It played back messages that others published earlier.
     Player,
@@ -71,12 +71,12 @@ pub(crate) enum ElementKey {
     Topic(Name),
     /// A node and a topic that it publishes.
     Publish(Name, Name),
-    /// A topic and a node that subscribes it.
+    /// A topic and a node that subscribes to it.
     Subscribe(Name, Name),
 }
 
 impl ElementKey {
-    /// The node and the topic: both of an edge, one of the others.
+    /// The node and the topic: both for an edge, otherwise one.
     pub(crate) fn ends(self) -> [Option<Name>; 2] {
         match self {
             Self::Node(node) => [Some(node), None],
@@ -129,7 +129,7 @@ pub(crate) enum Validity {
     Always,
 }
 
-/// A reason to believe in an element.
+/// A piece of evidence for an element.
 #[derive(Clone, Debug)]
 pub(crate) struct Inference {
     pub(crate) what: ElementKey,
@@ -148,8 +148,8 @@ impl Inference {
     }
 }
 
-/// The publishers that send only in another part of the recording than the one that is read: they may have stopped, or
-/// not have started. Nodes that send nothing but latched messages and logs may well be there.
+/// The publishers that only send outside of the part of the recording that is read: they may have stopped, or
+/// not have started. Nodes that only send latched messages and logs may still be running.
 fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
     let of = |is: &dyn Fn(&&Stream) -> bool| -> BTreeSet<Option<Name>> {
         streams.iter().filter(is).map(|s| s.publisher).collect()
@@ -172,13 +172,13 @@ pub(crate) struct Conclusions<'a> {
     pub(crate) inferences: Vec<Inference>,
     /// Statements other than about which elements exist, by time for each element.
     pub(crate) incidents: Vec<Incident>,
-    /// Proofs that were explained by their source, while `why` asks for them.
+    /// Inferences that were explained by their source, if `why` requests them.
     pub(crate) worded: BTreeSet<(ElementKey, SourceId)>,
     /// Publications whose messages are byte-for-byte copies of another topic's.
     pub(crate) copies: BTreeSet<(Name, Name)>,
     /// The mission's first and last moment.
     pub(crate) mission: (Stamp, Stamp),
-    /// The publishers that may be gone, or not there yet, in the part of the recording that is read.
+    /// The publishers that may have stopped, or not have started, in the part of the recording that is read.
     pub(crate) gone: BTreeSet<Option<Name>>,
     /// The streams of each topic.
     recorded: BTreeMap<Name, Vec<usize>>,
@@ -245,8 +245,8 @@ impl<'a> Conclusions<'a> {
         self.add(inference);
     }
 
-    /// Adds the inference of a rule, alive as long as `basis`, unless the element is known already or stronger evidence
-    /// denies it.
+    /// Adds the inference of a rule, valid as long as `basis`, unless the element is known already or
+    /// stronger evidence contradicts it.
     pub(crate) fn infer(
         &mut self,
         source: SourceId,
@@ -321,7 +321,7 @@ impl<'a> Conclusions<'a> {
         self.recorded.contains_key(&topic)
     }
 
-    /// The type of a recorded topic as ROS 1 writes it, without `/msg`; empty if no bag states it.
+    /// The type of a recorded topic in the form of ROS 1, without `/msg`; empty if no bag states it.
     pub(crate) fn kind(&self, topic: Name) -> String {
         let first = self.recorded.get(&topic).and_then(|all| all.first());
         first.map_or_else(String::new, |at| {
@@ -360,7 +360,7 @@ impl<'a> Conclusions<'a> {
         self.publishers.get(&topic).into_iter().flatten().copied()
     }
 
-    /// The nodes known so far to subscribe `topic`.
+    /// The nodes known so far to subscribe to `topic`.
     pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.subscribers.get(&topic).into_iter().flatten().copied()
     }
@@ -396,8 +396,8 @@ impl<'a> Conclusions<'a> {
         topics.into_iter().map(|(_, topic)| topic).collect()
     }
 
-    /// Adds `what` by a convention: it exists as long as `basis`, unless a complete list leaves it out. Headers do not
-    /// contradict it: a topic published by convention is often silent.
+    /// Adds `what` by a convention: it exists as long as `basis`, unless a complete list omits it. Headers do
+    /// not contradict it, as a topic published by convention is often silent.
     pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
@@ -410,7 +410,7 @@ impl<'a> Conclusions<'a> {
         });
     }
 
-    /// Adds, by a convention, a subscription of `topic` by a node that publishes `basis`.
+    /// Adds, by a convention, a subscription to `topic` by a node that publishes `basis`.
     pub(crate) fn subscribes_as_well(
         &mut self,
         source: SourceId,
@@ -425,7 +425,8 @@ impl<'a> Conclusions<'a> {
         );
     }
 
-    /// The node of a name without its namespace: the only known one with this ending, otherwise one of this name.
+    /// The node for a name without its namespace: the only known one with this ending, otherwise one with
+    /// exactly this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
         let loggers = self
@@ -449,7 +450,7 @@ impl<'a> Conclusions<'a> {
         self.facts.text(name)
     }
 
-    /// The times at which a fact was claimed, sorted; empty if they cannot be read, with the error kept.
+    /// The times at which a fact was observed, sorted; empty if they cannot be read, and the error is stored.
     pub(crate) fn times(&mut self, fact: &ObservationRecord) -> Vec<Stamp> {
         self.facts.times(fact).unwrap_or_else(|error| {
             self.failed = Some(error);
@@ -458,7 +459,7 @@ impl<'a> Conclusions<'a> {
     }
 }
 
-/// The largest number of publishers that each topic was offered by in one bag.
+/// The largest number of publishers that offered each topic in one bag.
 pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> BTreeMap<Name, u32> {
     let mut offers: BTreeMap<Name, u32> = BTreeMap::new();
     for (at, count) in of_streams {

@@ -3,7 +3,7 @@
 use super::SOURCES;
 use super::observation::SourceId;
 
-/// A set of kinds of evidence: bits at the places of rows in [`SOURCES`].
+/// A set of kinds of evidence: bits at the indices of rows in [`SOURCES`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Evidence(u64);
 

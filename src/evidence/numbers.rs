@@ -1,6 +1,6 @@
-//! Sequence numbers in the headers of messages (ROS 1), which begin again with their publisher.
+//! Sequence numbers in the headers of messages (ROS 1), which start over with their publisher.
 //!
-//! Kept are those on both sides of each place where they may have begun again: at most a few per stream.
+//! Only those on both sides of a possible restart are kept: at most a few per stream.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use crate::evidence::message::definition::outline;
 
 /// The number of bytes from a payload's start to the end of its header's stamp.
 pub(crate) const HEAD: usize = 12;
-/// The most places per stream at which numbers are kept: no node restarts more often.
+/// The most possible restarts per stream at which numbers are kept: no node restarts more often.
 const MOST: usize = 4096;
 
-/// The number in a header, with the stamp beside it as in the message: only copies have both in common.
+/// The number in a header, with the stamp beside it as in the message: only copies share both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Number {
     pub(crate) number: u32,
@@ -30,7 +30,7 @@ impl Number {
         })
     }
 
-    /// Whether it is so small that its publisher may just have begun, after `before`.
+    /// Whether it is so small, after `before`, that its publisher may just have started.
     pub(crate) fn begins_after(self, before: Self) -> bool {
         self.number <= BEGUN_AGAIN && self.number < before.number
     }
@@ -39,19 +39,20 @@ impl Number {
 /// The numbers of one stream.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Numbers {
-    /// The number of messages looked into.
+    /// The number of messages examined.
     pub(crate) read: u64,
     last: Option<(Stamp, Number)>,
     kept: BTreeMap<Stamp, Number>,
-    /// The number of messages with a larger number than the one before, and the times of those with a smaller one.
+    /// The number of messages with a larger number than the previous one, and the times of those with a
+    /// smaller one.
     grew: u64,
     fell: Vec<Stamp>,
-    /// The times on both sides of each place where numbers begin again after a gap.
+    /// The times on both sides of each point at which numbers start over after a gap.
     pub(crate) falls: Vec<(Stamp, Stamp)>,
 }
 
 impl Numbers {
-    /// Looks at the next message of the stream, in the order of the file.
+    /// Examines the next message of the stream, in the order of the file.
     pub(crate) fn add(&mut self, time: Stamp, payload: &[u8]) {
         let Some(number) = Number::of(payload) else {
             return;
@@ -82,13 +83,14 @@ impl Numbers {
         }
     }
 
-    /// Whether the numbers went on to grow from the last message before `from` to the first after `to`.
+    /// Whether the numbers continued to grow from the last message before `from` to the first after `to`.
     pub(crate) fn count_on(&self, from: Stamp, to: Stamp) -> bool {
         let is_counter = self.grew * 2 >= self.read;
         is_counter && !self.fell.iter().any(|at| from < *at && *at <= to)
     }
 
-    /// Whether all of `count` messages are of one sender at a time: their numbers grow, and begin again only after gaps.
+    /// Whether all of `count` messages are from one sender at a time: their numbers grow, and start over only
+    /// after gaps.
     pub(crate) fn is_one_counter(&self, count: u64) -> bool {
         let again = self.fell.len() as u64;
         let begun = self.falls.len() as u64;

@@ -1,7 +1,7 @@
 //! Observations that the messages of a mission make about its graph, with their source, strength and times.
 //!
-//! An observation is kept once per source with the times at which it was made, so that millions of messages that repeat
-//! themselves take no more room than their (compressed) times.
+//! An observation is kept once per source with the times at which it was made, so that millions of repeated
+//! messages take no more memory than their (compressed) times.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -15,7 +15,7 @@ use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
 worded! {
-    /// The strength of the evidence for something. Ordered: the stronger is the smaller.
+    /// The strength of evidence. Ordered: the stronger is the smaller.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub enum Confidence {
         /// Messages of this very connection, or the middleware's own statistics.
@@ -30,7 +30,7 @@ worded! {
     }
 }
 
-/// The number of a text seen in the mission: the name of a node or topic, a type, a state.
+/// The number of a text in the mission: the name of a node or topic, a type, a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Name(pub(crate) u32);
 
@@ -56,11 +56,11 @@ macro_rules! observations {
 }
 
 observations! {
-    /// This node is alive.
+    /// This node is running.
     Node(node),
-    /// This node has just begun.
+    /// This node has just started.
     Begins(node),
-    /// This node is gone.
+    /// This node has ended.
     NodeGone(node),
     /// This topic exists.
     Topic(topic),
@@ -68,17 +68,17 @@ observations! {
     Appears(topic),
     /// This node publishes this topic.
     Publish(node, topic),
-    /// This node subscribes this topic.
+    /// This node subscribes to this topic.
     Subscribe(node, topic),
-    /// This node has just begun to subscribe this topic.
+    /// This node has just subscribed to this topic.
     Joins(node, topic),
-    /// This node wanted to subscribe this topic, and was refused.
+    /// This node tried to subscribe to this topic, and was refused.
     Refused(node, topic),
-    /// This node no longer subscribes this topic.
+    /// This node no longer subscribes to this topic.
     Unsubscribe(node, topic),
     /// This node names this topic as its own, as publisher or as subscriber.
     Lists(node, topic),
-    /// Log records of the second node come over a connection that names the first as publisher.
+    /// Log records of the second node arrive over a connection that names the first as publisher.
     Carries(publisher, node),
     /// A logger of this name, which is a node or a part of one, logs to this topic.
     Logger(logger, topic),
@@ -96,8 +96,8 @@ observations! {
     SaysSubscribe(logger, topic),
     /// This logger logs from this source file (its own name, no folder).
     LogsFrom(logger, file),
-    /// A log text of this logger reports that a subscriber of this topic of its node gets nothing, by this policy of the
-    /// quality of service.
+    /// A log text of this logger reports that a subscriber of this topic of its node receives nothing because
+    /// of this policy of the quality of service.
     Starves(logger, topic, policy),
     /// This node, or logger, receives nothing from a publisher of this topic because of this policy.
     Starved(node, topic, policy),
@@ -127,7 +127,7 @@ impl Observation {
     }
 }
 
-/// The place of a source in the table of sources.
+/// The index of a source in the table of sources.
 pub(crate) type SourceId = usize;
 
 /// An observation by one source.
@@ -151,7 +151,7 @@ pub struct EvidenceLine {
     pub source: &'static str,
     /// The strength.
     pub confidence: Confidence,
-    /// The statement, in one line; may hold anything, so escape it where it is written.
+    /// The statement, in one line; may contain any characters, so escape it in output.
     pub text: String,
 }
 
@@ -164,7 +164,7 @@ pub(crate) struct Measurement {
     pub(crate) subscriber: Option<Name>,
     /// The interval, half-open.
     pub(crate) span: Span,
-    /// The number of messages that jitter and age are computed from.
+    /// The number of messages from which jitter and age are computed.
     pub(crate) count: u64,
     pub(crate) drops: Option<u64>,
     pub(crate) bytes: Option<u64>,
@@ -177,24 +177,25 @@ pub(crate) struct Measurement {
 /// All observations of a mission.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Observations {
-    /// The names that [`EvidenceLine`]s are kept for; if empty, none are kept.
+    /// The names for which [`EvidenceLine`]s are kept; if empty, none are kept.
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
-    /// The header stamps of streams, by the streams' places; log times are kept as if they were sizes.
+    /// The header stamps of streams, by the streams' indices; log times are stored in place of sizes.
     pub(crate) headers: BTreeMap<usize, SeriesId>,
-    /// The ages of messages by their header stamps, by the streams' places; kept as if they were sizes ([`age_of`]).
+    /// The ages of messages by their header stamps, by the streams' indices; stored in place of sizes
+    /// ([`age_of`]).
     pub(crate) ages: BTreeMap<usize, SeriesId>,
     /// Statistics, in the order in which they were read.
     pub(crate) measured: Vec<Measurement>,
-    /// The hashes of payloads, by the streams' places; kept as if they were sizes.
+    /// The hashes of payloads, by the streams' indices; stored in place of sizes.
     pub(crate) payloads: BTreeMap<usize, SeriesId>,
-    /// The number of publishers that each stream was offered by, by the streams' places.
+    /// The number of publishers that offer each stream, by the streams' indices.
     pub(crate) offers: BTreeMap<usize, u32>,
     /// Texts that nodes log, and texts in messages.
     pub(crate) logged: LoggedTexts,
     /// The namespaces of recordings; empty for one without.
     pub(crate) spaces: BTreeSet<String>,
-    /// Nodes of which some log record comes from a file of Python, until their lists are settled.
+    /// Nodes with a log record from a Python file, until their lists are interpreted.
     pub(crate) rospy: BTreeSet<Name>,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
@@ -202,16 +203,16 @@ pub(crate) struct Observations {
     bytes: usize,
     places: HashMap<(Observation, SourceId, Option<Name>), usize>,
     pub(crate) list: Vec<ObservationRecord>,
-    /// All times, which are added until this is shared.
+    /// All times, which can be added until this is shared.
     pub(crate) times: Arc<Stamps>,
     /// The name that replaces all texts beyond the limit.
     overflow: Option<Name>,
-    /// The number of observations that found no room.
+    /// The number of observations beyond the limits.
     pub(crate) dropped: u64,
 }
 
 impl Observations {
-    /// The same observations with times of their own, to which more can be added.
+    /// The same observations with a separate set of times, to which more can be added.
     ///
     /// # Errors
     /// As [`Stamps::since`].
@@ -222,7 +223,7 @@ impl Observations {
         })
     }
 
-    /// The name of a text; the overflow name if there is no room.
+    /// The name of a text; the overflow name if the limit is reached.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         if let Some(name) = self.ids.get(text) {
             return *name;
@@ -252,7 +253,7 @@ impl Observations {
         })
     }
 
-    /// The name of a text that was seen already.
+    /// The name of a known text.
     pub(crate) fn known(&self, text: &str) -> Option<Name> {
         self.ids.get(text).copied()
     }
@@ -264,7 +265,7 @@ impl Observations {
             .map_or_else(|| "".into(), Arc::clone)
     }
 
-    /// Keeps the words of an observation if `why` asks about its names.
+    /// Keeps the text of an observation if `why` requests its names.
     pub(crate) fn explain(
         &mut self,
         said: Statement,
@@ -285,18 +286,18 @@ impl Observations {
         }
     }
 
-    /// Whether `why` asks about something with these names.
+    /// Whether `why` requests an element with these names.
     pub(crate) fn is_watched(&self, names: [Option<Name>; 2]) -> bool {
         let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
         !self.watched.is_empty() && self.watched.iter().all(about)
     }
 
-    /// Adds a header stamp of the stream at `place`.
+    /// Adds a header stamp of the stream at index `place`.
     pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
         note(&mut self.times, &mut self.headers, place, (stamp, log_time));
     }
 
-    /// Adds the age of a message of the stream at `place`; one of more than half an hour is none.
+    /// Adds the age of a message of the stream at index `place`; an age of more than half an hour is ignored.
     pub(crate) fn age(&mut self, place: usize, time: Stamp, stamp: Stamp) {
         let micros = time.since(stamp).div_euclid(1000).saturating_add(AGE_0);
         if let Ok(age) = u32::try_from(micros) {
@@ -313,12 +314,12 @@ impl Observations {
         }
     }
 
-    /// Adds the hash of a payload of the stream at `place`.
+    /// Adds the hash of a payload of the stream at index `place`.
     pub(crate) fn payload(&mut self, place: usize, time: Stamp, hash: u32) {
         note(&mut self.times, &mut self.payloads, place, (time, hash));
     }
 
-    /// Ends the adding of times.
+    /// Finishes adding times.
     ///
     /// # Errors
     /// As [`Stamps::finish`].
@@ -399,7 +400,7 @@ impl Observations {
         self.texts
     }
 
-    /// The times at which a fact was claimed, sorted.
+    /// The times at which a fact was observed, sorted.
     pub(crate) fn times(&self, fact: &ObservationRecord) -> io::Result<Vec<Stamp>> {
         self.times.times(fact.times)
     }
@@ -413,7 +414,7 @@ pub(crate) fn age_of(kept: u32) -> i64 {
     (i64::from(kept) - AGE_0) * 1000
 }
 
-/// Adds a time with its number to the series of a place.
+/// Adds a time with its number to the series of a stream.
 fn note(
     times: &mut Arc<Stamps>,
     series: &mut BTreeMap<usize, SeriesId>,

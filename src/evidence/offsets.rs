@@ -1,4 +1,4 @@
-//! How far the clocks of several recorders are apart, by the messages that two of them recorded.
+//! Differences between the clocks of several recorders, by the messages that two of them recorded.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -6,26 +6,27 @@ use std::io;
 use super::collector::Recorded;
 use crate::base::time::Stamp;
 
-/// The fewest messages in common that are not chance.
+/// The fewest common messages that are significant.
 const FEWEST: usize = 10;
 /// The share, in per cent, of the messages in common that must agree about the offset.
 const SHARE: usize = 80;
-/// How far two messages may differ about one offset, in nanoseconds: they take different ways to the recorders.
+/// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
+/// the recorders.
 const NEAR_NS: i64 = 50_000_000;
 
 /// The offset of a recorder's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ClockOffset {
-    /// The place of the bag among the inputs, and that of the one that it is compared with.
+    /// The index of the bag among the inputs, and that of the one that it is compared with.
     pub(crate) bag: usize,
     pub(crate) other: usize,
-    /// How far its clock is ahead, in nanoseconds.
+    /// The time by which its clock is ahead, in nanoseconds.
     pub(crate) ahead: i64,
     /// The number of messages that show it.
     pub(crate) messages: usize,
 }
 
-/// The times of the contents that a bag has once on a topic; `None` for those that it has more often.
+/// The times of contents that occur once on a topic of a bag; `None` for those that occur more often.
 type Contents<'a> = BTreeMap<(&'a str, u32), Option<Stamp>>;
 
 /// The bags whose clocks differ from that of an earlier one.
@@ -67,7 +68,7 @@ pub(crate) fn offsets(recorded: &Recorded) -> io::Result<Vec<ClockOffset>> {
     Ok(found)
 }
 
-/// By how much the messages in common came later in the second recording, and their number; `None` without agreement.
+/// The delay of the common messages in the second recording, and their number; `None` without agreement.
 fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
     let both = other.iter().filter_map(|(key, time)| {
         let before = one.get(key)?.as_ref()?;

@@ -14,8 +14,8 @@ use crate::evidence::numbers::Numbers;
 use crate::evidence::observation::{Name, Observation, Observations};
 use crate::evidence::times::Stamps;
 
-/// Lowers the reliability of streams with unreliable headers, and divides those that outlive their publisher; returns a
-/// notice once per bag.
+/// Lowers the reliability of streams with unreliable headers, and divides those that continue after their
+/// publisher ended; returns a notice once per bag.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -63,10 +63,9 @@ pub(crate) fn judge(
     Ok(notices)
 }
 
-const REWRITTEN: &str = "the bag was rewritten by a tool that merges connections, so a topic's publishers are known \
-                         from log records where these name several";
+const REWRITTEN: &str = "the bag was rewritten by a tool that merges connections, so a topic's publishers are taken from log records if these name several";
 const PLAYBACK: &str =
-    "the bag was recorded during a playback, so the player publishes what other nodes did once";
+    "the bag was recorded during a playback, so the player publishes messages of other nodes";
 
 /// The topics that nodes name as their own in log records and similar messages.
 struct NamedTopics {
@@ -109,8 +108,9 @@ impl NamedTopics {
 /// The longest time from the start of a node to its first message on a topic of its own, in nanoseconds.
 const SOON_NS: i64 = 5_000_000_000;
 
-/// Whether the numbers in the headers of a topic show that one node sent all its messages: they are one counter, and
-/// where it begins again this node shows itself and no other that names the topic begins.
+/// Whether the numbers in the headers of a topic show that one node sent all its messages: they are one
+/// counter, and whenever it starts over, there is a sign of this node and no other node that names the topic
+/// starts.
 fn is_alone(
     stream: &Stream,
     node: Name,

@@ -54,7 +54,7 @@ pub struct Source {
     pub about: &'static str,
     /// The layouts of the messages that it reads.
     pub(crate) reads: &'static [(MessageLayout, Read)],
-    /// Whether nodes make these observations about themselves, so that the node was there at that time.
+    /// Whether nodes make these observations about themselves, so that the node was running at that time.
     pub(crate) own: bool,
     /// Whether each of its snapshots is valid until the next one: they are made whenever something changes.
     pub(crate) holds: bool,
@@ -84,7 +84,7 @@ pub(crate) struct SourceContext<'a> {
     /// The namespace of the names in this recording; empty for none.
     pub(crate) space: &'a str,
     pub(crate) stream: &'a Stream,
-    /// The stream's place among all streams.
+    /// The stream's index among all streams.
     pub(crate) place: usize,
     pub(crate) source: SourceId,
     /// The time at which the message was recorded; `None` at an announcement.
@@ -105,7 +105,7 @@ impl SourceContext<'_> {
     pub(crate) fn measure(&mut self, measurement: Measurement) {
         let now = self.time.unwrap_or(measurement.span.end);
         let nanos = measurement.span.nanos().clamp(1, 3_600_000_000_000);
-        // Intervals count on the node's clock: what matters is how long they are.
+        // Intervals are measured by the node's clock, so only their length is used.
         let span = Span::new(now.plus(-nanos), now);
         self.facts.measure(Measurement {
             span,

@@ -1,4 +1,4 @@
-//! Source text as a syntax tree: the only user of tree-sitter, which continues after text that it does not understand.
+//! Source text as a syntax tree: the only user of tree-sitter, which continues after invalid text.
 
 pub(crate) use tree_sitter::Node;
 
@@ -17,8 +17,8 @@ pub(crate) struct Parsed {
     tree: tree_sitter::Tree,
 }
 
-/// The most progress callbacks of the parser (one every hundred steps) per byte of text: usual text needs a hundredth
-/// of them. Text made to take long is given up, by a count of work and not by a clock.
+/// The most progress callbacks of the parser (one every hundred steps) per byte of text: usual text needs a
+/// hundredth of them. Parsing of maliciously slow text is abandoned, by counting work instead of time.
 const BREATHS_PER_BYTE: usize = 4;
 
 /// The deepest nesting of elements that is visited: real code stays below a hundred.

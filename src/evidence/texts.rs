@@ -1,5 +1,5 @@
-//! Log texts of nodes and values of small messages, kept together so that a log text that repeats a message can be
-//! found. Bounded: of more, the first are kept.
+//! Log texts of nodes and values of small messages, kept together so that a log text that repeats a message
+//! can be found. Bounded: beyond the limit, the first are kept.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub(crate) struct LoggedText {
 pub(crate) struct ShownValue {
     pub(crate) time: Stamp,
     pub(crate) stream: usize,
-    /// The place of the field in the message.
+    /// The index of the field in the message.
     pub(crate) field: usize,
     pub(crate) value: Box<str>,
 }
@@ -33,7 +33,7 @@ pub(crate) struct LoggedTexts {
     bytes: [usize; 2],
 }
 
-/// The most bytes that are kept of log texts, and of values.
+/// The most bytes of log texts, and of values, that are kept.
 const MOST: usize = 2 << 20;
 /// The overhead of a short text in bytes.
 const ENTRY: usize = 48;
@@ -64,7 +64,7 @@ impl LoggedTexts {
         }
     }
 
-    /// Log texts and values, sorted; of values that a field repeats only the first.
+    /// Log texts and values, sorted; of values that a field repeats, only the first.
     pub(crate) fn sorted(&self) -> (Vec<LoggedText>, Vec<ShownValue>) {
         let (mut said, mut shown) = (self.said.clone(), self.shown.clone());
         said.sort_unstable();

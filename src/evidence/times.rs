@@ -15,10 +15,11 @@ use crate::base::time::Stamp;
 
 pub(crate) use merge::Timed;
 
-/// The number of stamps per block: enough to make a block's head (32 bytes) not matter, few enough to sort in the
-/// cache.
+/// The number of stamps per block: enough for a block's head (32 bytes) to be negligible, few enough to sort
+/// in the cache.
 const BLOCK: usize = 1024;
-/// The number of bytes of encoded blocks kept in memory (8 to 20 million stamps) before they go to a file.
+/// The number of bytes of encoded blocks kept in memory (8 to 20 million stamps) before they are written to a
+/// file.
 const IN_MEMORY: usize = 16 << 20;
 /// The number of stamps not yet in a block, of all series together (8 MB), at which all of them are put into blocks.
 const MOST_OPEN: usize = 1 << 19;
@@ -28,7 +29,7 @@ const DAY: i64 = 86_400_000_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct SeriesId(pub u32);
 
-/// An encoded run of stamps and its place.
+/// An encoded run of stamps and its position.
 #[derive(Clone, Debug)]
 struct StampBlock {
     first: Stamp,
@@ -57,7 +58,7 @@ impl OpenSeries {
     }
 }
 
-/// Any number of sequences of times, each message with its size where that is known.
+/// Any number of sequences of times, each message with its size if known.
 #[derive(Debug)]
 pub(crate) struct Stamps {
     series: Vec<OpenSeries>,
@@ -90,7 +91,8 @@ impl Stamps {
         SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
     }
 
-    /// Adds times; `sizes`, if given, is as long as `stamps`. Times for a sequence that was never made are dropped.
+    /// Adds times; `sizes`, if given, is as long as `stamps`. Times for a sequence that does not exist are
+    /// dropped.
     pub(crate) fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         let Some(series) = self.series.get_mut(id.0 as usize) else {
             return;
@@ -116,7 +118,7 @@ impl Stamps {
         }
     }
 
-    /// Puts all open stamps into blocks.
+    /// Encodes all open stamps as blocks.
     fn close_all(&mut self) {
         let spool = self.spool.get_mut();
         let spool = spool.unwrap_or_else(PoisonError::into_inner);
@@ -177,7 +179,7 @@ impl Stamps {
         Some((first, last, self.series.iter().map(|s| s.count).sum()))
     }
 
-    /// Ends the adding of times.
+    /// Finishes adding times.
     ///
     /// # Errors
     /// If times could not be written to the unnamed file.
@@ -234,7 +236,7 @@ impl Stamps {
             part.push((timed.time, timed.size));
         })?;
         let sized = self.sized(id);
-        // They were counted when they came.
+        // They were counted when they were added.
         let days = self.days.clone();
         if let Some(series) = self.series.get_mut(id.0 as usize) {
             *series = OpenSeries::default();

@@ -77,12 +77,12 @@ pub fn read(path: &Path) -> Result<Topology> {
         },
         "py" => launch::read(path, &python::of_python(path, &text)?)?,
         _ => {
-            let reason = "unknown form of topology".to_owned();
+            let reason = "unknown topology format".to_owned();
             return Err(bad(
                 path,
                 0,
                 reason,
-                "name it .csv, .yaml, .mcap, .dot, .launch, .xml or .launch.py",
+                "rename it to .csv, .yaml, .mcap, .dot, .launch, .xml or .launch.py",
             ));
         }
     };
@@ -117,7 +117,7 @@ fn place(path: &Path, line: usize) -> String {
     }
 }
 
-/// A name with the slash that resolved names begin with.
+/// A name with the leading slash of resolved names.
 fn resolved(name: &str) -> String {
     format!("/{}", name.trim().trim_start_matches('/'))
 }

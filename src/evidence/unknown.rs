@@ -1,6 +1,7 @@
-//! Publishers that the bag counts but does not name. ROS 2 stores with each topic the number of its publishers, so that
-//! a separate box represents the remaining ones, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known
-//! program alone publishes messages of the topic's type, the box bears its name: `/turtlesim ?`.
+//! Publishers that the bag counts but does not name. ROS 2 stores with each topic the number of its
+//! publishers, so a separate box with a question mark represents the remaining ones: `/scan ?`, `/scan ? ×2`.
+//! If only one well-known program publishes messages of the topic's type, the box has its name: `/turtlesim
+//! ?`.
 //!
 //! Runs after all other sources, since such a box only replaces unknown nodes.
 
@@ -53,7 +54,8 @@ fn is_box(name: &str) -> bool {
     name.ends_with(" ?")
 }
 
-/// Adds the box of the program that alone publishes the type of a topic, with what else it publishes and subscribes.
+/// Adds the box of the only program that publishes the type of a topic, with its other publications and
+/// subscriptions.
 fn owned(known: &mut Conclusions<'_>, owners: &Owners, topic: Name) {
     let (text, kind) = (known.text(topic), known.kind(topic));
     let Some(owner) = owners.node(&kind, &text) else {
@@ -100,7 +102,7 @@ fn add(
     let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
         return;
     };
-    // It appears and vanishes with its topic, and is no evidence of the topic.
+    // It appears and vanishes with its topic, and is not evidence for the topic.
     let topics = || Validity::Like(ElementKey::Topic(topic));
     let life = if word == "unknown" {
         topics()

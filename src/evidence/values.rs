@@ -46,7 +46,7 @@ impl StatedValues {
         Ok(all)
     }
 
-    /// Adds a type that the user states. That something is a service adds nothing where its type is known.
+    /// Adds a type that the user states. The type of services is ignored if the actual type is known.
     pub(crate) fn state_type(&mut self, topic: Name, kind: &str) {
         let kinds = self.types.entry(topic).or_default();
         if kind != SERVICE || kinds.is_empty() {

@@ -55,7 +55,7 @@ fn column<'a>(from: &'a RecordBatch, name: &str, kind: ColumnKind) -> Result<&'a
     column.filter(is_right).ok_or_else(|| {
         Error::usage(
             format!("the table has no column `{name}` of the right type"),
-            "give what `tables` gave: texts, and numbers of 64 bits",
+            "pass tables as `tables` returned them: texts, and numbers of 64 bits",
         )
     })
 }

@@ -24,7 +24,10 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
             let what = if *other == *target {
                 format!("`{name}` is requested twice")
             } else {
-                format!("`{name}` and `{}` may be one file", other.path().display())
+                format!(
+                    "`{name}` and `{}` may be the same file",
+                    other.path().display()
+                )
             };
             return Err(Error::usage(what, "give every output its own name"));
         }
@@ -59,7 +62,7 @@ pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Res
     let Some(path) = clash else { return Ok(()) };
     let (folder, path) = (folder.display(), path.display());
     let what = format!("a table in `{folder}` might overwrite `{path}`, which is read");
-    Err(Error::usage(what, "name another folder"))
+    Err(Error::usage(what, "give another folder"))
 }
 
 /// The suffixes of a database and of its `SQLite` companion files.
@@ -115,13 +118,13 @@ fn check_place(target: &Target) -> Result<()> {
         })
     };
     if path.file_name().is_none() || path.is_dir() {
-        return refuse("it is a folder".to_owned(), "name a file in it");
+        return refuse("it is a folder".to_owned(), "give a file in it");
     }
     let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
     if Target::Path(path.clone()).is_numbered() && !is_text {
         return refuse(
             "`{n}` is in a name that is not UTF-8".to_owned(),
-            "give it a name in UTF-8, or leave `{n}` out",
+            "give it a name in UTF-8, or omit `{n}`",
         );
     }
     let folder = folder_of(path);
@@ -140,7 +143,7 @@ fn check_place(target: &Target) -> Result<()> {
     if !there.is_dir() {
         return refuse(
             format!("`{}` is not a folder", there.display()),
-            "name an existing folder, or one that can be created",
+            "give an existing folder, or one that can be created",
         );
     }
     if is_special(path) {
@@ -158,7 +161,7 @@ pub(crate) fn make_folder(target: &Target) -> Result<()> {
         Target::Stdout => Ok(()),
         Target::Path(path) => {
             let folder = folder_of(path);
-            fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))
+            fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))
         }
     }
 }

@@ -116,7 +116,7 @@ pub(crate) fn single<'a>(
                 "`{}` is one file for {windows} windows",
                 target.path().display()
             ),
-            "put `{n}` into the name for a file per window, or ask for a `--strip`",
+            "put `{n}` into the name for a file per window, or use `--strip`",
         )),
     }
 }
@@ -133,7 +133,7 @@ pub trait Encoder: Send {
         false
     }
 
-    /// The function that makes its packets, which [`Encoder::take`] receives in order.
+    /// The function that encodes its packets, which [`Encoder::take`] receives in order.
     fn pack(&self) -> Pack {
         |_| Ok(Packet::Nothing)
     }
@@ -266,7 +266,7 @@ pub enum OneDrawing {
 #[derive(Debug)]
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "a row of a table: each answers a question of its own"
+    reason = "a row of a table, whose flags are independent"
 )]
 pub struct OutputFormat {
     /// Its extension and its name for `--format`.

@@ -126,7 +126,7 @@ fn compressed(pixels: Vec<u8>) -> Vec<u8> {
     frame.buffer.into_owned()
 }
 
-/// A GIF in progress. A frame is held back until the next one differs, as its duration is only known then.
+/// A GIF in progress. A frame waits until the next one differs, since its duration is only known then.
 struct Animation<W: Write> {
     encoder: gif::Encoder<W>,
     clear: u8,

@@ -54,7 +54,7 @@ pub(crate) struct HtmlPage<'a> {
     pub folded: Option<PageGraph<'a>>,
     /// The style.
     pub style: &'a Style,
-    /// The style for readers who prefer dark pages; `None` for always the same.
+    /// The style for readers who prefer dark pages; `None` to use the same style always.
     pub dark: Option<&'a Style>,
     /// The title, such as the bag's name.
     pub title: &'a str,
@@ -159,7 +159,7 @@ impl HtmlPage<'_> {
         ]);
         let mut out = classes::variables(self.style) + &classes::rules(self.style, &words);
         if let Some(dark) = self.dark {
-            // Paper is white.
+            // Printed pages are white.
             let dark = classes::variables(dark) + &classes::rules(dark, &words);
             let _ = write!(
                 out,
@@ -240,8 +240,8 @@ impl HtmlPage<'_> {
         }
         xml.attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
             .attribute("role", "img")
-            .attribute("aria-label", "Graph; the search finds every element");
-        // If a host blocks styles, outlines remain.
+            .attribute("aria-label", "Graph; use the search to find any element");
+        // Outlines remain if a host blocks styles.
         let stroke = self.style.edge.stroke.to_string();
         let layer = |xml: &mut Xml, class: &str| {
             xml.open("g")
@@ -293,7 +293,7 @@ impl HtmlPage<'_> {
     }
 }
 
-/// The board of topics, for readers without scripts: the player draws it as its timeline.
+/// The timeline of topics, for readers without scripts: the player draws it as its timeline.
 fn board(overview: &Overview) -> String {
     let still = svg::write(&overview.scene);
     let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
@@ -307,7 +307,7 @@ fn board(overview: &Overview) -> String {
     )
 }
 
-/// An element as it is in one window.
+/// The state of an element in one window.
 struct Still<'a> {
     runs: &'a Runs,
     life: &'a ElementRuns,

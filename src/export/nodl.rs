@@ -1,8 +1,8 @@
 //! A folder with a document per node in the node definition language `NoDL` 2:
 //! <https://github.com/ros-tooling/nodl/tree/main/nodl_schema/nodl_schema/schemas>.
 //!
-//! The schema requires a type for every end and a quality of service for every topic: an end of unknown type is left out,
-//! an unknown quality of service is `SYSTEM_DEFAULT`.
+//! The schema requires a type for every endpoint and a quality of service for every topic: an endpoint of
+//! unknown type is omitted, an unknown quality of service is `SYSTEM_DEFAULT`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,8 +25,8 @@ use crate::mission::Mission;
 /// [`Error::Usage`] for both.
 pub(crate) fn check(target: &Target) -> Result<()> {
     if *target == Target::Stdout {
-        let what = "NoDL has a document per node, standard output is one";
-        return Err(Error::usage(what, "name a folder: `-o nodl/`"));
+        let what = "NoDL has a document per node, which does not fit on standard output";
+        return Err(Error::usage(what, "give a folder: `-o nodl/`"));
     }
     target.must_be_one("a document describes a node over the whole mission")
 }
@@ -52,14 +52,14 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         folder.commit()?;
         if untyped > 0 {
             let ends = words::count(untyped, "end");
-            let remark = format!("{ends} of unknown type left out, since NoDL needs the type");
+            let remark = format!("{ends} of unknown type omitted, since NoDL requires a type");
             written.remarks.push(remark);
         }
         Ok(written)
     }))
 }
 
-/// The lists of ends in a document, in its order.
+/// The lists of endpoints in a document, in its order.
 const LISTS: [&str; 6] = [
     "publishers",
     "subscriptions",
@@ -69,10 +69,10 @@ const LISTS: [&str; 6] = [
     "action_clients",
 ];
 
-/// Topics that every node has an end of.
+/// Topics for which every node has an endpoint.
 const FRAMEWORK: [&str; 3] = ["/rosout", "/rosout_agg", "/parameter_events"];
 
-/// The documents by the names of their nodes, and the number of ends that do not fit the schema.
+/// The documents by the names of their nodes, and the number of endpoints that do not fit the schema.
 fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>, usize) {
     let elements = &mission.elements;
     let confidences = mission.graphs.confidences(elements);
@@ -120,7 +120,8 @@ fn is_part(topic: &Topic) -> bool {
     FRAMEWORK.contains(&name) || name.contains("/_action/") && !name.ends_with("/_action/feedback")
 }
 
-/// The list that an end of a topic belongs to, and its entry; `None` for one that does not belong or does not fit.
+/// The list for an endpoint of a topic, and its entry; `None` if it belongs to no list or does not fit the
+/// schema.
 fn end(
     what: Element,
     topic: &Topic,
@@ -174,14 +175,14 @@ fn quality(offered: Option<&str>) -> String {
     format!("history: {history}, reliability: {reliability}{durability}")
 }
 
-/// Whether the schema takes the name of a topic, a service or an action.
+/// Whether the schema accepts the name of a topic, a service or an action.
 fn is_name(name: &str) -> bool {
     let is_inside = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '/');
     let rest = name.strip_prefix('/').unwrap_or_default();
     !rest.is_empty() && !rest.ends_with('/') && rest.chars().all(is_inside)
 }
 
-/// Whether the schema takes the type: `package/msg/Name` or `package/Name`.
+/// Whether the schema accepts the type: `package/msg/Name` or `package/Name`.
 fn is_type(kind: &str) -> bool {
     let parts: Vec<&str> = kind.split('/').collect();
     let ([package, own] | [package, "msg" | "srv" | "action", own]) = parts[..] else {

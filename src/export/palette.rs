@@ -28,7 +28,7 @@ impl Census {
     /// The sum of both histograms.
     #[must_use]
     pub(crate) fn and(mut self, other: Self) -> Self {
-        // Sums do not depend on the order of what is added.
+        // Sums do not depend on the order of addition.
         #[expect(clippy::iter_over_hash_type, reason = "the order does not matter")]
         for (colour, count) in other.0 {
             *self.0.entry(colour).or_default() += count;
@@ -63,7 +63,7 @@ fn fill(colours: &mut Vec<Rgb>, candidates: &[(Rgb, u64)], most: usize) {
         })
         .collect();
     while colours.len() < most {
-        // The first of equals wins, so that the choice is deterministic.
+        // Of equal ones the first is chosen, so that the result is deterministic.
         let mut best: Option<(f64, Rgb)> = None;
         for &(colour, weight, near) in &left {
             let score = f64::from(near) * weight;

@@ -23,7 +23,8 @@ use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn, Tex
 
 /// The most rows in a group, as in other writers.
 const MOST_ROWS: usize = 1 << 20;
-/// The number of bytes of values held in memory before their group is written: a million rows of the message table.
+/// The number of bytes of values kept in memory before their group is written: a million rows of the message
+/// table.
 const MOST_HELD: usize = 32 << 20;
 /// The number of values passed to the writer at once, so that temporary data stays in the cache.
 const AT_ONCE: usize = 1 << 14;
@@ -151,7 +152,7 @@ fn path(column: &TableColumn) -> Vec<&str> {
     }
 }
 
-/// The fields of a structure `depth` names deep that contains these columns.
+/// The fields of the structure, `depth` names deep, that contains these columns.
 fn fields(columns: &[PathOf<'_>], depth: usize) -> ParquetResult<Vec<TypePtr>> {
     let groups = columns.chunk_by(|(a, _), (b, _)| {
         a.get(depth) == b.get(depth) && a.len() > depth + 1 && b.len() > depth + 1
@@ -271,7 +272,7 @@ fn texts(texts: &TextColumn) -> impl Fn(usize) -> ByteArray {
     }
 }
 
-/// Writes the first `rows` rows of a column, the value at each place being `value`.
+/// Writes the first `rows` rows of a column; `value` returns the value at an index.
 fn values<T: DataType>(
     to: &mut SerializedColumnWriter<'_>,
     column: &TableColumn,

@@ -53,7 +53,7 @@ impl Book<'_> {
 
     fn add(&self, scene: Scene, entry: String) -> Result<()> {
         let sent = self.sheets.send(PdfPage { scene, entry });
-        sent.map_err(|_| self.failed("the document broke off".to_owned()))
+        sent.map_err(|_| self.failed("the document ended early".to_owned()))
     }
 
     /// The time of a window and its first change.
@@ -89,7 +89,7 @@ impl Encoder for Book<'_> {
         if let Some(scene) = self.strip {
             self.add(scene.clone(), scene.title.clone())?;
         }
-        let refused = self.failed("the document is not sound".to_owned());
+        let refused = self.failed("the document is not valid".to_owned());
         let Self {
             target,
             sheets,

@@ -103,7 +103,7 @@ fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
         .count();
     let lengths = words::period(first.span.nanos());
     format!(
-        "**{}**: {said}.\n\n{} from {}, looked at in {} of {lengths}{}.",
+        "**{}**: {said}.\n\n{} from {}, in {} of {lengths}{}.",
         plain(&title),
         words::duration(last.span.end.since(first.span.start)),
         words::date_and_clock(first.span.start.0),
@@ -111,7 +111,7 @@ fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
         if changed == 0 {
             String::new()
         } else {
-            format!(", of which {changed} changed something")
+            format!(", {changed} of them with changes")
         },
     )
 }
@@ -133,7 +133,7 @@ fn headline_counts(counts: &Counts) -> Vec<String> {
         (counts.nodes_added, "node", " started"),
         (counts.nodes_removed, "node", " stopped"),
         (counts.restarted, "node", " restarted"),
-        (counts.handed_over, "topic", " changed hands"),
+        (counts.handed_over, "topic", " handed over"),
         (counts.silent, "silence", ""),
         (counts.topics_added, "topic", " appeared"),
         (counts.topics_removed, "topic", " vanished"),
@@ -158,10 +158,10 @@ fn chart(view: &View) -> String {
     };
     let chart = mermaid::chart(view, &style, &seen);
     if chart.len() > MOST_CHART {
-        return "The graph of what changed is too large for Markdown.\n\n".to_owned();
+        return "The graph of the changes is too large for Markdown.\n\n".to_owned();
     }
     let mut out = format!("```mermaid\n{}\n```\n\n", chart.trim_end());
-    out += "Solid green is there at the end and was not at first, dashed orange the other way round; purple changed in between.\n";
+    out += "Solid green: present only at the end. Dashed orange: present only at the start. Purple: changed in between.\n";
     if left_out > 0 {
         let _ = writeln!(
             out,
@@ -171,9 +171,9 @@ fn chart(view: &View) -> String {
     }
     let edges = words::count(seen.arrows.len(), "edge");
     if seen.arrows.len() > MOST_EDGES_OPEN {
-        return tables::folded(&format!("What changed, drawn ({edges})"), &out);
+        return tables::folded(&format!("Graph of the changes ({edges})"), &out);
     }
-    format!("What changed, and what it is connected to:\n\n{out}\n")
+    format!("Changed elements and their neighbours:\n\n{out}\n")
 }
 
 fn notices(notices: &Notices) -> String {

@@ -32,7 +32,7 @@ enum SinkTarget {
     Nameless(File),
     /// A file with a temporary name beside the final one.
     Named(NamedTempFile, Leftover),
-    /// Bytes held back until they are known to be within the limit.
+    /// Bytes not yet written, until they are known to be within the limit.
     Memory(Vec<u8>),
 }
 

@@ -143,7 +143,7 @@ fn encoded(kind: StillKind, pixels: &Pixels) -> Result<Vec<u8>> {
     let (width, height, color) = (pixels.width, pixels.height, ExtendedColorType::Rgb8);
     let mut out = Vec::new();
     match kind {
-        // Ten times as fast as the default, for a quarter more bytes. Nothing asks for the pixels of an SVG.
+        // Ten times as fast as the default, for a quarter more bytes. Pixels are never requested of an SVG.
         StillKind::Png | StillKind::Svg => {
             PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
                 .write_image(&rgb, width, height, color)

@@ -33,7 +33,7 @@ pub(crate) fn check(target: &Target) -> Result<()> {
     };
     Err(Error::usage(
         format!("the tables are several files, {what}"),
-        "name a file: `-o x.csv` writes `x.edges.csv` and others",
+        "give a file: `-o x.csv` writes `x.edges.csv` and others",
     ))
 }
 

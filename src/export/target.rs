@@ -48,8 +48,8 @@ impl Target {
         if !self.is_numbered() {
             return Ok(());
         }
-        let what = format!("`{}` asks for a file per window", self.path().display());
-        Err(Error::usage(what, format!("{reason}: leave `{{n}}` out")))
+        let what = format!("`{}` requests a file per window", self.path().display());
+        Err(Error::usage(what, format!("{reason}: omit `{{n}}`")))
     }
 
     /// The file of window `index`, zero-padded so that the names of all `windows` sort in their order.

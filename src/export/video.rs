@@ -166,7 +166,7 @@ impl Video<'_> {
         let last = messages.lines().rev().find(|l| !l.trim().is_empty());
         self.failed(format!(
             "ffmpeg failed: {}",
-            last.unwrap_or("it gave no reason")
+            last.unwrap_or("it printed no reason")
         ))
     }
 }
@@ -219,7 +219,7 @@ impl Encoder for Video<'_> {
             return Err(self.complaint(&mut work));
         }
         if work.sink.is_empty_file().map_err(work.sink.error())? {
-            return Err(self.failed("ffmpeg ended without an error and wrote nothing".to_owned()));
+            return Err(self.failed("ffmpeg reported success but wrote nothing".to_owned()));
         }
         written.add(work.sink.commit()?);
         Ok(written)

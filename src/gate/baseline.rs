@@ -41,14 +41,14 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     };
     let nodes = draft.nodes.iter().map(|(name, line)| (name, line.text()));
     let nodes = room.section("nodes", nodes);
-    // Elements that did not fit are not unexpected.
+    // Elements that were left out must not be reported as unexpected.
     let others = if room.left_out == 0 { "warn" } else { "allow" };
     let topics = draft.topics.iter();
     let topics = topics.map(|(name, line)| (name, line.text() + &line.comment));
     let topics = room.section("topics", topics);
     let note = match room.left_out {
         0 => String::new(),
-        n => format!("# {} found no room.\n", words::count(n, "more name")),
+        n => format!("# {} did not fit.\n", words::count(n, "more name")),
     };
     let (from, period) = (scalar(from), length(period.nanos()));
     let text = format!(
@@ -193,7 +193,7 @@ mod tests {
         let (large, kept) = of(1 << 17, &[]);
         assert!(kept > 20_000 && large.left_out + kept == 1 << 17, "{kept}");
         assert!(large.text.contains("unexpected_nodes: allow"));
-        assert!(large.text.contains(" more names found no room.\n"));
+        assert!(large.text.contains(" more names did not fit.\n"));
     }
 
     #[test]

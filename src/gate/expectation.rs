@@ -82,7 +82,7 @@ pub(crate) enum Unlisted {
     Error,
 }
 
-/// The facts that can be expected of a node.
+/// The facts that can be expected about a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeFacts {
     /// Whether it must be absent.
@@ -100,7 +100,7 @@ pub(crate) struct NodeFacts {
     pub(crate) within: Option<At<During>>,
 }
 
-/// The facts that can be expected of a topic.
+/// The facts that can be expected about a topic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TopicFacts {
     pub(crate) forbidden: bool,
@@ -162,7 +162,7 @@ pub(crate) struct Rule {
     pub(crate) demand: Demand,
 }
 
-/// The demand of a rule.
+/// The condition that a rule checks.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Demand {
     /// Facts of each of these nodes.

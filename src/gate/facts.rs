@@ -75,7 +75,7 @@ impl<'a> Facts<'a> {
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
         let mut names = BTreeMap::new();
         for (id, node) in (0..).zip(&elements.nodes) {
-            // What never was in a window lies outside the part that is judged.
+            // Elements in no window are outside the part that is checked.
             if is_there(id) && is_seen(node.evidence) {
                 roles.entry(&node.role).or_default().push(id);
                 names.insert(node.name.as_str(), &*node.role);
@@ -236,9 +236,10 @@ impl<'a> Facts<'a> {
         self.is_rewritten
     }
 
-    /// Whether the bag names nodes reliably, so that an unnamed one is absent; `lost` expected nodes are unnamed.
-    /// Rewritten bags do not: publishers are merged, or only a log is left, to which most nodes never write. ROS 2 bags
-    /// name nodes that start during the recording: if more are missing than named, they ran before the recorder.
+    /// Whether the bag names nodes reliably, so that an unnamed one is absent; `lost` expected nodes are
+    /// unnamed. Rewritten bags do not: publishers are merged, or only a log remains, to which most nodes
+    /// never write. ROS 2 bags name nodes that start during the recording: if more are missing than named,
+    /// they ran before the recorder.
     pub(crate) fn names_nodes(&self, lost: usize) -> bool {
         let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
         let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
@@ -388,18 +389,18 @@ impl<'a> Facts<'a> {
         !sends && !nodes.iter().any(is_listed)
     }
 
-    /// A moment of the mission as text for people.
+    /// A point in time of the mission as text for people.
     pub(crate) fn clock(&self, at: Stamp) -> String {
         words::offset_seconds(self.mission.offset(at))
     }
 
-    /// A stretch of the mission as text for people.
+    /// A time range of the mission as text for people.
     pub(crate) fn stretch(&self, span: Span) -> String {
         format!("{}–{}", self.clock(span.start), self.clock(span.end))
     }
 }
 
-/// The edges of each topic, but for those of nodes that nothing names.
+/// The edges of each topic, except those of unnamed nodes.
 fn by_topic(edges: &[Edge], topics: usize) -> Vec<Vec<u32>> {
     let mut all = vec![Vec::new(); topics];
     for (id, edge) in (0..).zip(edges) {

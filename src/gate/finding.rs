@@ -40,18 +40,16 @@ kinds! {
          first sign.";
     NodeGone "node-gone":
         "A node ended before the mission did.",
-        "An expected node is expected to stay. Its end is inferred from a rhythm that broke for good, or stated by a \
-         log or snapshot; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go, \
-         `may_end: 1:30..` from then on.";
+        "An expected node is expected to stay. Its end is inferred from regular messages that stopped for good, or stated by a log or snapshot; the last 5 s, in which robots are shut down, do not count. `may_end: true` permits an end at any time, `may_end: 1:30..` from then on.";
     NodeRestarted "node-restarted":
         "A node restarted more or less often than allowed.",
-        "`restarts: ..0`. A restart is proved by sequence numbers, a new process, or a new anonymous name of one role.";
+        "`restarts: ..0`. A restart is detected by sequence numbers, a new process, or a new anonymous name of the same role.";
     NodeLifecycle "node-lifecycle":
         "A node is in another lifecycle state at the end.",
         "`lifecycle: active`. Undecidable without the node's transition events.";
     TopicMissing "topic-missing":
         "An expected topic is not in the bag.",
-        "A topic is there if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
+        "A topic is present if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
          messages. `optional: true` requires nothing.";
     TopicForbidden "topic-forbidden":
         "A forbidden topic is in the bag.",
@@ -76,8 +74,7 @@ kinds! {
         "`max_gap: 0.5s` applies between any two messages, and from the last one to the end of the mission unless it `may_end`.";
     TopicLate "topic-late":
         "A topic's first message came later, or earlier, than it should have.",
-        "`within: 40s..1:10` counts from the first message of the bag. What comes within 2.5 s of the recorder's start is \
-         never early: it may have been there before.";
+        "`within: 40s..1:10` counts from the first message of the bag. A message within 2.5 s of the recorder's start is never early: there may have been others before.";
     TopicGone "topic-gone":
         "A topic ended too early.",
         "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.";
@@ -96,7 +93,7 @@ kinds! {
         "`by: [/a, /b]`. Undecidable where the publishers of the topic are unknown.";
     PublisherUnexpected "publisher-unexpected":
         "A topic has a publisher that is not listed.",
-        "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` makes it milder. Only publishers that are \
+        "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` turns it into a warning. Only publishers that are \
          measured or stated count.";
     SubscriberMissing "subscriber-missing":
         "A node does not subscribe to an expected topic.",
@@ -107,8 +104,7 @@ kinds! {
         "`appear_in_order: [/a, /b]`. Undecidable where the uncertain times overlap.";
     ReactionMissing "reaction-missing":
         "An expected reaction did not happen.",
-        "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
-         must follow; times count as uncertain as they are known.";
+        "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second must follow; the uncertainty of both times is taken into account.";
     TooManyChanges "too-many-changes":
         "There were more, or fewer, reconfigurations than allowed.",
         "`during: -30s.., changes: ..0` counts the events that `bagreel events` prints.";
@@ -119,7 +115,7 @@ kinds! {
         "A topic in the bag is not in the file.",
         "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.";
     Starved "starved":
-        "A subscriber gets nothing because it requests a higher quality of service than is offered.",
+        "A subscriber receives nothing because it requests a higher quality of service than is offered.",
         "A warning wherever a log or `/rosgraph` reports it; `policy: {starved: error}` or `allow`.";
     DuplicateName "duplicate-name":
         "Two nodes have the same name.",

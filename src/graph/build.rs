@@ -1,5 +1,5 @@
-//! Graphs from findings: the elements of the mission with their lives, once; then for each window the states and rates
-//! of all elements.
+//! Graphs from findings: the elements of the mission with their lifetimes, once; then for each window the
+//! states and rates of all elements.
 
 pub(crate) mod assemble;
 pub(crate) mod history;
@@ -39,13 +39,13 @@ pub struct Built {
     pub graphs: Vec<Graph>,
     /// The number of messages of each window.
     pub messages: Vec<u64>,
-    /// The lives of each element.
+    /// The lifetimes of each element.
     pub lives: PerElement<Vec<Life>>,
     /// The messages of every sender.
     pub sending: Sending,
     /// Notices about the user's files.
     pub notices: Notices,
-    /// Every piece of evidence that was asked for.
+    /// Every requested piece of evidence.
     pub lines: Vec<EvidenceLine>,
 }
 

@@ -15,30 +15,30 @@ use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicS
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Change {
-    /// An element that was not in the window before.
+    /// An element that was not in the previous window.
     Added {
         /// The element.
         what: Element,
-        /// The time of its first sign of life in the window, if known.
+        /// The time of its first sign in the window, if known.
         time: Option<Stamp>,
     },
-    /// An element that was in the window before and is not in this one.
+    /// An element that was in the previous window and is not in this one.
     Removed {
         /// The element.
         what: Element,
-        /// The time of its last sign of life, if known.
+        /// The time of its last sign, if known.
         time: Option<Stamp>,
     },
     /// The rate of a topic or publication changed by more than the threshold.
     Rate {
         /// The topic or publication.
         what: Element,
-        /// Messages per second in the window before.
+        /// Messages per second in the previous window.
         from_hz: f64,
         /// Messages per second in this window.
         to_hz: f64,
     },
-    /// A topic lost all its publishers and got others.
+    /// All publishers of a topic were replaced by others.
     HandedOver {
         /// The topic.
         topic: TopicId,
@@ -108,7 +108,7 @@ pub struct Diff {
 }
 
 impl Diff {
-    /// The elements that are new.
+    /// The new elements.
     pub(crate) fn added(&self) -> impl Iterator<Item = Element> {
         let nodes = self.nodes.added.iter().map(|s| Element::Node(s.id));
         let topics = self.topics.added.iter().map(|s| Element::Topic(s.id));
@@ -118,7 +118,7 @@ impl Diff {
         nodes.chain(topics).chain(publishes).chain(subscribes)
     }
 
-    /// The elements that are no longer there.
+    /// The removed elements.
     pub(crate) fn removed(&self) -> impl Iterator<Item = Element> {
         let lists = [
             &self.nodes.removed,
@@ -138,7 +138,7 @@ pub struct Delta<T> {
     pub added: Vec<T>,
     /// Ids of removed elements.
     pub removed: Vec<u32>,
-    /// States before and after of elements that differ in anything.
+    /// States before and after of elements that differ.
     pub changed: Vec<(T, T)>,
 }
 
@@ -179,7 +179,7 @@ pub fn apply(before: &Graph, diff: &Diff) -> Graph {
     }
 }
 
-/// An element state with a place in the mission's list of elements.
+/// An element state with an index in the mission's list of elements.
 trait HasId {
     fn place(&self) -> u32;
 }

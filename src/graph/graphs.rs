@@ -1,5 +1,5 @@
-//! The graphs of all windows in little memory: per element the windows in which it stays the same, and differences
-//! where it does not. Memory grows with the changes, not with the number of windows.
+//! The graphs of all windows in little memory: per element the windows in which it is unchanged, and
+//! differences elsewhere. Memory grows with the changes, not with the number of windows.
 
 mod column;
 mod row;
@@ -20,9 +20,9 @@ use crate::evidence::Confidence;
 pub struct Graphs {
     /// The times of the windows.
     spans: Vec<Span>,
-    /// The lifecycle states that occur; rows refer to them by place, counted from 1.
+    /// The lifecycle states that occur; rows refer to them by number, counted from 1.
     lifecycles: Vec<Arc<str>>,
-    /// The rows of each element; those behind the last one of a kind that ever exists may be left out.
+    /// The rows of each element; those after the last existing one of a kind may be left out.
     columns: PerElement<Column>,
 }
 
@@ -42,7 +42,7 @@ impl Graphs {
         &self.spans
     }
 
-    /// The graphs in order, each built when it is needed.
+    /// The graphs in order, each built on demand.
     pub fn iter(&self) -> Iter<'_> {
         let columns = self.columns.0.each_ref();
         Iter {
@@ -52,12 +52,12 @@ impl Graphs {
         }
     }
 
-    /// The graph of one window, found by going through those before it: for many, take [`Self::iter`].
+    /// The graph of one window, computed from all previous ones: for many, use [`Self::iter`].
     pub fn get(&self, window: usize) -> Option<Graph> {
         self.iter().nth(window)
     }
 
-    /// The rows of an element in the windows in which it exists, in order, with the places of the windows.
+    /// The rows of an element in the windows in which it exists, in order, with the indices of the windows.
     pub(crate) fn rows(&self, what: Element) -> impl Iterator<Item = (usize, Row)> + '_ {
         let mut cursor = self.columns.of(what).map(Column::cursor);
         let row = move |at| {
@@ -86,12 +86,12 @@ impl Graphs {
         self.lifecycles.get(place).map(Arc::clone)
     }
 
-    /// A walk through all windows that yields only differences from the window before.
+    /// A walk through all windows that yields only differences from the previous one.
     pub(crate) fn walk(&self) -> ColumnWalk<'_> {
         ColumnWalk::new(&self.columns.0)
     }
 
-    /// The lifecycle state at a place, counted from 1.
+    /// The lifecycle state of this number, counted from 1.
     pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&str> {
         let place = (place as usize).checked_sub(1);
         place
@@ -159,7 +159,7 @@ impl<'a> IntoIterator for &'a Graphs {
 
 /// The states of the elements in the next window, by id.
 fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
-    // Room for all at once: growing would take half as much again.
+    // Reserved at once: growing would take half as much again.
     let mut states = Vec::with_capacity(cursors.len());
     let rows = (0..).zip(cursors);
     states.extend(rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?))));
@@ -183,7 +183,7 @@ impl GraphsWriter {
         }
     }
 
-    /// Adds the state of a node in the window at a place.
+    /// Adds the state of a node in the window with an index.
     pub(crate) fn node(&mut self, at: usize, state: &NodeState) {
         let lifecycle = state
             .lifecycle
@@ -204,7 +204,7 @@ impl GraphsWriter {
         self.row(what, at, Row::of_edge(state, self.spans[at]));
     }
 
-    /// Adds the row of an element in the window at a place.
+    /// Adds the row of an element in the window with an index.
     pub(crate) fn row(&mut self, what: Element, at: usize, row: Row) {
         let (kind, id) = what.place();
         let columns = &mut self.columns.0[kind];
@@ -219,7 +219,7 @@ impl GraphsWriter {
         place(&mut self.lifecycles, word)
     }
 
-    /// Adds all states of the window at a place.
+    /// Adds all states of the window with an index.
     pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
         graph.nodes.iter().for_each(|state| self.node(at, state));
         graph.topics.iter().for_each(|state| self.topic(at, state));
@@ -231,9 +231,9 @@ impl GraphsWriter {
         }
     }
 
-    /// Ends the writing.
+    /// The finished graphs.
     pub(crate) fn finish(self) -> Graphs {
-        // Not collected from the iterator, which would keep the room of the writers.
+        // Not collected from the iterator, which would keep the memory of the writers.
         let columns = |writers: Vec<ColumnWriter>| {
             let mut columns = Vec::with_capacity(writers.len());
             columns.extend(writers.into_iter().map(ColumnWriter::finish));
@@ -247,7 +247,7 @@ impl GraphsWriter {
     }
 }
 
-/// The place of a word in a short list, counted from 1; adds it if it is new.
+/// The number of a word in a short list, counted from 1; adds it if it is new.
 fn place(words: &mut Vec<Arc<str>>, word: &Arc<str>) -> u32 {
     let found = words.iter().position(|w| w == word).unwrap_or_else(|| {
         words.push(Arc::clone(word));

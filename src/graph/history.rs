@@ -1,8 +1,8 @@
-//! A mission in continuous time: the lives of each element with their uncertainty, and the messages of every sender as
-//! stretches of one rate.
+//! A mission in continuous time: the lifetimes of each element with their uncertainty, and the messages of
+//! every sender as stretches of one rate.
 //!
-//! Made once, from observations and stamps; windows, events, phases and figures are readings of it. Nothing here depends on
-//! windows.
+//! Made once, from observations and stamps; windows, events, phases and figures are derived from it. Nothing
+//! here depends on windows.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -15,7 +15,7 @@ use crate::base::time::{Span, Stamp};
 /// A moment with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bound {
-    /// The time of the sign that shows it.
+    /// The time of the sign on which it is based.
     pub time: Stamp,
     /// The earliest possible time.
     pub earliest: Stamp,
@@ -23,7 +23,7 @@ pub struct Bound {
     pub latest: Stamp,
 }
 
-/// One life of an element.
+/// One lifetime of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Life {
     /// The interval in which it exists, half-open.
@@ -47,7 +47,7 @@ pub struct Stretch {
     pub period: i64,
     /// Whether the messages come at even intervals.
     pub is_even: bool,
-    /// Whether the stretch before it ends where this one begins: a change of rate, not a gap.
+    /// Whether the previous stretch ends where this one begins: a change of rate, not a gap.
     pub is_joined: bool,
 }
 
@@ -60,7 +60,7 @@ impl Stretch {
         }
         let mean = nanos as f64 / (self.count - 1).max(1) as f64;
         let median = self.period as f64;
-        // A few lost messages do not make a rate slower; messages in pairs have no middle.
+        // The median is not affected by a few lost messages, but it is meaningless for messages in pairs.
         let period = if self.is_even { median } else { mean };
         1e9 / period.max(1.0)
     }
@@ -72,11 +72,11 @@ impl Stretch {
 pub struct Sender {
     /// The topic.
     pub topic: TopicId,
-    /// The node that sent; `None` for all unknown senders together.
+    /// The publishing node; `None` for all unknown senders together.
     pub node: Option<NodeId>,
     /// Whether its last message is latched.
     pub is_latched: bool,
-    /// The stretches of even sending, in order, none overlapping.
+    /// The stretches of even messages, in order, without overlaps.
     pub stretches: Vec<Stretch>,
 }
 
@@ -102,8 +102,8 @@ impl Sender {
 pub struct Sending {
     /// The messages of every sender, sorted by topic and node.
     pub senders: Vec<Sender>,
-    /// The longest pauses per topic, by id, at most 32, in order: each from one message to the next. Empty where single
-    /// messages are not known.
+    /// The longest pauses per topic, by id, at most 32, in order: each from one message to the next. Empty if
+    /// single messages are unknown.
     pub pauses: Vec<Vec<Span>>,
 }
 
@@ -115,14 +115,15 @@ impl Sending {
         &self.senders[from..to]
     }
 
-    /// The messages of a publication, if they are known apart from others'.
+    /// The messages of a publication, if they can be distinguished from those of others.
     pub(crate) fn of_edge(&self, node: NodeId, topic: TopicId) -> Option<&Sender> {
         let of = self.of_topic(topic);
         let at = of.binary_search_by_key(&Some(node), |s| s.node).ok()?;
         of.get(at)
     }
 
-    /// The sending of a mission with known windows only: in each window with messages a stretch of its rate.
+    /// The messages of a mission with known windows only: in each window with messages, a stretch of its
+    /// rate.
     pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
         let mut published: BTreeMap<TopicId, Vec<(EdgeId, NodeId)>> = BTreeMap::new();
         for (id, edge) in (0..).zip(&elements.publishes) {
@@ -166,8 +167,8 @@ impl Sending {
     }
 }
 
-/// The stretches of a sender by the number of its messages in each window: windows in a row with about the same rate
-/// are one.
+/// The stretches of a sender by the number of its messages in each window: consecutive windows with about the
+/// same rate are one.
 fn stretches_of_windows(counts: &[u64], spans: &[Span]) -> Vec<Stretch> {
     let mut all: Vec<Stretch> = Vec::new();
     let mut before = 0;
@@ -197,7 +198,8 @@ fn stretches_of_windows(counts: &[u64], spans: &[Span]) -> Vec<Stretch> {
     all
 }
 
-/// Whether a sender begins with a rhythm, so that there were no messages before: even ones, or many without a gap.
+/// Whether a sender begins with a rhythm, so that there were no messages before: even messages, or many
+/// without a gap.
 pub(crate) fn begins_steadily(stretches: &[Stretch]) -> bool {
     let Some((first, rest)) = stretches.split_first() else {
         return false;
@@ -219,8 +221,8 @@ pub(crate) struct Transition {
     pub(crate) state: Arc<str>,
 }
 
-/// The silences of a sender with a rhythm while it lived (`lives`, half-open): from the last message to the next, or
-/// `None` for no other. A sender of bursts is never silent.
+/// The silences of a sender with a rhythm during its lifetimes (`lives`, half-open): from the last message to
+/// the next, or `None` if there is none. A sender of bursts is never silent.
 pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found = Vec::new();
     for life in lives {
@@ -249,7 +251,7 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
     found
 }
 
-/// The times at which all of several senders are silent, if at least one has a rhythm that broke.
+/// The times at which all of several senders are silent, if at least one has a rhythm that stopped.
 pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for sender in senders {
@@ -258,7 +260,7 @@ pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, 
     found.sort_unstable();
     let mut all: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for (from, to) in found {
-        // From the last message of any of them to the first of any.
+        // From the last message of any of them to the next of any.
         let sends = |s: &&Stretch| s.last > from && to.is_none_or(|to| s.first < to);
         let others = || senders.iter().flat_map(|s| s.iter()).filter(sends);
         if others().next().is_none()
@@ -272,8 +274,8 @@ pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, 
     all
 }
 
-/// The most pauses that are kept of each topic: any part of the mission contains one of them, or none that is longer
-/// than those within windows.
+/// The most pauses that are kept for each topic; any part of the mission contains one of them, or no pause
+/// longer than those within windows.
 const PAUSES: usize = 32;
 
 /// The longest pauses of one sequence of messages, collected message by message.

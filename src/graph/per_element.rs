@@ -57,7 +57,7 @@ impl<T> PerElement<T> {
         self.0.iter_mut().flatten()
     }
 
-    /// Makes room for exactly so many more values of each kind.
+    /// Reserves space for exactly this many more values of each kind.
     pub(crate) fn reserve_exact(&mut self, many: [usize; 4]) {
         for (list, many) in self.0.iter_mut().zip(many) {
             list.reserve_exact(many);

@@ -68,11 +68,11 @@ pub struct Division {
     pub end: Option<Moment>,
     /// The alignment of windows.
     pub align: Align,
-    /// Windows from one turn of the mission to the next, instead of equal ones.
+    /// Windows from one phase or reconfiguration to the next, instead of equal ones.
     pub cut: Option<Cut>,
 }
 
-/// The places where windows of unequal length begin.
+/// The points at which windows of unequal length begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
     /// With each phase.
@@ -81,7 +81,8 @@ pub enum Cut {
     Changes,
 }
 
-/// The windows of a mission: all as long as the period, a step apart, except those cut off by its ends.
+/// The windows of a mission: all as long as the period, a step apart, except those cut off by the mission's
+/// ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Windows {
     /// The divided time.
@@ -95,16 +96,15 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Whether the window at this place, counted from 0, is shorter than the period.
+    /// Whether the window with this index, counted from 0, is shorter than the period.
     pub fn partial(&self, index: usize) -> bool {
         self.spans[index].nanos() < self.period.nanos()
     }
 }
 
-/// The part of `bag` that a division asks for.
+/// The part of `bag` that a division requests.
 ///
-/// # Errors
-/// [`Error::Usage`] where nothing of the bag lies inside.
+/// # Errors [`Error::Usage`] if it contains nothing of the bag.
 pub fn range(division: &Division, bag: Span) -> Result<Span> {
     let start = division
         .start
@@ -237,7 +237,7 @@ fn too_many(many: i64, nanos: i64) -> Error {
     let enough = enough.unwrap_or_else(|| count(nanos, budget::WINDOWS));
     Error::usage(
         format!("{many} windows are more than {}", budget::WINDOWS),
-        format!("`--period {}` would do", plain(enough)),
+        format!("use `--period {}`", plain(enough)),
     )
 }
 
@@ -339,7 +339,7 @@ mod tests {
     fn too_many_windows_suggest_a_period() {
         let error = divide(&every("1ms"), secs(0, 3600)).unwrap_err();
         assert!(error.is_usage());
-        assert_eq!(error.hint(), "`--period 100ms` would do");
+        assert_eq!(error.hint(), "use `--period 100ms`");
         assert!(divide(&every("100ms"), secs(0, 3600)).is_ok());
     }
 

@@ -1,4 +1,4 @@
-//! The fallback for graphs too large for layers: boxes packed by namespace, edges as straight as they can be.
+//! The fallback for graphs too large for layers: boxes packed by namespace, edges as straight as possible.
 
 use super::pack::pack;
 use super::routes::around;
@@ -8,10 +8,11 @@ use crate::base::geometry::{Point, Rect, Size};
 const GAP: f64 = 14.0;
 const PADDING: f64 = 8.0;
 
-/// The layout with all boxes packed, clusters around their members; it uses its siblings that pack and route.
+/// The layout with all boxes packed, clusters around their members; it uses the sibling modules for packing
+/// and routing.
 pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let (n, k) = (plan.vertices.len(), plan.clusters.len());
-    // Places `n..` are clusters; the last group contains what is in none.
+    // Indices `n..` are clusters; the last group contains vertices in none.
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); k + 1];
     for (v, vertex) in plan.vertices.iter().enumerate() {
         members[vertex.cluster.unwrap_or(k)].push(v);
@@ -61,7 +62,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     }
 }
 
-/// Packs some members and notes their corners; returns the size of the whole.
+/// Packs some members and records their corners; returns the total size.
 fn packed(members: &[usize], sizes: &[Size], page: Size, corners: &mut [Point]) -> Size {
     let own: Vec<Size> = members.iter().map(|&member| sizes[member]).collect();
     let (places, whole) = pack(&own, page, GAP);

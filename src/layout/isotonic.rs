@@ -1,12 +1,12 @@
-//! Growing sequences: the one nearest to goals that are out of order.
+//! Isotonic regression: the non-decreasing sequence nearest to given goals.
 
-/// Finds growing sequences by pooling adjacent violators; it keeps its room from one to the next.
+/// Finds non-decreasing sequences by pooling adjacent violators; it keeps its memory from one to the next.
 #[derive(Default)]
 pub(crate) struct Monotone {
     pools: Vec<Pool>,
 }
 
-/// Neighbours that share a place.
+/// Neighbours at the same position.
 struct Pool {
     sum: f64,
     weight: f64,
@@ -27,7 +27,7 @@ impl Pool {
 }
 
 impl Monotone {
-    /// Takes new goals, each with its weight.
+    /// Sets new goals, each with its weight.
     pub(crate) fn pool(&mut self, goals: impl Iterator<Item = (f64, f64)>) -> &Self {
         self.pools.clear();
         for (goal, weight) in goals {
@@ -44,7 +44,7 @@ impl Monotone {
         self
     }
 
-    /// The growing sequence nearest to the goals in weighted squares.
+    /// The non-decreasing sequence nearest to the goals in weighted squares.
     pub(crate) fn nearest(&self) -> impl Iterator<Item = f64> {
         self.pools
             .iter()

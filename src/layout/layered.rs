@@ -1,6 +1,6 @@
-//! The layered engine, step by step: parts, cycles, ranks, layers, order, places, routes, packing.
+//! The layered engine, step by step: parts, cycles, ranks, layers, order, positions, routes, packing.
 //!
-//! It calls the other files of this folder one after the other, so it alone uses its siblings.
+//! It alone calls the other files of this folder, one after the other.
 
 pub(crate) mod acyclic;
 pub(crate) mod crossings;
@@ -26,14 +26,14 @@ use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
 use order::Search;
 
-/// The room between parts.
+/// The space between parts.
 const PART_GAP: f64 = 20.0;
 /// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
 /// small.
 const MANY: usize = 300;
 /// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;
-/// The number of edges that the search for good orders may sweep, over all parts.
+/// The number of edges that the search for good orders may sweep, in all parts together.
 const EFFORT: usize = 120_000;
 
 /// The default engine.
@@ -45,7 +45,7 @@ impl Engine for Layered {
     }
 }
 
-/// The layered layout of a sane plan.
+/// The layered layout of a valid plan.
 pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let Some(draft) = Draft::new(plan, options) else {
         let mut layout = grid::lay_out(plan, options);
@@ -66,7 +66,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     best
 }
 
-/// The share of the labels that found room, from 0 to 1.
+/// The share of the labels that could be placed, from 0 to 1.
 fn labelled(plan: &Plan, layout: &Layout) -> f64 {
     let wanted = plan
         .links
@@ -92,7 +92,7 @@ struct Draft {
 }
 
 impl Draft {
-    /// The draft of a sane plan; `None` if a part is too large for layers.
+    /// The draft of a valid plan; `None` if a part is too large for layers.
     fn new(plan: &Plan, options: &LayoutOptions) -> Option<Self> {
         let parts = parts::parts(plan);
         let ways = parts.iter().map(|part| orderings(plan, part, options));
@@ -101,7 +101,7 @@ impl Draft {
         is_whole.then_some(Self { parts, orderings })
     }
 
-    /// Every part in its best way, packed on the page; and the number of crossings.
+    /// The best layout of every part, packed on the page; and the number of crossings.
     fn assembled(
         &self,
         plan: &Plan,
@@ -123,7 +123,8 @@ struct Ordering {
     crossings: u64,
 }
 
-/// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
+/// The drafts of a part, none if it is too large: every way of ranking, with long edges routed outside and
+/// inside of clusters.
 fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Ordering> {
     let mut ways = rankings(part, options);
     if plan.is_labelled {
@@ -162,8 +163,8 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     both.filter_map(ordering).collect()
 }
 
-/// The share of the best hope below which an order is not searched to the end. Of 392 plans, with and without searching all
-/// of them, ten came out otherwise, five of them better.
+/// The share of the best possible quality below which the search for an order is abandoned. Compared with
+/// complete searches, this changed 10 of 392 plans, 5 of them for the better.
 const PROMISING: f64 = 0.8;
 
 /// Whether each search may lead to the best drawing in one of the orientations, by the order that it found first.
@@ -202,7 +203,7 @@ fn orientations(options: &LayoutOptions) -> impl Iterator<Item = Orientation> {
         .filter(move |o| wished.is_none_or(|wished| wished == *o))
 }
 
-/// The most that the quality of a part with this order may be.
+/// The upper bound of the quality of a part with this order.
 fn hope(
     plan: &Plan,
     options: &LayoutOptions,
@@ -262,13 +263,13 @@ pub(crate) struct PlacedPart {
 /// worse, as much as one that is a twentieth smaller.
 const LENGTH: f64 = 0.12;
 
-/// The weight of the crossings: a drawing in which every edge crosses another is a third worse, or a tenth if it shall
-/// above all fill the page.
+/// The weight of the crossings: a drawing in which every edge crosses another is a third worse, or a tenth if
+/// filling the page is most important.
 const CROSSING: f64 = 0.5;
 const TIGHT_CROSSING: f64 = 0.1;
 
-/// The quality of a drawing, larger for a better one: from the scale at which it fills the page above all, from its
-/// smallness, and from the number of crossings and the length of its edges.
+/// The quality of a drawing, larger for a better one: mostly the scale at which it fills the page, also its
+/// compactness, the number of crossings and the length of its edges.
 fn quality(
     size: Size,
     (crossings, length): (u64, f64),
@@ -286,7 +287,7 @@ fn quality(
     readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
 
-/// What rounding may add to the quality of a drawing.
+/// The largest rounding error in the quality of a drawing.
 const ROUNDING: f64 = 1.0 + 1e-9;
 
 /// The best of all ways to place a part.
@@ -308,7 +309,7 @@ fn best_block(
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
-    // The most promising first: most of the others can then be reported to be worse before they have places.
+    // The most promising first: most others can then be rejected before they are placed.
     let hoped = |ordering: &Ordering| {
         let found = (&ordering.layers, &ordering.rows, ordering.crossings);
         hope(plan, options, part, found, orientation)
@@ -336,7 +337,7 @@ fn best_block(
     }
     let is_long = wrap::is_long(best.1.size, options, orientation);
     let inside = inside::inside(plan, options, part, is_long, orientation);
-    // Orderings that differ in the lanes of edges are cut into the same rows.
+    // Orders that only differ in the lanes of edges are cut into the same rows.
     let mut seen = BTreeSet::new();
     let ways = orderings.iter().filter(|_| is_long);
     let ways = ways.filter(|way| seen.insert(&way.layers.rank[..way.layers.vertices]));
@@ -365,7 +366,7 @@ fn block(
     placed.on_page(orientation)
 }
 
-/// The boxes and the routes of a part with layers at these places, x along and y across.
+/// The boxes and routes of a part with layers at these positions, x along and y across.
 pub(crate) fn routed(
     plan: &Plan,
     part: &Component,
@@ -392,7 +393,7 @@ pub(crate) fn routed(
 }
 
 impl PlacedPart {
-    /// This block, so far with x along and y across, turned to the page and moved to (0, 0).
+    /// This block, with x along and y across, converted to page coordinates and moved to (0, 0).
     pub(crate) fn on_page(self, orientation: Orientation) -> Self {
         let reach = Rect::of_points(self.routes.iter().flat_map(Route::points));
         let rects = self.boxes.iter().chain(&self.clusters).copied();

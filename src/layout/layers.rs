@@ -1,4 +1,5 @@
-//! A part cut into layers: long edges led through the layers between their ends, clusters bordered in each layer.
+//! A part cut into layers: long edges pass through the layers between their ends, clusters have borders in
+//! each layer.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ pub(crate) enum Lane {
     Inside,
 }
 
-/// The layers of a part with these ranks; an edge that runs against them is led the other way.
+/// The layers of a part with these ranks; an edge that runs against them is reversed.
 pub(crate) fn cut(plan: &Plan, part: &Component, rank: &[usize], lane: Lane) -> Layers {
     let n = part.vertices.len();
     let mut layers = Layers {
@@ -59,7 +60,7 @@ pub(crate) fn cut(plan: &Plan, part: &Component, rank: &[usize], lane: Lane) -> 
 #[derive(Clone, Copy)]
 struct Stem {
     is_forward: bool,
-    /// The bend, if an edge before has it.
+    /// The bend, if an earlier edge has it.
     bend: Option<usize>,
 }
 
@@ -126,8 +127,8 @@ impl Layers {
         self.up[after].push(before);
     }
 
-    /// Leads an edge from its earlier end to its later one, with a bend in every layer between; returns the items it
-    /// passes. Where an edge before has its stem, it runs through that.
+    /// Routes an edge from its earlier end to its later one, with a bend in every layer between; returns the
+    /// items it passes. If an earlier edge has the same stem, it runs through that.
     fn chain(&mut self, (from, to): (usize, usize), lane: Lane, stem: Stem) -> Vec<usize> {
         let shared = common(&self.parent, self.home[from], self.home[to]);
         let ranks = self.rank[from] + 1..self.rank[to];

@@ -1,7 +1,9 @@
-//! A second engine: cycles, ranks and order are ours, the places come from the crate `layout-rs`, the routes are ours.
+//! A second engine: cycles, ranks and order are ours, the positions come from the crate `layout-rs`, the
+//! routes are ours.
 //!
-//! Its own way through a graph takes exponential time on some and routes edges through boxes; its placement does not.
-//! Like `layered.rs`, it calls its siblings one after the other. It does not draw clusters: their frames stay empty.
+//! The crate's own ordering takes exponential time on some graphs, and its router draws edges through boxes;
+//! only its placement is used. Like `layered.rs`, it calls its siblings one after the other. It does not draw
+//! clusters: their frames stay empty.
 
 use std::cell::Cell;
 use std::panic::{self, UnwindSafe};
@@ -28,7 +30,7 @@ use crate::base::geometry::{Rect, Size};
 const MOST: usize = 150;
 /// The number of edges that the search for a good order may sweep, per part.
 const EFFORT: usize = 20_000;
-/// The room around boxes, and around edges: along, across.
+/// The space around boxes, and around edges: along, across.
 const BOX_HALO: Size = Size::new(50.0, 14.0);
 const EDGE_HALO: Size = Size::new(10.0, 7.0);
 
@@ -46,8 +48,8 @@ impl Engine for LayoutRs {
         }
         let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
         // It checks its preconditions with `assert!`.
-        let attempt = unheard(|| lay_out(plan, options, orientation));
-        attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs gave up on this graph", hint)))
+        let attempt = silenced(|| lay_out(plan, options, orientation));
+        attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs failed on this graph", hint)))
     }
 }
 
@@ -57,7 +59,7 @@ thread_local! {
 }
 
 /// The result of `work`, or its panic, which is not printed.
-fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
+fn silenced<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let before = panic::take_hook();
@@ -83,8 +85,12 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
         .iter()
         .map(|part| block(&flat, options, part, orientation))
         .collect();
-    let blocks = blocks
-        .ok_or_else(|| Error::usage("layout-rs overlapped boxes", "use `--layout layered`"))?;
+    let blocks = blocks.ok_or_else(|| {
+        Error::usage(
+            "layout-rs placed boxes on top of each other",
+            "use `--layout layered`",
+        )
+    })?;
     let (_, mut layout) = assembled(&flat, options, &parts, blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
     labels::place(&flat, &mut layout);
@@ -217,7 +223,7 @@ mod tests {
             HEARD.set(HEARD.get() + 1);
             before(reported);
         }));
-        assert!(unheard(|| panic!("expected")).is_err());
+        assert!(silenced(|| panic!("expected")).is_err());
         assert_eq!(HEARD.get(), 0);
         assert!(panic::catch_unwind(|| panic!("the test's own")).is_err());
         assert_eq!(HEARD.get(), 1);

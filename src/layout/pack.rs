@@ -2,8 +2,8 @@
 
 use crate::base::geometry::{Point, Size};
 
-/// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. The width is the one of several
-/// tries that lets the whole be drawn largest on the page.
+/// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. Several widths are
+/// tried, and the one with the largest scale on the page is used.
 pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
     let widest = sizes.iter().map(|size| size.w).fold(0.0, f64::max);
     let area: f64 = sizes.iter().map(|s| (s.w + gap) * (s.h + gap)).sum();
@@ -29,8 +29,8 @@ pub(crate) fn fit(whole: Size, page: Size) -> f64 {
     (page.w / whole.w.max(1.0)).min(page.h / whole.h.max(1.0))
 }
 
-/// The corners of blocks on shelves of this width, the highest blocks first, and the size of all; `gap` is the room
-/// between blocks side by side, and between shelves.
+/// The corners of blocks on shelves of this width, the highest blocks first, and the total size; `gap` is the
+/// space between blocks side by side, and between shelves.
 pub(crate) fn shelves(sizes: &[Size], width: f64, gap: (f64, f64)) -> (Vec<Point>, Size) {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by(|&a, &b| sizes[b].h.total_cmp(&sizes[a].h).then(a.cmp(&b)));

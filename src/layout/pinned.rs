@@ -1,17 +1,17 @@
-//! A layout that keeps the places of an earlier one: known boxes stay, new ones are placed beside them.
+//! A layout that keeps the positions of an earlier one: known boxes stay, new ones are placed beside them.
 
 use super::{Layout, Orientation, Plan, include};
 use crate::base::geometry::{Point, Rect, Size};
 
-/// The room around boxes, and inside the frames of clusters.
+/// The space around boxes, and inside the frames of clusters.
 const GAP: f64 = 10.0;
 const PADDING: f64 = 8.0;
 /// The largest distance from its neighbours at which a new box is tried, in steps.
 const RINGS: i32 = 30;
 const STEP: Size = Size::new(30.0, 20.0);
 
-/// Boxes and clusters with known places kept; routes are still to be found. Boxes that grew stay where their middle
-/// was; of two that would overlap now, the later one counts as new.
+/// Boxes and clusters with known positions kept; routes are computed later. Boxes that grew keep their
+/// middle; of two that would overlap now, the later one counts as new.
 pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation) -> Layout {
     let mut table = PinnedBoxes {
         plan,
@@ -75,7 +75,7 @@ impl PinnedBoxes<'_> {
             .any(|other| other.overlaps(&place))
     }
 
-    /// A free place near the neighbours, or else near the cluster, or else below everything.
+    /// A free position near the neighbours, or else near the cluster, or else below everything.
     fn place_for(&mut self, v: usize, neighbours: &[usize]) -> Rect {
         let size = self.plan.vertices[v].size;
         let below = self
@@ -120,7 +120,7 @@ impl PinnedBoxes<'_> {
         last
     }
 
-    /// Whether every cluster would still hold its own members only.
+    /// Whether every cluster would still contain its own members only.
     fn keeps_clusters(&mut self, v: usize, place: Rect) -> bool {
         let before = self.foreign();
         self.boxes[v] = Some(place);

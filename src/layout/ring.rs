@@ -1,7 +1,7 @@
 //! A third engine, for few boxes with many edges among them: the boxes around the page's rim, the edges across its
 //! middle.
 //!
-//! Layers would lead most of such edges past most of the boxes. On a rim no box lies between two others.
+//! With layers, most of these edges would pass most of the boxes. On a rim no box lies between two others.
 
 use super::layered::labels;
 use super::{Engine, Layout, LayoutOptions, Orientation, Plan, Route, Vertex};
@@ -10,12 +10,12 @@ use crate::base::geometry::{Point, Rect, Size};
 
 /// The largest number of boxes; more would crowd the rim.
 pub(crate) const MOST: usize = 16;
-/// The least room between boxes that follow each other on the rim, for the labels between them.
+/// The least space between consecutive boxes on the rim, for the labels between them.
 const GAP: f64 = 60.0;
-/// The distances that an edge may swing to its right, over its length, so that the two ways between two boxes lie
-/// apart. If it would meet a third box, the next one is tried.
+/// The distances, relative to its length, by which an edge may bend to its right, so that the two directions
+/// between two boxes are separate. If it would touch a third box, the next one is tried.
 const BENDS: [f64; 7] = [0.1, 0.06, 0.16, 0.22, 0.02, -0.06, -0.14];
-/// The room between an edge and a box that it passes.
+/// The space between an edge and a box that it passes.
 const CLEAR: f64 = 4.0;
 /// The number of pieces in which a curve is checked.
 const PIECES: u32 = 48;
@@ -79,7 +79,7 @@ fn rounded(part: f64) -> f64 {
     libm::copysign(libm::pow(part.abs(), 0.75), part)
 }
 
-/// The order of the vertices along the rim: swapped two by two as long as that brings ends of edges nearer.
+/// The order of the vertices along the rim: swapped pairwise as long as that shortens edges.
 fn order(plan: &Plan) -> Vec<usize> {
     let n = plan.vertices.len();
     let mut order: Vec<usize> = (0..n).collect();
@@ -109,7 +109,8 @@ fn order(plan: &Plan) -> Vec<usize> {
     order
 }
 
-/// The route from box to box that meets no other box: by the first of the bends that allows it, or else by the last.
+/// The route from box to box that touches no other box: with the first bend that allows it, or else with the
+/// last.
 fn route(places: [usize; 2], ends: [&Vertex; 2], boxes: &[Rect]) -> Route {
     let [from, to] = places.map(|v| boxes[v]);
     if places[0] == places[1] {
@@ -147,10 +148,10 @@ fn turn(rect: Rect) -> Route {
     }
 }
 
-/// A curve that swings to the right of the straight way by `bend` times its length.
+/// A curve to the right of the straight line, by `bend` times its length.
 fn swung(a: Point, b: Point, bend: f64) -> [Point; 4] {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
-    // A control reaches three quarters of itself.
+    // A cubic reaches three quarters of the way to its controls.
     let aside = bend / 0.75;
     let at = |t: f64| Point::new(a.x + dx * t - dy * aside, a.y + dy * t + dx * aside);
     [a, at(0.3), at(0.7), b]
@@ -160,7 +161,7 @@ fn holds(rect: &Rect, p: Point) -> bool {
     p.x > rect.x && p.x < rect.right() && p.y > rect.y && p.y < rect.bottom()
 }
 
-/// The place, from 0 to about a half, at which a curve leaves its box: the last one that is inside.
+/// The parameter, from 0 to about a half, at which a curve leaves its box: the last one that is inside.
 fn border(is_inside: impl Fn(f64) -> bool) -> f64 {
     let (mut inside, mut outside) = (0.0, 0.5);
     for _ in 0..30 {
@@ -187,7 +188,7 @@ fn on(curve: &[Point; 4], t: f64) -> Point {
     split(curve, t)[1][0]
 }
 
-/// The curve between two of its places.
+/// The curve between two of its parameters.
 fn part(curve: &[Point; 4], start: f64, end: f64) -> [Point; 4] {
     let rest = split(curve, start)[1];
     split(&rest, (end - start) / (1.0 - start).max(1e-6))[0]

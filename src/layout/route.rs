@@ -1,21 +1,21 @@
-//! The way of one edge.
+//! The route of one edge.
 
 use crate::base::geometry::Point;
 
-/// The way of one edge: a start point, then cubic pieces `(control, control, end)`; straight pieces have their
-/// controls on the line. It runs from the outline of `from` to the outline of `to`.
+/// The route of one edge: a start point, then cubic pieces `(control, control, end)`; straight pieces have
+/// their controls on the line. It runs from the outline of `from` to the outline of `to`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Route {
     /// Its start point.
     pub start: Point,
     /// The cubic pieces `(control, control, end)`.
     pub curves: Vec<[Point; 3]>,
-    /// The middle of its label, if it has one and there was room.
+    /// The middle of its label, if it has one and it could be placed.
     pub label: Option<Point>,
 }
 
 impl Route {
-    /// Every point that shapes it, from its start on.
+    /// All its points and controls, from its start on.
     pub(crate) fn points(&self) -> impl DoubleEndedIterator<Item = Point> {
         std::iter::once(self.start).chain(self.curves.iter().flatten().copied())
     }
@@ -34,7 +34,7 @@ impl Route {
         self.mapped(|p| Point::new(p.x + by.x, p.y + by.y))
     }
 
-    /// About its length: that of the straight lines between the points that its pieces join.
+    /// Its approximate length: that of the straight lines between the points that its pieces join.
     pub(crate) fn length(&self) -> f64 {
         let ends = self.curves.iter().map(|curve| curve[2]);
         let far = |(length, from): (f64, Point), to: Point| (length + from.distance(to), to);

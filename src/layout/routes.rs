@@ -1,15 +1,15 @@
-//! The route of each edge: level through every layer, bending only in the gaps between layers, so that it can meet no
-//! foreign box.
+//! The route of each edge: level through every layer, bending only in the gaps between layers, so that it
+//! cannot touch any other box.
 
 pub(crate) mod around;
 
 use super::{LayerItem, Layers, Outline, Route};
 use crate::base::geometry::{Point, Size};
 
-/// The distance of neighbouring ports, where the side of a box is long enough.
+/// The distance of neighbouring ports, if the side of a box is long enough.
 const PORT_STEP: f64 = 6.0;
 
-/// The input of a router, with x along and y across: vertices as they were placed and the layers' extents.
+/// The input of a router, with x along and y across: the placed vertices and the layers' extents.
 pub(crate) struct RoutingPlane<'a> {
     /// The layered graph.
     pub(crate) layers: &'a Layers,
@@ -74,7 +74,7 @@ impl RoutingPlane<'_> {
         self.outline[v].reach(self.size[v].h, self.size[v].w, along)
     }
 
-    /// The places across at which each chain leaves its first vertex and enters its last.
+    /// The positions across at which each chain leaves its first vertex and enters its last.
     fn ports(&self) -> Vec<(f64, f64)> {
         let mut ports = vec![(0.0, 0.0); self.layers.chains.len()];
         let n = self.layers.vertices;
@@ -97,8 +97,8 @@ impl RoutingPlane<'_> {
         ports
     }
 
-    /// Ports for chains at one side of a vertex, in the order of the places they come from; the edges of a fork come
-    /// from the same item and share one.
+    /// Ports for chains at one side of a vertex, in the order of the positions they come from; the edges of a
+    /// fork come from the same item and share one.
     fn spread(&self, v: usize, chains: &mut [(usize, usize)]) -> Vec<(usize, f64)> {
         chains.sort_by(|a, b| {
             let across = self.across[a.0].total_cmp(&self.across[b.0]);
@@ -116,7 +116,7 @@ impl RoutingPlane<'_> {
             .collect()
     }
 
-    /// The reach of a vertex's outline along from its middle, at a place across.
+    /// The reach of a vertex's outline along from its middle, at a position across.
     fn reach(&self, v: usize, across: f64) -> f64 {
         self.outline[v].reach(self.size[v].w, self.size[v].h, across - self.across[v])
     }

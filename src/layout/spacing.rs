@@ -1,6 +1,6 @@
-//! The room that everything takes: distances across, columns along, and the boxes around clusters.
+//! The space that everything takes: distances across, columns along, and the boxes around clusters.
 //!
-//! Here x runs along the edges and y across; [`turned`] brings sizes there and back.
+//! Here x runs along the edges and y across; [`turned`] converts sizes in both directions.
 
 use std::collections::BTreeMap;
 
@@ -10,26 +10,26 @@ use crate::layout::{
     include,
 };
 
-/// The room between boxes side by side, between edges side by side, and between an edge and anything else.
+/// The space between boxes side by side, between edges side by side, and between an edge and anything else.
 const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
-/// The room between a cluster's border and what is inside, and outside.
+/// The space between a cluster's border and its contents, and outside of it.
 pub(crate) const PADDING: f64 = 7.0;
-/// The room below a title for the heads of arrows that come from above: the title is painted over their lines.
+/// The space below a title for the heads of arrows from above: the title is painted over their lines.
 const HEAD: f64 = 9.0;
 const MARGIN: f64 = 4.0;
-/// The room before and after a label between two layers.
+/// The space before and after a label between two layers.
 const LABEL_GAP: f64 = 12.0;
-/// The room that the first self loop takes beside its vertex, and each further one.
+/// The space that the first self loop takes beside its vertex, and each further one.
 const LOOP: (f64, f64) = (14.0, 6.0);
 
-/// The room between a label and its edge.
+/// The space between a label and its edge.
 const ASIDE: f64 = 4.0;
-/// The room that edges need to bend where they bend twice, as a part of the room for once.
+/// The space that edges need to bend twice, as a fraction of the space to bend once.
 const TWICE: f64 = 0.45;
 
-/// The bend beside which the label of an edge is placed: about the middle one, in a layer without boxes; of an edge of a
-/// fork the first one, which all of them pass.
+/// The bend beside which the label of an edge is placed: about the middle one, in a layer without boxes; for
+/// an edge of a fork, the first one, which all of them pass.
 fn label_bend(
     plan: &Plan,
     layers: &Layers,
@@ -47,7 +47,7 @@ fn label_bend(
     bend.filter(|_| plan.is_labelled)
 }
 
-/// The sizes of one part, seen in one orientation.
+/// The sizes of one part in one orientation.
 pub(crate) struct Spacing<'a> {
     pub(crate) layers: &'a Layers,
     orientation: Orientation,
@@ -61,9 +61,9 @@ pub(crate) struct Spacing<'a> {
     worded: BTreeMap<usize, Size>,
     /// The size of each cluster's title; the first is that of the outside.
     title: Vec<Size>,
-    /// The room for the words at the end of each cluster: along, across.
+    /// The space for the words at the end of each cluster: along, across.
     footer: Vec<(f64, f64)>,
-    /// The room below a title across the edges.
+    /// The space below a title across the edges.
     below_title: f64,
 }
 
@@ -119,7 +119,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// The room that the self loops of a vertex take on each side across.
+    /// The space that the self loops of a vertex take on each side across.
     pub(crate) fn loop_room(&self, v: usize) -> f64 {
         match self.loops[v] {
             0 => 0.0,
@@ -164,7 +164,7 @@ impl<'a> Spacing<'a> {
         self.orientation == Orientation::TopBottom
     }
 
-    /// The middle of the label of an edge that has room of its own.
+    /// The middle of the label of an edge, if it has reserved space.
     pub(crate) fn label_of(
         &self,
         chain: &[usize],
@@ -221,8 +221,8 @@ impl<'a> Spacing<'a> {
         self.lined_up(&width, &gaps)
     }
 
-    /// The least size of a drawing of these rows, along and across, and the least length of its edges: those of one in
-    /// which every edge is level and no title needs room.
+    /// The least size of a drawing of these rows, along and across, and the least length of its edges: those
+    /// of a drawing with level edges and without titles.
     pub(crate) fn least(&self, rows: &LayerRows, apart: &[Vec<f64>]) -> (Size, f64) {
         let columns = self.lined_up(&self.widths(), &self.gaps(rows, |_, _| 0.0));
         let reach = |v: usize| self.size.get(v).map_or(0.0, |size| size.h / 2.0);
@@ -245,7 +245,7 @@ impl<'a> Spacing<'a> {
         (Size::new(along, across), level.sum())
     }
 
-    /// The room after every row: for its labels, and for edges to bend, which rise by so much.
+    /// The space after every row: for its labels, and for edges to bend, which rise by these amounts.
     fn gaps(&self, rows: &LayerRows, rise: impl Fn(usize, usize) -> f64) -> Vec<f64> {
         let bending = rows.iter().map(|row| self.bending_room(row, &rise));
         let gaps = bending.zip(&self.label);
@@ -284,7 +284,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// The room that borders of clusters need before and after every layer.
+    /// The space that borders of clusters need before and after every layer.
     fn depths(&self) -> Vec<(f64, f64)> {
         let mut depth = vec![(0.0_f64, 0.0_f64); self.layers.ranks];
         for cluster in 1..self.layers.parent.len() {
@@ -296,7 +296,7 @@ impl<'a> Spacing<'a> {
         depth
     }
 
-    /// The room that the borders from `cluster` outwards need before and after a layer.
+    /// The space that the borders from `cluster` outwards need before and after a layer.
     fn depth(&self, cluster: usize, rank: usize) -> (f64, f64) {
         let (mut before, mut after) = (0.0, 0.0);
         let mut cluster = cluster;
@@ -313,7 +313,7 @@ impl<'a> Spacing<'a> {
         (before, after)
     }
 
-    /// The room between the border where a cluster begins along and what is inside.
+    /// The space between the border at which a cluster begins along and its contents.
     fn lead(&self, cluster: usize) -> f64 {
         match self.orientation {
             Orientation::LeftRight => PADDING,
@@ -321,7 +321,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// The room between the border where a cluster begins across and what is inside.
+    /// The space between the border at which a cluster begins across and its contents.
     fn headroom(&self, cluster: usize) -> f64 {
         match self.orientation {
             Orientation::LeftRight => PADDING + self.title[cluster].h,
@@ -329,7 +329,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// The room that edges need to bend after a row: more for many and for steep ones.
+    /// The space that edges need to bend after a row: more for many and for steep ones.
     fn bending_room(&self, row: &[usize], rise: impl Fn(usize, usize) -> f64) -> f64 {
         let (mut edges, mut steepest) = (0.0, 0.0_f64);
         for &v in row
@@ -350,7 +350,7 @@ impl<'a> Spacing<'a> {
         }
     }
 
-    /// A box around each cluster, children inside their parents, all in their borders.
+    /// A box around each cluster, children inside their parents, all within their borders.
     pub(crate) fn frames(
         &self,
         boxes: &[Rect],
@@ -401,7 +401,7 @@ impl<'a> Spacing<'a> {
             content.w + lead + PADDING + tail,
             content.h + head + PADDING + foot,
         );
-        // A title longer than that may need the room up to the borders.
+        // A longer title may need the space up to the borders.
         let wanted = self.title[cluster];
         let room = (columns[low].0 - lead, columns[high].1 + PADDING + tail);
         (frame.x, frame.w) = stretched((frame.x, frame.w), wanted.w + 2.0 * PADDING, room);
@@ -411,7 +411,8 @@ impl<'a> Spacing<'a> {
     }
 }
 
-/// A stretch `(start, length)` made at least `wanted` long: to its end if there is room, else to its start too.
+/// A stretch `(start, length)` made at least `wanted` long: to its end if there is space, else to its start
+/// too.
 fn stretched((start, length): (f64, f64), wanted: f64, room: (f64, f64)) -> (f64, f64) {
     if length >= wanted {
         return (start, length);
@@ -420,7 +421,7 @@ fn stretched((start, length): (f64, f64), wanted: f64, room: (f64, f64)) -> (f64
     (start.min(end - wanted).max(room.0.min(start)), wanted)
 }
 
-/// A size on the page as along and across, or back.
+/// Converts a size on the page to along and across, or back.
 pub(crate) fn turned(size: Size, orientation: Orientation) -> Size {
     match orientation {
         Orientation::LeftRight => size,

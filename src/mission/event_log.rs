@@ -1,8 +1,8 @@
 //! The events of a mission, in continuous time: one list, made once from the full graph, independent of windows and
 //! views.
 //!
-//! It does not depend on windows. All outputs that show a change (chips, captions, marks, tables, pages, the log) read
-//! this.
+//! It does not depend on windows. All outputs that show a change (badges, captions, marks, tables, pages, the
+//! log) read it.
 
 mod causes;
 mod changes;
@@ -77,12 +77,12 @@ worded! {
         Stopped = "stopped",
         /// A node, or an anonymous role, was gone from [`Event::time`] to [`Event::until`] and is back.
         Restarted = "restarted",
-        /// A node or topic with a rhythm paused from [`Event::time`] to [`Event::until`]; there is no proof of a
-        /// restart.
+        /// A node or topic that sends regularly paused from [`Event::time`] to [`Event::until`]; nothing
+        /// shows a restart.
         Silent = "silent",
-        /// A topic of unknown publisher, or an edge of a living node, began.
+        /// A topic of unknown publisher, or an edge of a running node, began.
         Appeared = "appeared",
-        /// A topic of unknown publisher, or an edge of a living node, ended.
+        /// A topic of unknown publisher, or an edge of a running node, ended.
         Vanished = "vanished",
         /// A topic's messages come from other publishers.
         HandedOver = "handed_over",
@@ -196,8 +196,8 @@ worded! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     #[non_exhaustive]
     pub enum InterruptionKind {
-        /// The recorder's clock was set back, or simulated time restarted: what follows is shown after what came
-        /// before.
+        /// The recorder's clock was set back, or simulated time restarted: later messages are placed after
+        /// earlier ones.
         ClockBack = "clock_back",
         /// Nothing was recorded: the recorder paused, or its clock was set ahead.
         Nothing = "nothing_recorded",

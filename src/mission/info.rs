@@ -116,16 +116,16 @@ impl FromIterator<Confidence> for ConfidenceCounts {
     }
 }
 
-/// A kind of evidence and the number of elements it proves.
+/// A kind of evidence and the number of elements that it supports.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EvidenceInfo {
     /// The source's word in JSON.
     pub source: &'static str,
-    /// The number of nodes that it proves.
+    /// The number of nodes that it supports.
     pub nodes: usize,
-    /// The number of publications that it proves.
+    /// The number of publications that it supports.
     pub publishes: usize,
-    /// The number of subscriptions that it proves.
+    /// The number of subscriptions that it supports.
     pub subscribes: usize,
 }
 

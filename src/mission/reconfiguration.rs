@@ -1,7 +1,8 @@
 //! How much a mission reconfigures: changes per minute, lifetimes of nodes, and the distance between the graphs of
 //! consecutive windows.
 //!
-//! Only the robot counts: recorders, housekeeping and whatever is only inferred or declared are left out.
+//! Only the robot counts: recorders, housekeeping, and elements that are only inferred or declared are left
+//! out.
 
 use std::collections::BTreeSet;
 
@@ -19,18 +20,18 @@ pub(crate) struct Reconfiguration {
     /// The number of events that a reader of the event log sees.
     changes: usize,
     windows: Vec<WindowDistance>,
-    /// The lives of each node.
+    /// The lifetimes of each node.
     lives: Vec<(String, Span)>,
 }
 
-/// The graph of a window against that of the window before.
+/// The graph of a window compared with that of the previous window.
 struct WindowDistance {
     span: Span,
     nodes: usize,
     edges: usize,
-    /// Nodes and edges that came and went; `None` for the first window.
+    /// The number of nodes and edges that appeared or vanished; `None` for the first window.
     changed: Option<[usize; 4]>,
-    /// The number of elements in either of the two windows.
+    /// The number of elements in at least one of the two windows.
     either: usize,
 }
 
@@ -111,13 +112,13 @@ impl Reconfiguration {
         }
     }
 
-    /// The mean over the windows that have a window before them.
+    /// The mean over all windows but the first.
     fn mean(&self, of: impl Fn(&WindowDistance) -> Option<f64>) -> Option<f64> {
         let all: Vec<f64> = self.windows.iter().filter_map(of).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
     }
 
-    /// The median lifetime in seconds, of two in the middle the longer.
+    /// The median lifetime in seconds; of the two in the middle, the longer.
     fn lifetime(&self) -> Option<f64> {
         let mut all: Vec<i64> = self.lives.iter().map(|(_, run)| run.nanos()).collect();
         all.sort_unstable();
@@ -125,7 +126,7 @@ impl Reconfiguration {
     }
 }
 
-/// All recordings, and a place among them: the recording, and the window or the life.
+/// All recordings, and a position in them: the recording, and the window or the lifetime.
 type Runs = Vec<Reconfiguration>;
 type Place = (usize, usize);
 
@@ -184,7 +185,7 @@ fn number(number: Option<f64>) -> TableCell<'static> {
     TableCell::known(number, TableCell::Float)
 }
 
-/// The tables of all recordings by name: a row per recording, per window, and per life of a node.
+/// The tables of all recordings by name: a row per recording, per window, and per lifetime of a node.
 pub(crate) fn tables(all: &Runs) -> [(&'static str, Batch); 3] {
     let places = |of: fn(&Reconfiguration) -> usize| -> Vec<Place> {
         let runs = all.iter().enumerate();

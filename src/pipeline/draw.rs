@@ -16,17 +16,17 @@ use crate::view::{View, ViewOptions, view};
 /// The kind of picture of a mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A graph, or a board if the publishers of most messages are unknown.
+    /// A graph, or a topic timeline if the publishers of most messages are unknown.
     #[default]
     Auto,
     /// The computation graph.
     Graph,
-    /// The board of topics over time.
+    /// The timeline of topics.
     Board,
 }
 
 impl Body {
-    /// Whether it is a board for this mission.
+    /// Whether it is a topic timeline for this mission.
     pub(super) fn is_board(self, mission: &Mission) -> bool {
         match self {
             Self::Graph => false,
@@ -40,7 +40,7 @@ impl Body {
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Drawing {
-    /// The kind of picture: graph or board.
+    /// The kind of picture: graph or topic timeline.
     pub body: Body,
     /// The choice of what is shown.
     pub view: ViewOptions,
@@ -63,7 +63,7 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// The light style on a page of 1280×720 that may grow, as the command line has it.
+    /// The light style on a page of 1280×720 that may grow, as on the command line.
     ///
     /// # Errors
     /// None in practice: the built-in style is valid.

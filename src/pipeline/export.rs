@@ -40,7 +40,8 @@ pub struct Render {
     pub kept: Vec<PathBuf>,
     /// The outputs to write.
     pub outputs: Vec<Output>,
-    /// The output that replaces all others if the picture is not an animation: a mission in one window, or a board.
+    /// The output that replaces all others if the picture is not an animation: a mission in one window, or a
+    /// topic timeline.
     pub still: Option<Output>,
     /// Whether data files contain only the filtered graph.
     pub is_filtered: bool,
@@ -131,7 +132,7 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     if is_figure || !is_mixed {
         return show_alike(job, mission, watch);
     }
-    // Two drawings of one mission, each the same as if its kind of output had been requested alone.
+    // Both drawings of the mission are the same as if only one kind of output had been requested.
     let some = |is: bool| {
         let outputs = job.outputs.iter().filter(|o| has_all_topics(o) == is);
         Render {
@@ -168,7 +169,7 @@ fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
         "nothing changes after the beginning, so this is one picture with rates over the whole time"
     };
     let film = job.outputs.first()?.target.path().display();
-    let text = format!("{why}; `-o {film}` makes a film");
+    let text = format!("{why}; `-o {film}` makes an animation");
     mission.notices.add(Notice::new(NoticeKind::Chosen, text));
     Some(Render {
         outputs: vec![still.clone()],
@@ -353,7 +354,7 @@ fn rows(height: f64) -> usize {
     cast::to_usize((height / ROWS.1).clamp(1.0, ROWS.0))
 }
 
-/// Writes a mission whose picture is the topic board.
+/// Writes a mission whose picture is the topic timeline.
 fn show_board(
     job: &Render,
     mission: Mission,

@@ -236,7 +236,7 @@ impl Fitting<'_> {
         }
     }
 
-    /// The changing elements, the nodes that they connect, and the partners of those.
+    /// The changing elements, the nodes that they connect, and the neighbours of those.
     fn changing(&self) -> BTreeSet<Element> {
         let elements = &self.mission.elements;
         let view = &self.best.view;

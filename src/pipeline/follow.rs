@@ -50,7 +50,10 @@ impl Follow {
     /// If it cannot be read or cannot grow.
     pub fn new(reading: Reading, keep: Period) -> Result<Self> {
         let [input] = &reading.inputs[..] else {
-            return Err(Error::usage("one recording is followed", "name one"));
+            return Err(Error::usage(
+                "one recording is followed",
+                "give a single recording",
+            ));
         };
         let growing = bag::follow(input)?;
         let mut options = reading.collect.clone();
@@ -67,7 +70,7 @@ impl Follow {
         })
     }
 
-    /// Collects what has become readable since the last call.
+    /// Collects the messages that have become readable since the last call.
     ///
     /// # Errors
     /// If the recording no longer exists, or a temporary file cannot be used.
@@ -110,7 +113,7 @@ impl Follow {
         };
         let mut reading = self.reading.clone();
         reading.division.length = length;
-        // Times of events count from the first message; windows divide the kept time.
+        // Times of events count from the first message; only the kept time is divided into windows.
         let start = match length {
             Length::All => self
                 .origin

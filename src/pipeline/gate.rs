@@ -185,7 +185,7 @@ pub(crate) struct BaselineWritten {
     pub(crate) changed: usize,
     /// The number of remaining findings.
     pub(crate) left: usize,
-    /// The number of nodes and topics left out for lack of room.
+    /// The number of nodes and topics left out because they did not fit.
     pub(crate) left_out: usize,
 }
 

@@ -28,7 +28,7 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
                 "{} was given twice, but can be read only once",
                 input.name()
             );
-            return Err(Error::usage(what, "name it once"));
+            return Err(Error::usage(what, "give it once"));
         } else {
             let text = format!("`{}` was given twice and read once", input.name());
             twice.push(Notice::new(NoticeKind::Note, text));
@@ -57,7 +57,7 @@ pub(super) fn in_time(
     }
 }
 
-/// The namespace of what an input recorded; empty for none.
+/// The namespace for the names in an input; empty for none.
 pub(super) fn space_of(reading: &Reading, input: &Input) -> String {
     let own = reading.namespaces.iter().rev();
     let mut own = own.filter(|(name, _)| is_of(name, input));
@@ -65,7 +65,7 @@ pub(super) fn space_of(reading: &Reading, input: &Input) -> String {
         .map_or_else(String::new, |(_, space)| space.clone())
 }
 
-/// Whether what is given for `name` is for this input.
+/// Whether an option given for `name` applies to this input.
 fn is_of(name: &Path, input: &Input) -> bool {
     match input {
         Input::Path(path) => path.starts_with(name) || path.file_name() == Some(name.as_os_str()),
@@ -74,7 +74,7 @@ fn is_of(name: &Path, input: &Input) -> bool {
     }
 }
 
-/// Refuses an offset or a namespace that is for none of the inputs.
+/// Refuses an offset or a namespace that applies to none of the inputs.
 pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
     let offsets = reading
         .offsets
@@ -92,7 +92,7 @@ pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
                 "`--{option}` names `{}`, which is not among the bags",
                 name.display()
             ),
-            format!("write the bag as it is given: `--{option} run_2.bag={value}`"),
+            format!("write the bag as on the command line: `--{option} run_2.bag={value}`"),
         )),
     }
 }
@@ -143,9 +143,10 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
             let other = contents(input).and_then(|own| known.insert(own, input.name()));
             if let Some(other) = other {
                 let own = input.name();
-                let what =
-                    format!("`{own}` holds the same messages as `{other}`: they would count twice");
-                return Err(Error::usage(what, "name one of them"));
+                let what = format!(
+                    "`{own}` contains the same messages as `{other}`, which would be counted twice"
+                );
+                return Err(Error::usage(what, "give only one of them"));
             }
         }
     }

@@ -66,7 +66,7 @@ impl Live {
         let mut ways = WAYS.into_iter();
         let found = ways.find_map(|(scheme, way)| Some((text.strip_prefix(scheme)?, way)));
         if !topics.is_empty() && !text.starts_with("ws://") {
-            let what = "`--rates` asks for messages that only a bridge (`ws://`) sends";
+            let what = "`--rates` subscribes to topics, which only a bridge (`ws://`) supports";
             return Err(Error::usage(what, "leave it out"));
         }
         let Some((place, way)) = found else {
@@ -165,7 +165,7 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, reported:
     }
     if let Err(error) = watched.file.finish() {
         let _ = reported.send(format!(
-            "the recording of {name} could not be ended: {error}"
+            "the recording of {name} could not be finished: {error}"
         ));
     }
 }
@@ -222,7 +222,7 @@ impl Patient {
 
 impl Read for Patient {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let late = || io::Error::new(io::ErrorKind::TimedOut, "it did not answer in time");
+        let late = || io::Error::new(io::ErrorKind::TimedOut, "it did not respond in time");
         let left = self.until.saturating_duration_since(Instant::now());
         if left.is_zero() {
             return Err(late());
@@ -248,7 +248,7 @@ impl Write for Patient {
 
 /// Connects to a server, which then has [`WAIT`] for its first answer.
 fn connect(place: &str) -> io::Result<Patient> {
-    let mut failed = io::Error::other("the name has no address");
+    let mut failed = io::Error::other("the host name cannot be resolved");
     for at in place.to_socket_addrs()? {
         match TcpStream::connect_timeout(&at, WAIT) {
             Ok(stream) => {
@@ -270,7 +270,7 @@ fn now() -> Stamp {
     }))
 }
 
-/// The ends of all connections: for publishers, subscribers, clients and servers, the names of nodes by topic or
+/// The ends of all connections: the names of publishers, subscribers, clients and servers by topic or
 /// service.
 #[derive(Default)]
 struct LiveGraph {
@@ -299,8 +299,7 @@ impl LiveGraph {
         }
     }
 
-    /// # Errors
-    /// If there are implausibly many names, each end counted once.
+    /// # Errors If there are implausibly many names; each end counts once.
     fn check(&self) -> io::Result<()> {
         let ends = self
             .ends

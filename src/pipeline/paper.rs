@@ -29,7 +29,7 @@ pub(crate) struct Paper {
     pub(crate) folder: PathBuf,
     /// The options of reading, without inputs.
     pub(crate) reading: Reading,
-    /// The options of the command as they were typed, for `commands.sh`.
+    /// The options of the command as typed, for `commands.sh`.
     pub(crate) options: String,
 }
 
@@ -46,11 +46,11 @@ pub(crate) struct Papered {
     pub(crate) skipped: bool,
 }
 
-/// The files that are the same in every bundle.
+/// The files that are identical in every bundle.
 const README: &str = include_str!("../../docs/src/bundle.md");
 const CITATION: &str = include_str!("../../CITATION.cff");
 
-/// The widths of figures in millimetres: a column for life lines, a page for all others.
+/// The widths of figures in millimetres: a column for lifelines, a page for all others.
 const WIDTHS: (f64, f64) = (88.0, 181.0);
 
 /// Reads every recording and writes the bundle, whole or not at all. The same recordings make the same bytes.
@@ -180,7 +180,7 @@ impl Bundle<'_> {
             .map_err(Error::io("write", &self.path.join(name)))
     }
 
-    /// A name for the figures of a recording: that of its file, with a number if it is taken.
+    /// A name for the figures of a recording: that of its file, with a number if it is already in use.
     fn stem(&self, run: &str) -> String {
         let name = Path::new(run).file_stem().unwrap_or_default();
         let name = file_stem(&name.to_string_lossy()).replace('%', "_");

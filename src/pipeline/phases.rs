@@ -133,7 +133,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
         return Err(bad(
             *n,
-            "this line has no start time, but others do".to_owned(),
+            "this line has no start time, but other lines do".to_owned(),
         ));
     }
     if timed > 0 {

@@ -33,9 +33,9 @@ impl Purpose {
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        let what = || format!("`{word}` is not a known place");
+        let what = || format!("unknown medium `{word}`");
         Self::from_word(word)
-            .ok_or_else(|| Error::usage(what(), "places: readme, slide, column, page"))
+            .ok_or_else(|| Error::usage(what(), "choose one of readme, slide, column, page"))
     }
 
     /// The width on paper in millimetres, if printed.
@@ -84,10 +84,10 @@ impl Purpose {
     pub(crate) fn advice(self) -> &'static str {
         match self {
             Self::Readme | Self::Slide => {
-                "`--ns-filter`, `--hide dead,leaf` or `--mode nodes` leave less to draw"
+                "draw less with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`"
             }
             Self::Column | Self::Page => {
-                "`bagreel figure` is made for paper; `--ns-filter` or `--mode nodes` leave less to draw"
+                "use `bagreel figure`, which is made for paper, or draw less with `--ns-filter` or `--mode nodes`"
             }
         }
     }

@@ -31,7 +31,7 @@ use crate::mission::{Mission, Window, read_json};
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Reading {
-    /// Bags of one mission, or one mission's own JSON.
+    /// Bags of one mission, or the JSON of one mission.
     pub inputs: Vec<Input>,
     /// The times by which the clocks of recorders were wrong, in nanoseconds: they are added to the times of those
     /// inputs that have this path or name, or lie in this folder.
@@ -49,7 +49,7 @@ pub struct Reading {
     pub is_still_if_unchanged: bool,
     /// The options of collecting evidence.
     pub collect: collector::CollectOptions,
-    /// Additions to the facts from the bags.
+    /// Sources of facts besides the bags.
     pub conclude: conclude::ConcludeOptions,
     /// The number of silent windows before an element counts as gone.
     pub grace: usize,
@@ -85,7 +85,7 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// Reads one mission's bags by their paths or URLs, or its own JSON, with the command line's defaults.
+    /// Reads one mission's bags by their paths or URLs, or its JSON, with the command line's defaults.
     pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
         let inputs = paths.into_iter().map(|path| Input::parse(path.into()));
         Self {
@@ -144,7 +144,7 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
             "`--verify` reads a bag twice, but {} can be read only once",
             pipe.name()
         );
-        return Err(Error::usage(what, "save the bag in a file first"));
+        return Err(Error::usage(what, "save the bag to a file first"));
     }
     watch.stage(Stage::Read);
     if let Some(path) = mission_file(&reading.inputs)? {
@@ -227,7 +227,7 @@ fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)>
         let reason = format!("{many} windows are more than {}", budget::WINDOWS);
         Err((
             reason,
-            "write it again from the bag with a longer `--period`",
+            "generate it again from the bag with a longer `--period`",
         ))
     } else if longest > budget::NAME || lengths.len() > budget::NAMES || whole > budget::NAMES_BYTES
     {
@@ -344,7 +344,7 @@ fn doubled(history: &History) -> Option<Notice> {
     let name = |id: &u32| format!("`{}`", history.elements.nodes[*id as usize].name);
     let names: Vec<String> = history.doubled.iter().map(name).collect();
     let text = format!(
-        "several recordings have messages of the same nodes at the same time, so their restarts are unknown: {}; `--ns BAG=/robot2` puts those of a bag in a namespace",
+        "several recordings contain messages of the same nodes at the same time, so restarts of these nodes are unknown: {}; put the names of one bag in a namespace with `--ns BAG=/robot2`",
         words::some_of(&names, NAMED)
     );
     (!names.is_empty()).then(|| Notice::new(NoticeKind::Note, text))

@@ -1,4 +1,4 @@
-//! The nodes and topics of a picture that no line leads to: those in words, and topics beside their only box.
+//! The nodes and topics of a picture without a line: those listed as words, and topics beside their only box.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,9 @@ use crate::graph::{Element, Elements, TopicId};
 use crate::mission::Mission;
 
 impl Viewed {
-    /// Finds the topics to list as words: those without a known end, and in bundles those about which something is reported
-    /// although no line carries them; but of these, such as have one known end get a box beside it.
+    /// Finds the topics to list as words: those without a known endpoint, and in bundles those with an event
+    /// although no line carries them; of the latter, those with one known endpoint get a box beside it
+    /// instead.
     pub(super) fn set_apart(
         &mut self,
         mission: &Mission,

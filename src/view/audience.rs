@@ -1,4 +1,5 @@
-//! The nodes that miss something while a node is away: the subscribers of topics that only that node publishes.
+//! The nodes that lack messages while a node is away: the subscribers of topics that only that node
+//! publishes.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +38,8 @@ impl<'a> Audience<'a> {
         all
     }
 
-    /// The topic that only this node, or other runs of it, publish with most subscribers, and those.
+    /// Of the topics that only this node (or other runs of it) publishes, the one with most subscribers, and
+    /// these subscribers.
     pub(super) fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
         let topics = self.published.get(&node)?.iter().copied();
         let name = |topic: TopicId| self.elements.topics.get(topic as usize).map(|t| &t.name);

@@ -26,8 +26,8 @@ pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
     names
 }
 
-/// Whether bundles draw each topic: not one of the plumbing that half the system is connected to, unless a connection of
-/// its own changes, or nothing else is there.
+/// Whether bundles draw each topic: those that half the system is connected to are not drawn, unless one of
+/// their connections changes or there is no other topic.
 pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     let elements = &mission.elements;
     let plain = |topic: &Topic| !options.hide.quiet || !is_plumbing(topic.name.as_str());
@@ -55,8 +55,8 @@ pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     drawn
 }
 
-/// Whether each node has no line to another, or, if leaves are listed as words, only one, where neither end of it changes;
-/// none where fewer than half of the nodes have a line.
+/// Whether each node has no line to another, or, if leaves are listed as words, only one whose two ends never
+/// change; no node if fewer than half of the nodes have a line.
 pub(crate) fn nodes_in_words(
     mission: &Mission,
     (selection, drawn): (&Selection, &[bool]),
@@ -79,7 +79,7 @@ pub(crate) fn nodes_in_words(
     for (ends, _) in ends.iter().zip(is_drawn).filter(|(_, drawn)| *drawn) {
         for (these, others) in [(&ends[0], &ends[1]), (&ends[1], &ends[0])] {
             for node in these {
-                // Two others are enough to know that there are several.
+                // Two are enough to know that there are several.
                 for other in others.iter().filter(|other| *other != node).take(2) {
                     let partner = &mut partner[*node as usize];
                     *partner = Some(if partner.is_none_or(|old| old == *other) {
@@ -110,8 +110,9 @@ pub(crate) fn nodes_in_words(
     (0..).zip(&changes).map(is_in_words).collect()
 }
 
-/// Whether anything is reported of each node, of itself, its connections, or a topic of its own, and whether of itself or
-/// its connections. A start in the first window is no change: the node was there before most of the picture.
+/// For each node, whether there is an event about it, its connections or a topic of its own, and whether
+/// there is one about it or its connections. A start in the first window is not a change, as the node exists
+/// in most of the picture.
 fn changing_nodes(
     mission: &Mission,
     drawn: &[bool],
@@ -135,15 +136,15 @@ fn changing_nodes(
     (changes, changes_itself)
 }
 
-/// The end of the time in which everything begins that is there from the beginning, to the eye, where a mission is one
-/// window.
+/// If the mission is one window: the time until which elements that begin appear to have been there from the
+/// beginning.
 pub(crate) fn beginning(mission: &Mission) -> Option<Stamp> {
     let first = default_period(mission.span.nanos());
     let end = mission.span.start.plus(first.nanos());
     (mission.windows.len() == 1 && !mission.log.compares).then_some(end)
 }
 
-/// The headlines but for the starts in the first window, or in the beginning of the only one.
+/// The headlines except starts in the first window, or at the beginning of the only one.
 pub(crate) fn changed(mission: &Mission) -> impl Iterator<Item = &Event> {
     let first = mission.windows.first().map(|window| window.span.end);
     let first = beginning(mission).or(first);

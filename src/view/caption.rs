@@ -19,7 +19,7 @@ const LONGEST_NAME: usize = 48;
 /// The most names in the line below the headline.
 const MOST_NAMED: usize = 3;
 
-/// The kinds of events of which several at once are one event of the log.
+/// The kinds of events that the log combines if several happen at once.
 const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::Rate];
 
 /// A writer of headlines, window by window.
@@ -30,14 +30,15 @@ pub(crate) struct CaptionWriter<'a> {
     /// The parts of each event of the log.
     parts: BTreeMap<EventId, Vec<EventId>>,
     start: Stamp,
-    /// Whether there is but one window.
+    /// Whether there is only one window.
     is_still: bool,
     /// The last event of the windows so far.
     last: Option<Stamp>,
     audience: Audience<'a>,
 }
 
-/// The events of a window, in the order of their phrases, each with what is equal within one phrase.
+/// The events of a window, in the order of their phrases, each with the values that are equal within one
+/// phrase.
 type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
 impl<'a> CaptionWriter<'a> {
@@ -64,7 +65,7 @@ impl<'a> CaptionWriter<'a> {
             let part = self.event(headline.event).map(|e| Part::of(e, frame.span));
             let phrase = self.phrase(headline, part.unwrap_or(Part::Whole), home);
             add(&mut groups, phrase, headline.event);
-            // Equal events of others at the same time are parts of it.
+            // Equal simultaneous events of other elements are parts of it.
             for id in self.parts.get(&headline.event).into_iter().flatten() {
                 if let Some(part) = self.event(*id)
                     && CROWDED.contains(&part.kind)
@@ -181,7 +182,7 @@ impl<'a> CaptionWriter<'a> {
         }
     }
 
-    /// The place of a headline among the phrases, and its phrase. What ended comes before what began.
+    /// The rank of a headline among the phrases, and its phrase. Ends come before beginnings.
     fn phrase(&self, headline: &Headline, part: Part, home: &str) -> (u8, Phrase) {
         let name = self.name(headline.what, home);
         let kind = headline.kind;
@@ -263,7 +264,7 @@ impl<'a> CaptionWriter<'a> {
         (place, said(sign, &lead, name, ""))
     }
 
-    /// A difference of two missions.
+    /// A difference between two missions.
     fn compared(&self, headline: &Headline, home: &str) -> (u8, Phrase) {
         let name = self.name(headline.what, home);
         let (place, sign) = match headline.kind {
@@ -303,7 +304,7 @@ impl<'a> CaptionWriter<'a> {
         clip(below.unwrap_or(name))
     }
 
-    /// The node, or the topic where it is about none.
+    /// The node, or the topic if the event is about no node.
     fn subject(&self, what: Element) -> Option<&'a str> {
         match self.elements.ends(what).0 {
             Some(node) => self.node_name(node),

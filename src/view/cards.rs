@@ -1,5 +1,6 @@
-//! Cards: a topic that only one box is connected to is a row of that box, so that there are no leaves around it; the
-//! plumbing is a row in every box that is connected to it, so that no lines lead there from everywhere.
+//! Cards: a topic with only one connected box is a row of that box instead of a leaf beside it; a hub, a
+//! topic that half the system is connected to, is a row in every connected box instead of lines from
+//! everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,14 +10,14 @@ use super::showing::{Showing, ShowingWriter};
 use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
 
-/// A topic that is a row in a box: one without another known end, or one of the plumbing.
+/// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardRow {
-    /// The box that it is a row of: a place in [`View::items`](super::View::items).
+    /// The box that it is a row of: an index into [`View::items`](super::View::items).
     pub owner: u32,
-    /// Whether that box sends it, and whether it receives it.
+    /// Whether that box publishes it, and whether it subscribes to it.
     pub ways: [bool; 2],
-    /// Whether it is a topic that half the system is connected to, and a row in each box there.
+    /// Whether it is a hub, a topic that half the system is connected to, and a row in each of these boxes.
     pub is_plumbing: bool,
     /// The topic, or the group of topics.
     pub item: Item,
@@ -24,8 +25,8 @@ pub struct CardRow {
     pub shown: Showing,
 }
 
-/// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that they stand
-/// in. Fewer lines can be followed.
+/// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that
+/// contain them. Fewer lines are easy to follow.
 const FEWEST_ENDS: usize = 6;
 const FEWEST_HOMES: usize = 2;
 
@@ -38,9 +39,9 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Makes topics with one known end rows of the box there, and, if `hides_plumbing`, the plumbing rows of all boxes
-    /// that are connected to it. Topics that are there without a connection in some window stay boxes. The rows are
-    /// sorted by their boxes; what is sent comes before what is received.
+    /// Makes topics with one known endpoint rows of its box and, if `hides_plumbing`, hubs rows of all
+    /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
+    /// by their boxes, publications before subscriptions.
     pub(super) fn fold_leaves(&mut self, hides_plumbing: bool) -> Vec<CardRow> {
         let mut lines: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (at, arrow) in self.arrows.iter().enumerate() {
@@ -103,8 +104,8 @@ impl Drawn {
         }
     }
 
-    /// Whether one of these arrows of a topic is there whenever the topic is; of plumbing, whenever something is
-    /// reported of it.
+    /// Whether one of these arrows of a topic exists whenever the topic does; of a hub, whenever there is an
+    /// event about it.
     fn is_reported(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
         let Some(looks) = self.items_shown.get(topic as usize) else {
             return true;
@@ -117,7 +118,7 @@ impl Drawn {
         windows.all(|k| self.line(lines, k).is_some())
     }
 
-    /// The windows in which a topic or one of its arrows gets another look.
+    /// The windows in which the look of a topic or one of its arrows changes.
     fn turns(&self, topic: u32, lines: &[usize]) -> BTreeSet<u32> {
         let own = self.items_shown.get(topic as usize).into_iter();
         let lines = lines.iter().filter_map(|at| self.arrows_shown.get(*at));
@@ -127,7 +128,7 @@ impl Drawn {
             .collect()
     }
 
-    /// The look of the first of these arrows that is there in a window, one with a mark before others.
+    /// The look of the first of these arrows that exists in a window; one with a mark takes precedence.
     fn line(&self, lines: &[usize], window: u32) -> Option<&Shown> {
         let lines = lines
             .iter()
@@ -140,7 +141,7 @@ impl Drawn {
             .copied()
     }
 
-    /// The row of a topic in a box; that of plumbing has the rate of the box alone.
+    /// The row of a topic in a box; that of a hub has the rate of this box alone.
     fn row(&self, (topic, owner): (u32, u32), lines: &[usize], is_plumbing: bool) -> CardRow {
         let sends = |at: &usize| self.arrows[*at].to == topic;
         let receives = |at: &usize| self.arrows[*at].from == topic;
@@ -149,7 +150,7 @@ impl Drawn {
             let line = self.line(lines, window);
             let look = self.items_shown[topic as usize].at(window as usize);
             let look = look.zip(line).map(|(look, line)| {
-                // A connection that came or went is the change of the row, too.
+                // A connection that appeared or vanished is also the change of the row.
                 let reported = if look.mark.is_some() { look } else { line };
                 let events = look.events.iter().chain(&line.events);
                 let events: BTreeSet<_> = events.copied().collect();
@@ -171,8 +172,8 @@ impl Drawn {
         }
     }
 
-    /// Hides a box of unnamed publishers in the windows in which none of its topics is there, those of
-    /// the plumbing aside: it would be an empty box. Returns those that are never there.
+    /// Hides a box of unnamed publishers in windows without any of its topics, apart from hubs, as it would
+    /// be empty. Returns the boxes that are never shown.
     fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<u32> {
         let mut never = BTreeSet::new();
         for (showing, at) in self.items_shown.iter_mut().zip(0_u32..) {
@@ -204,8 +205,8 @@ impl Drawn {
         never
     }
 
-    /// Makes the two arrows of a box that both sends and receives a topic one line, with a head at each end that is
-    /// used.
+    /// Combines the two arrows of a box that both publishes and subscribes to a topic into one line, with a
+    /// head at each end that is used.
     pub(super) fn join_twins(&mut self) {
         let place = |arrows: &[Arrow], from: u32, to: u32| {
             arrows
@@ -240,7 +241,7 @@ impl Drawn {
         }
     }
 
-    /// Takes the topics of these rows and the boxes that are never there out of the boxes, and renumbers everything.
+    /// Removes the topics of these rows and the boxes that are never shown, and renumbers everything.
     fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
         let gone: BTreeSet<_> = rows
             .iter()
@@ -313,7 +314,7 @@ fn both_ways(ways: [&Showing; 2]) -> Showing {
     writer.finish()
 }
 
-/// Keeps the elements at these places.
+/// Keeps the elements at these indices.
 fn keep<T>(all: &mut Vec<T>, stays: impl Fn(usize) -> bool) {
     let mut at = 0;
     all.retain(|_| {
@@ -328,7 +329,7 @@ mod tests {
     use crate::view::testing::mission;
     use crate::view::{Mark, Mode, ViewOptions, view};
 
-    /// The boxes and the rows of a picture: `/a → /t`, with the windows in which each row is there.
+    /// The boxes and the rows of a picture: `/a → /t`, with the windows in which each row exists.
     fn drawn(windows: &[&str], mode: Mode) -> (Vec<String>, Vec<String>) {
         let options = ViewOptions {
             mode,

@@ -10,10 +10,10 @@ const DEEPEST: usize = 16;
 
 /// The namespaces of these items, sorted by name, parents before children, and each item's innermost one set.
 ///
-/// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item is in the box of its first N parts, or of
-/// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
-/// namespace around a single thing is left out, unless it is one of `kept`; a thing with the name of one of those is in
-/// it.
+/// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item is in the box of its first N parts,
+/// or of its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are
+/// drawn, but a namespace around a single item is omitted, unless it is one of `kept`; an item with the name
+/// of one of those is in it.
 pub(crate) fn clusters(
     items: &mut [Item],
     depth: Option<usize>,
@@ -88,7 +88,7 @@ fn parent(space: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// Drops namespaces around a single thing, which then belongs to the one around them.
+/// Drops namespaces around a single item, which then belongs to the next outer one.
 fn fold(spaces: &mut BTreeSet<&str>, homes: &[String], always: &BTreeSet<&str>) {
     let mut things: BTreeMap<&str, usize> = BTreeMap::new();
     for home in homes {

@@ -23,8 +23,8 @@ impl<'a> Collapse<'a> {
         }
     }
 
-    /// The collapsed namespace that swallows an element of this name: the outermost one that contains no namespace to
-    /// keep open on the way to the name. A node that is called like the namespace itself goes inside too.
+    /// The collapsed namespace that contains an element of this name: the outermost one without a namespace
+    /// to keep open between it and the name. A node with the same name as the namespace goes inside too.
     pub(crate) fn of(&self, name: &str) -> Option<&'a str> {
         let mut found = None;
         let ends = name.match_indices('/').map(|(at, _)| at).skip(1);
@@ -38,8 +38,8 @@ impl<'a> Collapse<'a> {
         found
     }
 
-    /// Opens the namespaces that would fold fewer than two of these names, and those in which a single node would be
-    /// left beside what is kept open: a box of a single thing gets the name of that thing.
+    /// Opens namespaces that would collapse fewer than two of these names, and those that would collapse a
+    /// single node beside elements kept open: a box of one element would have that element's name.
     pub(crate) fn open_single(&mut self, nodes: &BTreeSet<&str>, topics: &BTreeSet<&str>) {
         let mut folded: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
         for (at, names) in [nodes, topics].into_iter().enumerate() {
@@ -62,15 +62,15 @@ impl<'a> Collapse<'a> {
         self.collapse.is_empty()
     }
 
-    /// Whether this very element is kept open, not only a namespace around it.
+    /// Whether this element itself is kept open, not only a namespace around it.
     pub(crate) fn keeps(&self, name: &str) -> bool {
         self.expand.contains(name)
     }
 }
 
-/// The collapsed namespace that swallows a topic (or group): the one of all its `publishers` and `subscribers`, if it
-/// is the topic's `own` too or both kinds are there; with no connection at all, its `own`. Topics that cross the border
-/// of a namespace stay outside as its interface.
+/// The collapsed namespace that contains a topic (or group): that of all its `publishers` and `subscribers`,
+/// if it is also the topic's `own` or both kinds exist; without any connection, its `own`. Topics that cross
+/// the border of a namespace stay outside as its interface.
 pub(crate) fn swallows<'a>(
     own: Option<&'a str>,
     publishers: &[Option<&'a str>],
@@ -118,7 +118,7 @@ pub(crate) fn changed(mission: &Mission) -> BTreeMap<&str, usize> {
 }
 
 impl View {
-    /// The boxes inside a namespace that hold one of these elements.
+    /// The boxes inside a namespace that contain one of these elements.
     pub(crate) fn holding(&self, reported: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
         let items = self.items.iter();
         let inside = items.filter(|item| lies_in(&item.name, space));
@@ -129,16 +129,16 @@ impl View {
             .collect()
     }
 
-    /// The namespaces that could be collapsed, the one to collapse first at the front: those in which least changes for
-    /// each box that they hold, then innermost ones before those around them, the largest first, then by name. Those
-    /// that hold fewer than two boxes, or that `options` keeps open, are left out.
+    /// The namespaces that could be collapsed, in the order of collapsing: those with fewest changes per box,
+    /// then inner before outer ones, larger before smaller ones, then by name. Those with fewer than two
+    /// boxes, or that `options` keeps open, are omitted.
     pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Collapsible> {
         let changed = changed(mission);
         let open = Collapse::new(options).expand;
         let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
         for item in &self.items {
             let mut space = match item.kind {
-                // A node that is called like a namespace would go inside.
+                // A node with the same name as a namespace would go inside.
                 ItemKind::Node => item.name.as_ref(),
                 _ => namespace(&item.name),
             };

@@ -1,5 +1,5 @@
-//! Windows with more changes than a reader can follow: those of one kind in one namespace are one coloured frame
-//! with their number, and as few words in the headline.
+//! Windows with more changes than a reader can follow: changes of one kind in one namespace become one
+//! coloured frame with their number, and a short phrase in the headline.
 
 use std::collections::BTreeMap;
 
@@ -9,30 +9,30 @@ use crate::graph::Element;
 use crate::mission::Mission;
 use crate::mission::event_log::{EventId, Kind};
 
-/// The most things that have a colour, and a word in the headline, each on its own.
+/// The most changes that have their own colour and their own words in the headline.
 const MOST: usize = 5;
 /// The event of a phrase that describes several.
 const FOLDED: EventId = EventId::MAX;
 /// The word for publications and subscriptions.
 const EDGES: &str = "edges";
 
-/// The places of a phrase in the headline and of a name in it.
+/// The indices of a phrase in the headline and of a name in it.
 type NamePlace = (usize, usize);
 
 /// Changes of one kind in one namespace that are one coloured frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Crowd {
-    /// The namespace with the frame: a place in [`View::namespaces`]; the whole graph if `None`.
+    /// The namespace with the frame: an index into [`View::namespaces`]; the whole graph if `None`.
     pub space: Option<usize>,
     /// Its colour.
     pub mark: Mark,
     /// The words on the frame: `+4 nodes`.
     pub words: String,
-    /// The headlines, sorted: places in the event log.
+    /// The headlines, sorted: indices in the event log.
     pub events: Vec<EventId>,
 }
 
-/// Draws crowds as one in every window.
+/// Combines crowds in every window.
 pub(super) fn gather(view: &mut View, mission: &Mission) {
     let mut frames = std::mem::take(&mut view.frames);
     for frame in &mut frames {
@@ -54,7 +54,7 @@ fn largest(
     mission: &Mission,
 ) -> Option<(Vec<NamePlace>, Option<usize>)> {
     let mut groups: BTreeMap<(bool, usize, usize), Vec<NamePlace>> = BTreeMap::new();
-    // The first phrase about edges that come, and about those that go.
+    // The first phrase about edges that appear, and about those that vanish.
     let mut edges: BTreeMap<char, usize> = BTreeMap::new();
     for (at, phrase) in frame.caption.iter().enumerate() {
         for (name, event) in phrase.events.iter().enumerate() {
@@ -81,7 +81,8 @@ fn largest(
     let best = groups
         .into_iter()
         .max_by_key(|((is_framed, at, space), names)| {
-            // What came is still there in the next window; what went is seen in this one only.
+            // New elements are still visible in the next window; elements that ended are visible in this one
+            // only.
             let stays = frame.caption[*at].sign == '+' && all - names.len() < MOST;
             let order = (usize::MAX - at, usize::MAX - space);
             (*is_framed, stays, names.len(), order)
@@ -115,7 +116,7 @@ fn subject(mission: &Mission, event: EventId) -> &str {
         .unwrap_or_default()
 }
 
-/// The kind of thing that an event is about, in the plural.
+/// The kind of element that an event is about, in the plural.
 fn noun(mission: &Mission, event: EventId) -> &'static str {
     let event = mission.log.events.get(event as usize);
     event.map_or("changes", |event| match (event.kind, event.what) {
@@ -126,7 +127,7 @@ fn noun(mission: &Mission, event: EventId) -> &'static str {
     })
 }
 
-/// Makes some names one.
+/// Combines some names into one.
 fn fold(
     frame: &mut Frame,
     names: &[NamePlace],
@@ -187,8 +188,8 @@ impl View {
 }
 
 impl Frame {
-    /// Takes the colour from a look whose events are those of a crowd: it is drawn as if nothing happened, or as
-    /// gone; a folded namespace keeps its words.
+    /// Removes the colour from a look whose events are those of a crowd: it is drawn as unchanged, or as
+    /// ended; a collapsed namespace keeps its words.
     pub(crate) fn calm(&self, shown: &mut Shown) {
         let in_crowd = |event: &EventId| {
             let mut crowds = self.crowds.iter();

@@ -4,7 +4,7 @@ use regex::Regex;
 
 use crate::base::error::{Error, Result};
 
-/// A list of names and patterns, some of them exclusions. The default lets every name pass.
+/// A list of names and patterns, some of them exclusions. The default accepts every name.
 ///
 /// The rules are those of `matches_any` and `_split_filter_string` in `rqt_graph/dotcode.py`: tokens are split at
 /// commas and stripped; one that begins with `-` excludes; a lone `/` or nothing includes everything. A token matches
@@ -40,7 +40,7 @@ impl NameFilter {
         Ok(Self { includes, excludes })
     }
 
-    /// Whether a name passes: any inclusion (or none is given) and no exclusion matches it.
+    /// Whether a name passes: an inclusion matches it, or none is given, and no exclusion matches it.
     pub fn passes(&self, name: &str) -> bool {
         let name = name.trim();
         let included = self.includes.is_empty() || self.includes.iter().any(|t| t.matches(name));
@@ -84,9 +84,9 @@ impl FilterToken {
     }
 }
 
-/// The pattern as Python's `re.match` takes it: bound to the start of the text, free to end anywhere.
+/// The pattern as in Python's `re.match`: anchored at the start of the text, free to end anywhere.
 fn anchored(pattern: &str) -> Result<Regex> {
-    // On its own first, so that a stray `)` cannot close our group.
+    // Compiled alone first, so that a stray `)` cannot close our group.
     let compiled = Regex::new(pattern).and_then(|_| Regex::new(&format!(r"\A(?:{pattern})")));
     compiled.map_err(|error| {
         let text = error.to_string();
@@ -103,7 +103,7 @@ fn anchored(pattern: &str) -> Result<Regex> {
 mod tests {
     use super::*;
 
-    /// Which of the names pass, as one text.
+    /// The names that pass, as one text.
     fn passing(filter: &str, names: &[&str]) -> String {
         let filter = NameFilter::parse(filter).unwrap();
         let kept: Vec<&str> = names.iter().copied().filter(|n| filter.passes(n)).collect();

@@ -1,4 +1,4 @@
-//! The viewed part of a mission as a mission of its own, for `--filtered`.
+//! The viewed part of a mission as a separate mission, for `--filtered`.
 
 use super::items::Viewed;
 use super::state::{shows_node, shows_topic};
@@ -9,8 +9,9 @@ use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
 use crate::mission::event_log::{Detail, Event};
 use crate::mission::{EventId, EventLog, Mission, Window};
 
-/// The mission without the elements that the view leaves out. Topics in groups and elements inside collapsed namespaces
-/// are seen, so they stay, under their own names; so do changes, as they were found in the whole graph.
+/// The mission without the elements that the view omits. Topics in groups and elements inside collapsed
+/// namespaces are visible, so they stay, under their own names; changes stay as they were found in the whole
+/// graph.
 pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(mission, options);
     let mut keep = Keep::new(&mission.elements, options, &viewed);
@@ -34,7 +35,7 @@ struct Keep {
     topics: Vec<Option<u32>>,
     publishes: Vec<Option<u32>>,
     subscribes: Vec<Option<u32>>,
-    /// Per event of the event log its new place, if it stays.
+    /// Per event of the log, its new index, if it stays.
     events: Vec<Option<EventId>>,
 }
 
@@ -62,7 +63,7 @@ impl Keep {
         }
     }
 
-    /// The events about elements that stay. An event that is part of one that does not stay becomes one of its own.
+    /// The events about elements that stay. A part of an event that does not stay becomes a separate event.
     fn log(&mut self, all: &EventLog) -> EventLog {
         let stays = |event: &Event| self.element(event.what).is_some();
         self.events = numbered(all.events.iter().map(stays));
@@ -173,7 +174,7 @@ impl Keep {
             let node = sender.node.map(|id| new_id(&self.nodes, id));
             Some(Sender {
                 topic: new_id(&self.topics, sender.topic)?,
-                // Of a node that is left out the messages stay, and are of an unknown sender.
+                // The messages of an omitted node stay, with an unknown sender.
                 node: node.flatten(),
                 ..sender.clone()
             })

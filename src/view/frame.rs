@@ -8,7 +8,7 @@ use crate::mission::event_log::{EventId, Kind};
 /// An event of the log that begins in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Headline {
-    /// Its place in the event log.
+    /// Its index in the event log.
     pub event: EventId,
     /// The kind of event.
     pub kind: Kind,
@@ -40,7 +40,7 @@ pub struct Phrase {
     pub lead: String,
     /// The names, one per event.
     pub names: Vec<String>,
-    /// The event of each name: places in the event log.
+    /// The event of each name: indices in the event log.
     pub events: Vec<EventId>,
     /// The words after the names: `start`.
     pub tail: String,
@@ -73,25 +73,26 @@ pub struct Frame {
     pub span: Span,
     /// Whether it is shorter than the others.
     pub partial: bool,
-    /// The number of all messages of the bag in the window, hidden topics included.
+    /// The number of all messages in the window, including those of hidden topics.
     pub messages: u64,
     /// For each namespace that represents several, in the order of [`View::namespaces`](super::View::namespaces), the
     /// presence of each of them.
     pub member_lists: Vec<Vec<Attendance>>,
     /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
     pub headlines: Vec<Headline>,
-    /// The events of earlier windows that last into it or end in it: marked and in words, but counted once, where they
-    /// begin.
+    /// The events of earlier windows that last into it or end in it: they are marked and in the headline, but
+    /// counted only where they begin.
     pub lasting: Vec<Lasting>,
     /// The number of headlines of each kind.
     pub counts: Counts,
     /// The changes in words, the most important first; empty exactly if nothing is marked.
     pub caption: Vec<Phrase>,
-    /// The changes that are one coloured frame, because there are too many.
+    /// The changes that are combined into one coloured frame, because there are too many.
     pub crowds: Vec<Crowd>,
-    /// The long time without a message and without a change that it lies in, which is one frame of a film.
+    /// The long time without messages and changes that it lies in, which is one frame of an animation.
     pub empty: Option<Span>,
-    /// The line below: namespace, exact times and consequence of the changes, or since when nothing changed.
+    /// The line below: namespace, exact times and consequences of the changes, or the time of the last
+    /// change.
     pub note: String,
 }
 
@@ -126,8 +127,8 @@ impl Frame {
         self.shortened(most, 3)
     }
 
-    /// The caption with as many names as fit, at most 40 of each kind, and of as many phrases as can be; the shortest form
-    /// where none fits.
+    /// The caption with as many names as fit, at most 40 of each kind, and as many phrases as possible; the
+    /// shortest form if none fits.
     pub fn fitting(&self, fits: impl Fn(&str) -> bool) -> String {
         let longest = self.caption.iter().map(|p| p.names.len()).max();
         let longest = longest.unwrap_or(1).min(40);

@@ -23,7 +23,8 @@ pub(crate) struct Frames {
     pub(crate) arrows: Vec<Showing>,
 }
 
-/// The windows one after the other. In one without headlines, only elements whose numbers changed are looked at.
+/// The windows one after the other. In windows without headlines, only elements whose numbers changed are
+/// updated.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
     let mut windows = ShownWindows::new(mission, options, viewed);
     let mut writer = CaptionWriter::new(mission, viewed);
@@ -60,10 +61,10 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     }
 }
 
-/// The most windows without a message in a row that are a frame each.
+/// The most consecutive windows without a message that are separate frames.
 const MOST_EMPTY: usize = 10;
 
-/// Marks each long run of windows without a message and without a change as one time.
+/// Marks each long run of windows without messages and changes as one time.
 fn join_empty(frames: &mut [Frame]) {
     let is_empty = |frame: &Frame| frame.messages == 0 && !frame.is_changed();
     for run in frames.chunk_by_mut(|a, b| is_empty(a) && is_empty(b)) {
@@ -79,8 +80,8 @@ fn join_empty(frames: &mut [Frame]) {
     }
 }
 
-/// For each window, whether it is the first, or an event of the event log begins or ends in it or in the window before, or
-/// the first message of a topic comes: in all others everything stays as it is.
+/// For each window, whether it is the first, contains the first message of a topic, or an event of the log
+/// begins or ends in it or in the previous one; in all others nothing changes.
 fn turns(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
     let mut turns = vec![false; windows.len()];
@@ -107,7 +108,7 @@ struct ShownWindows<'a> {
     lives: ItemTurns<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
-    /// What begins before it is not a change.
+    /// A beginning before this time is not a change.
     beginning: Option<Stamp>,
     now: Now<'a>,
     turn: WindowTurn,
@@ -120,7 +121,7 @@ struct ShownWindows<'a> {
 #[derive(Default)]
 struct Cast {
     shown: Vec<ShowingWriter>,
-    /// The ids of those with other numbers than in the window before.
+    /// The ids of those with other numbers than in the previous window.
     touched: Vec<u32>,
     is_touched: Vec<bool>,
 }
@@ -224,8 +225,7 @@ impl<'a> ShownWindows<'a> {
         }
     }
 
-    /// Shows a window without headlines after another without: everything that is there stays there, and what is away
-    /// stays away.
+    /// Shows a window without headlines after another without: all elements stay present or away as they are.
     fn go_on(&mut self, at: u32) {
         for who in self.member_lists.iter_mut().flatten() {
             *who = match who {
@@ -260,7 +260,7 @@ impl<'a> ShownWindows<'a> {
     }
 }
 
-/// The presence of each member of each fleet, given the elements alive before and after the window.
+/// The presence of each member of each fleet, given the elements that exist before and after the window.
 fn member_lists(
     viewed: &Viewed,
     before: &Alive,
@@ -289,7 +289,8 @@ mod tests {
     use super::*;
     use crate::view::testing::mission;
 
-    /// Each window as text: items and arrows with a sign for their mark, hidden or not there if not named.
+    /// Each window as text: items and arrows with a sign for their mark; hidden and absent ones are not
+    /// listed.
     fn seen(windows: &[&str], options: &ViewOptions) -> Vec<String> {
         let (view, _) = view(&mission(windows), options);
         let seen = (0..view.frames.len()).map(|k| view.seen(k));

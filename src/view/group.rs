@@ -10,8 +10,9 @@ use crate::graph::{Elements, TopicId};
 /// The groups by name, and the topics in each, sorted. No topic is in two groups.
 pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;
 
-/// Groups the topics that are still `seen`. ROS 1 actions, images and the transform tree follow `rqt_graph`'s rules;
-/// ROS 2 actions and service events, which it does not know, are grouped where two or more of their topics are there.
+/// Groups the topics that are still `seen`. ROS 1 actions, images and the transform tree follow `rqt_graph`'s
+/// rules; ROS 2 actions and service events, which it does not know, are grouped if at least two of their
+/// topics are present.
 pub(crate) fn groups(elements: &Elements, seen: &[bool], wish: Grouping) -> Groups {
     let topics = elements.topics.iter().zip(0..);
     let mut free: BTreeMap<&str, TopicId> = topics
@@ -95,14 +96,14 @@ fn action_of_ros2(topic: &str) -> Option<String> {
     Some(format!("{action}{}", ACTION.name))
 }
 
-/// The group of the event topics of the services of one namespace, which is most often a node's name.
+/// The group of the event topics of the services of one namespace, which is usually a node's name.
 fn service_events(topic: &str) -> Option<String> {
     let service = topic.strip_suffix("/_service_event")?;
     let space = namespace(service).trim_end_matches('/');
     Some(format!("{space}/service_events"))
 }
 
-/// Moves these topics into the group, which grows if it is there.
+/// Moves these topics into the group, which is extended if it exists.
 fn take<'a>(
     free: &mut BTreeMap<&'a str, TopicId>,
     groups: &mut Groups,

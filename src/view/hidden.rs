@@ -1,4 +1,4 @@
-//! The notices about elements that the picture leaves out, one per reason, with the way to see them.
+//! The notices about elements that the picture leaves out, one per reason, with the option that shows them.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ fn add(notices: &mut Notices, count: usize, text: String) {
     });
 }
 
-/// The words for the elements left out for a reason, and the way to see them.
+/// The words for the elements left out for a reason, and the option that shows them.
 fn words(reason: Reason) -> (&'static str, &'static str) {
     match reason {
         Reason::NsFilter => (
@@ -85,11 +85,8 @@ fn words(reason: Reason) -> (&'static str, &'static str) {
             "`--hide` without `params` shows them",
         ),
         Reason::Services => ("services", "`--hide` without `services` shows them"),
-        Reason::Debug => (
-            "what is there for debugging",
-            "`--hide` without `debug` shows it",
-        ),
-        Reason::Quiet => ("housekeeping", "`--hide none` shows it"),
+        Reason::Debug => ("debugging elements", "`--hide` without `debug` shows them"),
+        Reason::Quiet => ("housekeeping", "`--hide none` shows them"),
         Reason::Recorder => ("recorder and player", "`--show-recorder` shows them"),
     }
 }
@@ -126,7 +123,7 @@ mod tests {
         assert_eq!(
             reported(window, &ViewOptions::default()),
             [
-                "2 housekeeping left out (/clock, /rosout): `--hide none` shows it",
+                "2 housekeeping left out (/clock, /rosout): `--hide none` shows them",
                 "1 recorder and player left out (/record_7): `--show-recorder` shows them",
             ]
         );

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::base::name::namespace;
 
-/// The namespace below which names are written without it: the one around all names that have one, else that of most
-/// of them; empty where all stand at the root.
+/// The namespace below which names are written without it: the one around all names that have one, else that
+/// of most of them; empty if all are at the root.
 pub(super) fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
     let spaces = names.map(|name| namespace(without_transport(name)));
     let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
@@ -22,7 +22,7 @@ pub(super) fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
         let (count, around) = most.entry(&space[..end]).or_insert((0, space));
         (*count, *around) = (*count + 1, shared(around, space));
     }
-    // Of equal ones the first.
+    // The first of equal ones.
     let best = most.values().rev().max_by_key(|(count, _)| *count);
     best.map_or("", |(_, around)| around)
 }

@@ -12,8 +12,9 @@ use crate::graph::{Edge, Elements, Topic};
 /// The kind and name of a box.
 pub(crate) type ItemKey = (ItemKind, Arc<str>);
 
-/// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their name.
-/// Topics that several boxes publish are reported by the arrows alone, so they are in none.
+/// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their
+/// name. Changes of topics that several boxes publish are only shown on the arrows, so these topics are in
+/// none.
 pub(crate) fn inside(
     elements: &Elements,
     collapse: &Collapse<'_>,
@@ -42,7 +43,7 @@ pub(crate) fn inside(
     topics.map(home).collect()
 }
 
-/// Puts the topics of each group into its box, whose name is made unlike that of every topic.
+/// Puts the topics of each group into its box, whose name is made different from that of every topic.
 pub(crate) fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
     for ids in groups.values() {
         for id in ids {

@@ -1,4 +1,4 @@
-//! The items of a view: every box and arrow of the mission, and the place of each element of the graph among them.
+//! The items of a view: every box and arrow of the mission, and the one that shows each element of the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use super::{Arrow, ArrowKind, Item, ItemKind, LineWidth, Mode, ViewOptions};
 use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
 
-/// The place of an edge of the graph in the picture.
+/// The part of the picture that shows an edge of the graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EdgePlace {
     /// It is not drawn.
@@ -28,7 +28,7 @@ pub(crate) enum EdgePlace {
     Inside(u32),
 }
 
-/// Every box and arrow, and the way from the graph's elements to them.
+/// Every box and arrow, and the mapping from the graph's elements to them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Viewed {
     pub(crate) selection: Selection,
@@ -40,9 +40,10 @@ pub(crate) struct Viewed {
     pub(crate) node: Vec<Option<u32>>,
     /// Per topic of the mission, its item.
     pub(crate) topic: Vec<Option<u32>>,
-    /// The place of each publication. In mode *nodes* it may be part of several arrows and is reported by `pairs` alone.
+    /// The part that shows each publication. In mode *nodes* a publication may be part of several arrows,
+    /// which only `pairs` lists.
     pub(crate) publish: Vec<EdgePlace>,
-    /// The place of each subscription.
+    /// The part that shows each subscription.
     pub(crate) subscribe: Vec<EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
@@ -64,11 +65,11 @@ pub(crate) struct Viewed {
     pub(crate) dropped: usize,
 }
 
-/// The largest number of pairs of publishers and subscribers drawn from node to node. One topic with thousands of both
-/// has millions, too many to be read.
+/// The largest number of pairs of publishers and subscribers drawn from node to node. A topic with thousands
+/// of both has millions, far too many to read.
 const MOST_PAIRS: usize = 200_000;
 
-/// The fleets to draw as one: none where names are wanted exactly, or everything on its own.
+/// The fleets to draw as one: none if exact names or separate boxes are requested.
 fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
     if options.exact_names || options.group == super::Grouping::NONE {
         return Fleets::default();
@@ -108,7 +109,7 @@ impl Viewed {
         if options.mode == Mode::Bundles {
             viewed.drawn = bundles::drawn(mission, options);
         }
-        // What is written down or can be opened has a box for each.
+        // Outputs that are files of data or can be expanded have a box for each.
         if options.mode == Mode::Bundles && options.is_picture {
             viewed.is_in_words[0] = bundles::nodes_in_words(
                 mission,
@@ -370,7 +371,7 @@ impl Viewed {
         }
     }
 
-    /// Lets a bundle run as most of its topics do.
+    /// Gives a bundle the direction of most of its topics.
     fn turn(&self, ends: &mut ArrowEnds, pairs: &[(EdgeId, EdgeId)]) {
         let topics = |from: u32| {
             let of = pairs
@@ -422,7 +423,7 @@ impl Viewed {
         self.both_of(what).1
     }
 
-    /// Notes the arrows that each topic's publications are part of.
+    /// Records the arrows that each topic's publications are part of.
     fn set_carriers(&mut self, elements: &Elements) {
         for (arrow, id) in self.arrows.iter().zip(0..) {
             for member in &arrow.members {

@@ -1,16 +1,17 @@
-//! Events that last: the node that is away, and what is back after an absence or a silence.
+//! Events that last: nodes that are away, and elements that are back after an absence or a silence.
 
 use super::items::Viewed;
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::event_log::{Event, EventId, EventLog, Kind};
 
-/// An event of an earlier window that lasts into this one or ends in it: a node is away, or something is back.
+/// An event of an earlier window that lasts into this one or ends in it: a node is away, or an element is
+/// back.
 ///
-/// A silence without a proof of an absence is listed where it ends only.
+/// A silence without evidence of an absence is only listed where it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lasting {
-    /// Its place in the event log.
+    /// Its index in the event log.
     pub event: EventId,
     /// The element it is about.
     pub what: Element,
@@ -23,11 +24,11 @@ pub struct Lasting {
 /// The part of an event that a window shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// All that is drawn of it.
+    /// All of it that is drawn.
     Whole,
     /// A node leaves, to come back in a later window.
     Leaves,
-    /// A node is away all through the window.
+    /// A node is away during the whole window.
     Away,
     /// A node or topic is back.
     Back,
@@ -57,7 +58,7 @@ pub(crate) struct LastingEvents<'a> {
     all: Vec<(EventId, &'a Event)>,
     /// The first of them that begins in or after the present window.
     next: usize,
-    /// The places of those that began before it and do not end before it.
+    /// The indices of those that began before it and do not end before it.
     open: Vec<usize>,
 }
 

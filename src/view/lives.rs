@@ -1,7 +1,8 @@
-//! The lives of elements by the event log: one without a beginning in it was there before, one without an end stays.
+//! The lifetimes of elements by the event log: an element without a beginning in it existed before, one
+//! without an end stays.
 //!
-//! The picture follows from these and not from the messages that fall into a window, so that nothing comes, goes or
-//! changes its look without an event.
+//! The picture is derived from these and not from the messages in a window, so that no element appears,
+//! vanishes or changes its look without an event.
 
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Elements, PerElement};
@@ -29,8 +30,9 @@ impl<'a> ItemTurns<'a> {
         };
         let events = &mission.log.events;
         for event in events {
-            // A part is reported with its whole, so that it comes and goes with it. What restarts keeps its parts; of a
-            // role one run ends there and the next one begins, without which each of them would live all the time.
+            // A part is reported with its whole, so it appears and vanishes with it. An element that restarts
+            // keeps its parts; for a role, one run ends and the next one begins at a restart, otherwise each
+            // run would exist all the time.
             let whole = event.part_of.and_then(|id| events.get(id as usize));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
             if is_kept && !matches!(event.what, Element::Node(_)) {
@@ -66,7 +68,7 @@ impl<'a> ItemTurns<'a> {
         })
     }
 
-    /// The elements that live at any time of a window.
+    /// The elements that exist at any time of a window.
     pub(crate) fn during(&self, span: Span) -> Alive {
         self.alive(span.end, |turns| {
             let first = turns.partition_point(|t| t.0 < span.start);
@@ -75,8 +77,8 @@ impl<'a> ItemTurns<'a> {
         })
     }
 
-    /// Elements that are silent or away all through a window. A publication pauses with its node, a topic with all of
-    /// its publications, a subscription with its topic.
+    /// Elements that are silent or away during a whole window. A publication pauses with its node, a topic
+    /// with all of its publications, a subscription with its topic.
     pub(crate) fn paused(&self, span: Span, alive: &Alive) -> Alive {
         let own = |what| {
             let covers = |pause: &Span| pause.start <= span.start && span.end <= pause.end;
@@ -103,8 +105,9 @@ impl<'a> ItemTurns<'a> {
         })
     }
 
-    /// `own` says whether an element lives by its own beginnings and ends, the last of them before `end`. An edge lives
-    /// with its node; a topic without turns of its own lives with its edges, without any from its first message on.
+    /// `own` returns whether an element exists according to its own beginnings and ends, the last of them
+    /// before `end`. An edge exists as long as its node; a topic without beginnings and ends of its own
+    /// exists with its edges or, without edges, from its first message on.
     fn alive(&self, end: Stamp, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
         let own = |what| {
             let turns = self.turns.of(what).filter(|turns| !turns.is_empty())?;
@@ -137,7 +140,8 @@ impl<'a> ItemTurns<'a> {
     }
 }
 
-/// Whether an element exists after the first `done` of its turns: before the first one, if that is not a beginning.
+/// Whether an element exists after the first `done` of its beginnings and ends; before all of them, it exists
+/// unless the first is a beginning.
 fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
     match done.checked_sub(1).and_then(|last| turns.get(last)) {
         Some((_, begins)) => *begins,

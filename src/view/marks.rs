@@ -13,10 +13,10 @@ use crate::mission::event_log::{Detail, Event, EventId, Kind};
 /// The changes of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Changed {
-    /// Whether something of it began, or ended.
+    /// Whether a part of it began, or ended.
     pub(crate) came: bool,
     pub(crate) went: bool,
-    /// The mark that it gets if it was there before and still is.
+    /// Its mark if it existed before and still does.
     pub(crate) mark: Option<Mark>,
     /// Messages per second before and after.
     pub(crate) rates: Option<(f64, f64)>,
@@ -24,7 +24,7 @@ pub(crate) struct Changed {
     pub(crate) events: Vec<EventId>,
 }
 
-/// The parts of each headline, by their places in the event log.
+/// The parts of each headline, by their indices in the event log.
 pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// The changes of one window by the id of the item or arrow.
@@ -37,9 +37,9 @@ pub(crate) struct News {
 }
 
 impl News {
-    /// The changes of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
-    /// headline; they are reported with it, whenever they were seen. What starts or appears before `beginning` is
-    /// not a change.
+    /// The changes of the window `span`, with the events of earlier windows that last. `parts` are the parts
+    /// of each headline; they are reported with it, whenever they happened. A start or appearance before
+    /// `beginning` is not a change.
     pub(crate) fn new(
         log: &EventLog,
         (parts, beginning): (&Parts, Option<Stamp>),
@@ -196,7 +196,7 @@ impl EventSign {
         }
     }
 
-    /// The mark on something that was there before and still is.
+    /// The mark on an element that existed before and still does.
     fn mark(&self, reach: Reach) -> Option<Mark> {
         let is_faster = self.rates.is_some_and(|(from, to)| to > from);
         match (self.part, reach) {
@@ -218,7 +218,8 @@ impl EventSign {
         }
     }
 
-    /// Notes the event for an item or arrow; of several marks on the same one, the most informative one stays.
+    /// Records the event for an item or arrow; of several marks on the same one, the most informative one
+    /// stays.
     fn keep(&self, all: &mut BTreeMap<u32, Changed>, id: u32, reach: Reach) {
         let reported = all.entry(id).or_default();
         reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);

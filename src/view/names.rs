@@ -1,4 +1,5 @@
-//! The names that are housekeeping by the lists of `rqt_graph`; our own short list is with the names of the graph.
+//! The names that are housekeeping according to `rqt_graph`'s lists; our own short list is in the graph's
+//! module.
 
 pub(crate) use crate::base::name::is_quiet;
 
@@ -49,8 +50,9 @@ pub(crate) fn is_tf(topic: &str) -> bool {
     matches!(topic, "/tf" | "/tf_static")
 }
 
-/// Whether `rqt_graph`'s "Params" leaves out this topic. Its rule for `parameter_updates` compares the wrong part of
-/// the name and so hides nothing; as in its first version, we hide them where `parameter_descriptions` stands beside.
+/// Whether `rqt_graph`'s "Params" leaves out this topic. Its rule for `parameter_updates` compares the wrong
+/// part of the name and so hides nothing; as in its first version, we hide them if `parameter_descriptions`
+/// exists beside them.
 pub(crate) fn is_params(topic: &str, exists: impl Fn(&str) -> bool) -> bool {
     let beside = |this: &str, other: &str| {
         topic

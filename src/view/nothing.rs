@@ -1,5 +1,5 @@
-//! Options of a view that name nothing, and the error of a view that shows nothing at all, with the name that may have
-//! been meant.
+//! Options of a view that match nothing, and the error of a view that shows nothing at all, with the name
+//! that may have been meant.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
 use crate::graph::Elements;
 
-/// The error of a view in which nothing of these elements is left.
+/// The error of a view without any of these elements.
 pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
     let nodes: Vec<&str> = elements.nodes.iter().map(|n| n.name.as_str()).collect();
     let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
@@ -24,7 +24,7 @@ pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
         let passes = |name: &&str| filter.passes(name);
         if !filter.passes_all() && !names.iter().any(passes) {
             return Error::usage(
-                format!("`{flag}` lets none of {} through", among(names.len())),
+                format!("`{flag}` matches none of {}", among(names.len())),
                 meant(&filter.wanted(), names),
             );
         }
@@ -32,7 +32,7 @@ pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
     let all = words::count(nodes.len() + topics.len(), "name");
     Error::usage(
         format!("nothing is left to draw of {all}"),
-        "`--hide none` and `--show-recorder` show what is left out; wider filters show more",
+        "show more with `--hide none`, `--show-recorder` or wider filters",
     )
 }
 
@@ -85,7 +85,7 @@ fn among(names: usize) -> String {
     }
 }
 
-/// The name or namespace nearest to one that was asked for, else some that there are.
+/// The name or namespace nearest to a requested one, else some existing ones.
 fn meant(wanted: &[&str], names: &[&str]) -> String {
     let mut known: BTreeSet<&str> = names.iter().copied().collect();
     for name in names {
@@ -103,7 +103,9 @@ fn meant(wanted: &[&str], names: &[&str]) -> String {
     });
     match near {
         Some(name) if names.contains(&name) => format!("the nearest name is `{name}`"),
-        Some(space) => format!("the nearest namespace is `{space}`: `{space}/.*` is all of it"),
+        Some(space) => {
+            format!("the nearest namespace is `{space}`: `{space}/.*` matches all of it")
+        }
         None => format!("there are {}", words::some_of(names, 3)),
     }
 }
@@ -149,7 +151,7 @@ mod tests {
     fn the_nearest_name_or_namespace_is_suggested() {
         assert_eq!(
             hint("/robt1/.*"),
-            "the nearest namespace is `/robot1`: `/robot1/.*` is all of it"
+            "the nearest namespace is `/robot1`: `/robot1/.*` matches all of it"
         );
         assert_eq!(hint("/robot1/aml"), "the nearest name is `/robot1/amcl`");
         assert_eq!(

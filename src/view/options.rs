@@ -50,7 +50,7 @@ worded! {
     }
 }
 
-/// The things to leave out. The default is `quiet` alone.
+/// The elements to leave out. The default is `quiet` alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -72,7 +72,7 @@ pub struct Hide {
     pub params: bool,
     /// Services.
     pub services: bool,
-    /// Nodes without a sign of life in the window.
+    /// Nodes without any sign of activity in the window.
     pub unreachable: bool,
 }
 
@@ -89,8 +89,8 @@ impl Hide {
         unreachable: false,
     };
 
-    /// The things to leave out by a list like `debug,dead`, in the place of the default; `none` and the empty list hide
-    /// nothing.
+    /// The elements to leave out by a list such as `debug,dead`, which replaces the default; `none` and the
+    /// empty list hide nothing.
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown word.
@@ -126,7 +126,7 @@ impl Default for Hide {
     }
 }
 
-/// The things to draw as one box. The default is everything, with a box around every namespace.
+/// The elements to draw as one box. The default is all groups, with a box around every namespace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grouping {
     /// The topics of an action, and the event topics of services, as one box each.
@@ -140,7 +140,7 @@ pub struct Grouping {
 }
 
 impl Grouping {
-    /// The choice that draws every node and topic on its own.
+    /// The choice that draws every node and topic separately.
     pub const NONE: Self = Self {
         actions: false,
         tf: false,
@@ -148,8 +148,8 @@ impl Grouping {
         namespaces: Some(0),
     };
 
-    /// The things to draw as one box by a list like `actions,tf,namespaces=2`, in the place of the default. A list
-    /// without `namespaces` leaves them boxed on all levels, unless it is `none`.
+    /// The elements to draw as one box by a list such as `actions,tf,namespaces=2`, which replaces the
+    /// default. A list without `namespaces` leaves them boxed on all levels, unless it is `none`.
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown word or a depth that is not a number.
@@ -168,7 +168,7 @@ impl Grouping {
                 ("namespaces", depth) => {
                     group.namespaces = Some(depth.parse().map_err(|_| {
                         Error::usage(
-                            format!("`{depth}` is not a depth of namespaces"),
+                            format!("`{depth}` is not a number of namespace levels"),
                             "write a whole number: `namespaces=2`",
                         )
                     })?);
@@ -194,12 +194,9 @@ impl Default for Grouping {
     }
 }
 
-/// The choice of what the picture shows of the graph.
+/// The part of the graph that the picture shows.
 #[derive(Clone, Debug, Default)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "choices that do not depend on each other"
-)]
+#[expect(clippy::struct_excessive_bools, reason = "independent choices")]
 #[non_exhaustive]
 pub struct ViewOptions {
     /// The kinds of boxes and arrows.
@@ -208,9 +205,9 @@ pub struct ViewOptions {
     pub ns_filter: NameFilter,
     /// The filter for topics.
     pub topic_filter: NameFilter,
-    /// The things to leave out.
+    /// The elements to leave out.
     pub hide: Hide,
-    /// The things to draw as one box.
+    /// The elements to draw as one box.
     pub group: Grouping,
     /// Namespaces to draw as one box each: `/robot1/nav`.
     pub collapse: Vec<Arc<str>>,
@@ -218,14 +215,14 @@ pub struct ViewOptions {
     pub expand: Vec<Arc<str>>,
     /// Whether to show the recorder and the player.
     pub show_recorder: bool,
-    /// Whether it is only looked at: topics with one known end, and those that half the system is connected to, are
-    /// rows in boxes, and topics without a known end are words.
+    /// Whether the output is only for viewing: topics with one known endpoint, and those that half the system
+    /// is connected to, are rows in boxes, and topics without a known endpoint are listed as words.
     pub(crate) is_picture: bool,
-    /// Whether bundles name nodes that never change in words too if one line leads to them.
+    /// Whether bundles also list nodes that never change as words if they have a single line.
     pub(crate) are_leaves_in_words: bool,
     /// The number that the thickness of lines shows.
     pub line_width: LineWidth,
-    /// Whether anonymous nodes are drawn under their full names, each run a box of its own.
+    /// Whether anonymous nodes are drawn under their full names, with a box for each run.
     pub exact_names: bool,
 }
 

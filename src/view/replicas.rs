@@ -1,5 +1,5 @@
-//! Namespaces and names that are the same but for their index, such as the robots of a fleet: they are drawn once for
-//! all.
+//! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once
+//! for all.
 
 use std::cmp::Reverse;
 use std::collections::hash_map::DefaultHasher;
@@ -14,13 +14,13 @@ use crate::graph::{Element, Elements};
 /// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
 
-/// The most equal namespaces that are drawn as one: the presence of each is kept for each window.
+/// The most equal namespaces that are drawn as one: the presence of each is stored for each window.
 const MOST: usize = 1024;
 
 /// The most digits of an index: longer numbers are times, process numbers or serial numbers.
 const MOST_DIGITS: usize = 6;
 
-/// The largest number of searches for fleets among the namespaces that are left.
+/// The largest number of searches for fleets among the remaining namespaces.
 const MOST_ROUNDS: usize = 16;
 
 /// Namespaces, or single names, with the same graph, drawn as one.
@@ -45,17 +45,17 @@ impl Fleet {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fleets {
     pub(crate) all: Vec<Fleet>,
-    /// The place of each namespace's fleet, by the name of the namespace.
+    /// The index of each namespace's fleet, by the name of the namespace.
     place: BTreeMap<Arc<str>, usize>,
-    /// The place of each fleet by the name it is drawn under.
+    /// The index of each fleet by the name it is drawn under.
     drawn: BTreeMap<Arc<str>, usize>,
 }
 
-/// A hash for each thing that a namespace contains or is linked to, without the name of the namespace.
+/// A hash for each element that a namespace contains or is linked to, without the name of the namespace.
 type Inside = BTreeSet<u64>;
 
 impl Fleets {
-    /// The fleets among these elements, but for namespaces that are kept open.
+    /// The fleets among these elements, except namespaces that are kept open.
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
         let mut by_stem: BTreeMap<&str, BTreeMap<&str, Inside>> = BTreeMap::new();
         let kept = options.expand.iter().chain(&options.collapse);
@@ -74,9 +74,10 @@ impl Fleets {
             for (space, inside) in spaces {
                 alike.entry(inside).or_default().push(space);
             }
-            // The largest, of several the one whose first name comes first; those that differ stay beside it.
+            // The largest, or of several the one whose first name comes first; members that differ stay
+            // beside it.
             let largest = alike.into_values().max_by_key(|m| (m.len(), Reverse(m[0])));
-            // Of single names a few are soon equal by chance.
+            // A few single names are easily equal by chance.
             let is_rule =
                 |m: &Vec<&str>| 2 * m.len() > many || !m.iter().all(|s| single.contains(s));
             if let Some(members) =
@@ -121,7 +122,7 @@ impl Fleets {
         Some(format!("{}{rest}", fleet.name).into())
     }
 
-    /// The fleet that something drawn under this name is part of.
+    /// The fleet that an element drawn under this name is part of.
     pub(crate) fn of(&self, drawn: &str) -> Option<&Fleet> {
         let around = std::iter::successors(Some(drawn), |name| Some(namespace(name)));
         let mut around = around.take_while(|name| name.len() > 1);
@@ -150,7 +151,7 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// Whether something is called like this namespace or lies in it.
+    /// Whether an element has the name of this namespace or is in it.
     fn holds(&self, space: &str) -> bool {
         let below = format!("{space}/");
         let next = self.names.range(below.as_str()..).next();
@@ -166,14 +167,14 @@ impl<'a> Known<'a> {
 }
 
 impl ViewOptions {
-    /// The same options with every namespace opened: none collapsed, none drawn for several.
+    /// The same options with every namespace expanded: none collapsed, none drawn for several.
     pub(crate) fn opened(&self, elements: &Elements) -> Self {
         let mut options = Self {
             collapse: Vec::new(),
             is_picture: false,
             ..self.clone()
         };
-        // Those that differed from the largest fleet may be one among themselves.
+        // Those that differed from the largest fleet may form another one.
         for _ in 0..MOST_ROUNDS {
             let fleets = Fleets::new(elements, &options);
             if fleets.all.is_empty() {
@@ -218,7 +219,7 @@ fn index(space: &str) -> &str {
     &space[stem(space).len()..]
 }
 
-/// Every namespace with a number, and a hash for each thing in it and each edge of such a thing.
+/// Every namespace with a number, and a hash for each element in it and each of their edges.
 fn described(elements: &Elements) -> Vec<(&str, u64)> {
     let mut all = Vec::new();
     for (name, element) in names(elements) {
@@ -245,7 +246,7 @@ fn described(elements: &Elements) -> Vec<(&str, u64)> {
     all
 }
 
-/// A name as one of several equal namespaces sees it.
+/// A name relative to one of several equal namespaces.
 #[derive(Hash)]
 enum Seen<'a> {
     /// In the namespace: the rest of the name.
@@ -290,8 +291,8 @@ fn partners(elements: &Elements) -> Vec<(&str, &str)> {
     elements.edges().filter_map(pair).collect()
 }
 
-/// Drops fleets of which a member is linked to one of the same index that is in no fleet, and those linked to them:
-/// they only look alike.
+/// Drops fleets with a member that is linked to a namespace of the same index outside of all fleets, and
+/// fleets linked to these: their members only look alike.
 fn keep_linked(found: &mut Vec<(&str, Vec<&str>)>, partners: &[(&str, &str)]) {
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
     for (at, (_, members)) in found.iter().enumerate() {
@@ -385,7 +386,7 @@ mod tests {
             seen.namespaces[1].replicas,
             ["1", "2", "3", "4"].map(Arc::from)
         );
-        // Long numbers are no index: those are distinguished, or one by their role.
+        // Long numbers are not an index: such nodes are separate, or one by their role.
         assert!(seen.items.iter().all(|item| !item.name.ends_with("NN")));
         assert_eq!(seen.namespaces.len(), 2);
     }
@@ -395,7 +396,7 @@ mod tests {
         let seen = |text: &str| outline(&mission(&[text]), &ViewOptions::default());
         let chain = "/work_1>/out_1 /work_2>/out_2 /work_3>/out_3 /work_4>/out_4";
         assert_eq!(seen(chain).items.len(), 2);
-        // Half of the topics go on to another node each: the nodes would be one, and its topics many.
+        // Half of the topics lead to another node each: the nodes would be merged, but not their topics.
         let more = " /a</out_1 /b</out_2 /work_5>/out_5 /work_5>/x /work_6>/out_6 /work_6>/y";
         let items = seen(&(chain.to_owned() + more)).items;
         assert!(items.iter().all(|item| !item.is_replica), "{items:?}");

@@ -1,4 +1,5 @@
-//! Nodes by role: the runs of one anonymous node are one box, named without the part that is new in every run.
+//! Nodes by role: the runs of one anonymous node are one box, named without the part that differs from run to
+//! run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,7 +9,8 @@ use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::graph::{Elements, Node};
 
-/// Per node of the mission, the name of its box: its role, if all nodes of that role lived one after the other.
+/// Per node of the mission, the name of its box: its role, if all nodes of that role existed one after the
+/// other.
 pub(crate) fn boxes(elements: &Elements) -> Vec<Arc<str>> {
     let mut by_role: BTreeMap<&str, Vec<&Node>> = BTreeMap::new();
     for node in elements.nodes.iter().filter(|n| is_anonymous(n)) {
@@ -26,7 +28,8 @@ pub(crate) fn boxes(elements: &Elements) -> Vec<Arc<str>> {
     elements.nodes.iter().map(name).collect()
 }
 
-/// Gives each node's box its role as a label, numbered where several of a role live at once: `/rviz`, `/rviz ~2`.
+/// Gives each node's box its role as a label, numbered if several of a role exist at once: `/rviz`, `/rviz
+/// ~2`.
 pub(crate) fn label(items: &mut [Item], elements: &Elements) {
     let mut seen: BTreeMap<Arc<str>, usize> = BTreeMap::new();
     let mut order: Vec<(Stamp, usize, Arc<str>)> = Vec::new();
@@ -94,7 +97,7 @@ mod tests {
     use crate::view::testing::mission;
     use crate::view::{ViewOptions, view};
 
-    /// The labels of the boxes when these nodes live in these seconds.
+    /// The labels of the boxes if these nodes exist in these seconds.
     fn labels(lives: &[(&str, i64, i64)]) -> Vec<String> {
         let names: Vec<&str> = lives.iter().map(|l| l.0).collect();
         let mut mission = mission(&[&names.join(" ")]);

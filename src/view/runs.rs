@@ -1,5 +1,5 @@
-//! A mission as data for a page: per element a flat list of its values and the windows from which they hold, so that
-//! any window is one search away.
+//! A mission as data for a page: per element a flat list of its values and the windows from which they apply,
+//! so that any window is found by one search.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,9 +15,9 @@ use crate::view::{Arrow, Mark, Showing, Shown, TopicRow, View};
 /// A value of a table that applies from a window on, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// The first window: a place in [`View::frames`].
+    /// The first window: an index into [`View::frames`].
     pub from: u32,
-    /// The value: a place in the table.
+    /// The value: an index into the table.
     pub value: u32,
 }
 
@@ -25,23 +25,24 @@ pub(crate) struct Run {
 /// 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ElementRuns {
-    /// Its class words: places in [`Runs::classes`].
+    /// Its class words: indices into [`Runs::classes`].
     pub classes: Vec<Run>,
-    /// Its rate: places in [`Runs::labels`]. While it is not there, the last value stays.
+    /// Its rate: indices into [`Runs::labels`]. While it is absent, the last value stays.
     pub rates: Vec<Run>,
-    /// Its lifecycle state: places in [`Runs::labels`]. While it is not there, the last value stays.
+    /// Its lifecycle state: indices into [`Runs::labels`]. While it is absent, the last value stays.
     pub lifecycles: Vec<Run>,
-    /// Windows in which its rate changed, each with the old and the new rate: places in [`Runs::labels`]. Such a value
-    /// applies to one window.
+    /// Windows in which its rate changed, each with the old and the new rate: indices into [`Runs::labels`].
+    /// Such a value applies to one window.
     pub turns: Vec<Run>,
 }
 
 /// The whole sequence of a view as runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Runs {
-    /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`: not there.
+    /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`:
+    /// absent.
     pub classes: Vec<String>,
-    /// Rates and lifecycle states as they are written; the first is empty: not known.
+    /// Rates and lifecycle states as they are written; the first is empty: unknown.
     pub labels: Vec<String>,
     /// The values of each item of the view.
     pub items: Vec<ElementRuns>,
@@ -165,7 +166,7 @@ pub(crate) fn decades(step: u8) -> f64 {
     f64::from(step) / 2.0
 }
 
-/// Different values in order of appearance.
+/// Distinct values in order of appearance.
 struct ValueTable<T> {
     places: BTreeMap<T, u32>,
 }
@@ -182,7 +183,7 @@ impl<T: Ord + Clone> ValueTable<T> {
         *self.places.entry(value).or_insert(next)
     }
 
-    /// The new place of each old one: the first stays, then the more frequent, then the older.
+    /// The new index of each old one: the first stays, then by frequency, then by age.
     fn by_frequency<'a>(&self, runs: impl IntoIterator<Item = &'a Run>) -> Vec<u32> {
         let mut uses = vec![0_u64; self.places.len()];
         for run in runs {
@@ -223,7 +224,7 @@ struct RunRecorder<'a, F> {
 impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
     fn runs(&mut self, showing: &Showing) -> ElementRuns {
         let mut life = ElementRuns::default();
-        // The label of each rate: writing one takes time, and most come again.
+        // The label of each rate is cached: formatting takes time, and most rates recur.
         let mut known: BTreeMap<_, u32> = BTreeMap::new();
         let mut last_hz = None;
         for (window, shown) in showing.runs() {
@@ -270,7 +271,7 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
     }
 }
 
-/// Notes a value unless the list has it already.
+/// Adds a value unless it equals the last one.
 fn push(list: &mut Vec<Run>, window: u32, value: u32) {
     if list.last().map_or(0, |last| last.value) != value {
         list.push(Run {
@@ -280,7 +281,7 @@ fn push(list: &mut Vec<Run>, window: u32, value: u32) {
     }
 }
 
-/// A list as flat numbers: windows since the run before, value, windows since, value, …
+/// A list as flat numbers: windows since the previous run, value, windows since, value, …
 pub(crate) fn flat(list: &[Run]) -> Vec<u32> {
     let mut before = 0;
     let mut out = Vec::with_capacity(list.len() * 2);
@@ -307,7 +308,7 @@ mod tests {
     use super::*;
     use crate::view::ArrowKind;
 
-    /// One element over the windows: there with this mark and rate, or not there.
+    /// One element over the windows: present with this mark and rate, or absent.
     type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
 
     fn runs(story: Story<'_>) -> Runs {

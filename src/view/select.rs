@@ -1,4 +1,4 @@
-//! The choice of the nodes and topics that are seen at all, in the order of `rqt_graph`'s own steps.
+//! The choice of visible nodes and topics, in the order of `rqt_graph`'s own steps.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +23,7 @@ pub(crate) enum Reason {
     Recorder,
 }
 
-/// Per node and topic of the mission, the reason for leaving it out; `None` for one that is seen.
+/// Per node and topic of the mission, the reason for leaving it out; `None` for a visible one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Selection {
     pub(crate) nodes: Vec<Option<Reason>>,
@@ -41,7 +41,8 @@ struct TopicDegrees {
     is_recorded: bool,
 }
 
-/// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without a node left.
+/// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without
+/// remaining nodes.
 pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let hide_recorder = options.hide.quiet && !options.show_recorder;
     let recorders: Vec<bool> = elements
@@ -93,7 +94,7 @@ fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Ve
     all
 }
 
-/// Whether only a hidden recorder waits for a topic: it has no other end and no message.
+/// Whether only a hidden recorder subscribes to a topic, which has no other endpoint and no message.
 fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
     let connected = topic.evidence.words().any(|word| word == "connection");
     ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
@@ -125,8 +126,8 @@ fn topic_reason(
     }
 }
 
-/// The last steps, after the grouping: separate topics with all of their nodes filtered out, then "Debug". `grouped`
-/// marks topics that are in a group, which these steps leave alone.
+/// The last steps, after the grouping: separate topics with all of their nodes filtered out, then "Debug".
+/// `grouped` marks topics that are in a group, which these steps do not affect.
 pub(crate) fn finish(
     selection: &mut Selection,
     elements: &Elements,
@@ -162,7 +163,8 @@ pub(crate) fn finish(
 }
 
 impl Selection {
-    /// Nodes as the filter of namespaces alone sees them: nodes hidden for another reason still hold their topics.
+    /// The nodes that the filter of namespaces alone accepts: nodes hidden for another reason still keep
+    /// their topics visible.
     fn nodes_by_filter(&self) -> Vec<Option<Reason>> {
         let by_filter = |reason: &Option<Reason>| reason.filter(|r| *r == Reason::NsFilter);
         self.nodes.iter().map(by_filter).collect()
@@ -175,7 +177,7 @@ mod tests {
     use crate::view::testing::mission;
     use crate::view::{Hide, Mode, NameFilter, outline};
 
-    /// The names of the boxes that are left.
+    /// The names of the remaining boxes.
     fn left(window: &str, options: &ViewOptions) -> String {
         let view = outline(&mission(&[window]), options);
         let names: Vec<&str> = view.items.iter().map(|i| i.name.as_ref()).collect();

@@ -1,5 +1,5 @@
-//! Looks that do not flicker: between two events of the event log, an element keeps its state, the thickness of its rate,
-//! and the number that is written as long as chance alone may make the difference.
+//! Stable looks without flicker: between two events of the log, an element keeps its state, the thickness for
+//! its rate, and its written number as long as the difference may be random.
 
 use super::showing::{Showing, ShowingWriter};
 use super::{Mark, Shown};
@@ -7,7 +7,7 @@ use crate::base::time::Span;
 use crate::evidence::Confidence;
 use crate::graph::State;
 
-/// The length of all windows before each, in nanoseconds; the last event is the length of all.
+/// The length of all windows before each, in nanoseconds; the last entry is the length of all.
 pub(crate) struct Lengths(Vec<i64>);
 
 impl Lengths {
@@ -32,7 +32,7 @@ impl Lengths {
     }
 }
 
-/// The facts gathered so far about an element's present life.
+/// The facts gathered so far about an element's current lifetime.
 #[derive(Clone, Copy, Default)]
 struct PresentLife {
     look: Option<(State, Confidence)>,
@@ -43,23 +43,23 @@ struct PresentLife {
     held: Option<(f64, Option<u64>)>,
 }
 
-/// A look in some windows in a row.
+/// A look in some consecutive windows.
 struct LookRun<'a> {
     from: u32,
     to: u32,
     place: u32,
     shown: &'a Shown,
-    /// Its state, its confidence and its average rate, settled.
+    /// Its stable state, confidence and average rate.
     look: (State, Confidence),
     steady_hz: Option<f64>,
     held: Option<(f64, Option<u64>)>,
 }
 
-/// Gives an item or arrow, for as long as it exists, its liveliest state and its strongest confidence, and its average rate
-/// between two changes of it.
+/// Gives an item or arrow its most active state and its strongest confidence for as long as it exists, and
+/// its average rate between two rate changes.
 ///
-/// A topic with a message per minute is equally alive in the seconds in between; only a pause
-/// that the event log knows is drawn as one.
+/// A topic with a message per minute is also active in the seconds in between; only a pause in the event log
+/// is drawn as one.
 pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
     let mut runs = runs(raw, lengths.windows());
     let mut life = PresentLife::default();
@@ -71,7 +71,7 @@ pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
         life.forward(run, lengths);
         last = if is_ghost(run.shown) { 0 } else { run.to };
     }
-    // Backwards, what is known at the end of a life is known all through it.
+    // Backwards, so that facts known at the end of a lifetime apply to all of it.
     let mut next = u32::MAX;
     for run in runs.iter_mut().rev() {
         if next != run.to || is_ghost(run.shown) {
@@ -115,7 +115,7 @@ impl PresentLife {
             let old = self.look.unwrap_or(run.look);
             self.look = Some((livelier(old.0, run.look.0), old.1.min(run.look.1)));
         }
-        // A ghost's rate is not its own.
+        // The rate of a ghost is not shown.
         let is_own = !shown.is_paused && !is_ghost(shown);
         if let Some(hz) = shown.hz.filter(|hz| hz.is_finite() && is_own) {
             let length = lengths.of(run.from, run.to);
@@ -124,7 +124,7 @@ impl PresentLife {
         }
         let (sent, time) = self.sent;
         run.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
-        // The number of an event is the event's, and a few messages are no rate.
+        // A window with an event shows the event's number, and a few messages make no rate.
         let is_few = shown.count.is_some_and(|count| count < FEWEST);
         if shown.mark.is_some() || is_few && self.held.is_none() {
             self.held = None;
@@ -155,12 +155,12 @@ impl PresentLife {
     }
 }
 
-/// The runs with their settled looks.
+/// The runs with their stable looks.
 fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
     let mut writer = ShowingWriter::default();
     let look = |run: &LookRun<'_>| (run.look, run.steady_hz, run.held);
     let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| look(a) == look(b);
-    // Between two changes only the numbers differ, and few of them do.
+    // Between two changes only the numbers differ, and only a few of them.
     let mut places: Vec<Option<u32>> = Vec::new();
     let mut before: Option<&LookRun<'_>> = None;
     for run in runs {
@@ -198,7 +198,7 @@ const DIFFERENT: (f64, f64) = (0.25, 2.0);
 /// The fewest messages in a window that make a rate.
 const FEWEST: u64 = 5;
 
-/// Whether a window has another rate than `held`, more than by chance.
+/// Whether the rate of a window differs from `held` by more than chance.
 fn differs(held: f64, shown: &Shown) -> bool {
     let Some(hz) = shown.hz else {
         return false;
@@ -220,7 +220,7 @@ fn is_ghost(shown: &Shown) -> bool {
     shown.mark == Some(Mark::Removed)
 }
 
-/// The livelier of two states. Alive by a latched message counts most, since it means more than messages do.
+/// The more active of two states. Latched counts most, since it is more informative than active.
 fn livelier(a: State, b: State) -> State {
     let rank = |state| match state {
         State::Latched => 0,

@@ -1,5 +1,5 @@
-//! The looks of one item or arrow: every look once, and the windows from which it has each. Memory grows with the
-//! number of changes, not with the number of windows.
+//! The looks of one item or arrow: every look once, and the windows from which each applies. Memory grows
+//! with the number of changes, not with the number of windows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,13 +11,13 @@ use crate::graph::State;
 /// A topic on a line between two boxes in a window, or several that are shown as one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicRow {
-    /// Its place in `Arrow::topics`.
+    /// Its index in `Arrow::topics`.
     pub topic: u32,
     /// Whether its messages run along the arrow, and whether they run against it.
     pub ways: [bool; 2],
     /// Whether it is a service.
     pub is_service: bool,
-    /// Whether the receiver gets nothing because the qualities of service do not match.
+    /// Whether the subscriber receives nothing because the qualities of service are incompatible.
     pub is_starved: bool,
     /// Its state.
     pub state: State,
@@ -25,9 +25,9 @@ pub struct TopicRow {
     pub hz: Option<f64>,
     /// The number of messages in the window, if known.
     pub count: Option<u64>,
-    /// Its change, where that is not the change of the whole line.
+    /// Its change, if different from that of the whole line.
     pub mark: Option<Mark>,
-    /// Messages per second before and after, where its rate changed.
+    /// Messages per second before and after, if its rate changed.
     pub rates: Option<(f64, f64)>,
 }
 
@@ -35,7 +35,7 @@ pub struct TopicRow {
 pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
 
 impl TopicRow {
-    /// Takes in the same topic on another line; its messages add up where others send them.
+    /// Adds the same topic on another line; messages of different senders are summed.
     pub(crate) fn join(&mut self, other: &Self, is_other_sender: bool) {
         let is_sum = is_other_sender && self.count.is_some() && other.count.is_some();
         if is_sum {
@@ -65,15 +65,15 @@ impl TopicRow {
 pub struct Showing {
     /// Its looks, each only once unless it is marked.
     looks: Vec<Shown>,
-    /// Pairs of a window and the place of the look from then on, or [`AWAY`]; sorted.
+    /// Pairs of a window and the index of the look from then on, or [`AWAY`]; sorted.
     runs: Vec<(u32, u32)>,
 }
 
-/// The place that means absence.
+/// The index that means absence.
 const AWAY: u32 = u32::MAX;
 
 impl Showing {
-    /// The look in the window at a place; `None` where it is not there.
+    /// The look in a window; `None` if it is absent.
     pub fn at(&self, window: usize) -> Option<&Shown> {
         let after = self.runs.partition_point(|run| run.0 as usize <= window);
         let (_, look) = self.runs.get(after.checked_sub(1)?)?;
@@ -85,21 +85,21 @@ impl Showing {
         &self.looks
     }
 
-    /// Its looks with the window from which each applies, in order; `None` where it is not there, as before the first of
-    /// these.
+    /// Its looks with the window from which each applies, in order; `None` if it is absent, as before the
+    /// first of these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
         let look = |place: u32| self.looks.get(place as usize);
         self.runs.iter().map(move |run| (run.0, look(run.1)))
     }
 
-    /// Gives all its looks another id.
+    /// Sets the id of all its looks.
     pub(super) fn renumber(&mut self, id: u32) {
         for look in &mut self.looks {
             look.id = id;
         }
     }
 
-    /// The windows from which its looks hold, with the place of each look or [`AWAY`].
+    /// The windows from which its looks apply, with the index of each look or [`AWAY`].
     pub(super) fn places(&self) -> &[(u32, u32)] {
         &self.runs
     }
@@ -114,16 +114,16 @@ impl Showing {
     }
 }
 
-/// A writer that takes in looks in order of the windows.
+/// A writer that adds looks in order of the windows.
 #[derive(Debug, Default)]
 pub(super) struct ShowingWriter {
     showing: Showing,
-    /// The places of looks without a mark, once there are more than [`FEW`] looks.
+    /// The indices of looks without a mark, if there are more than [`FEW`] looks.
     places: BTreeMap<LookKey, u32>,
 }
 
-/// The number of looks that are searched one by one: most items have no more, and a map of each would take more room
-/// than all else.
+/// The number of looks that are searched one by one: most items have no more, and a map for each would take
+/// more memory than everything else.
 const FEW: usize = 4;
 
 /// The properties that distinguish looks without marks.
@@ -136,13 +136,13 @@ type LookKey = (
 );
 
 impl ShowingWriter {
-    /// Notes the look from this window on; `None` where it is not there.
+    /// Adds the look from this window on; `None` if it is absent.
     pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
         let place = shown.map_or(AWAY, |shown| self.look(shown));
         self.turn(window, place);
     }
 
-    /// The place of a look. A look with a mark gets a place of its own each time.
+    /// The index of a look. A look with a mark gets a new index each time.
     pub(super) fn look(&mut self, shown: Shown) -> u32 {
         let is_plain = shown.mark.is_none();
         if is_plain && let Some(place) = self.place(&shown) {
@@ -160,7 +160,7 @@ impl ShowingWriter {
         next
     }
 
-    /// The place of a look without a mark, if it was there before.
+    /// The index of a look without a mark, if it exists already.
     fn place(&mut self, shown: &Shown) -> Option<u32> {
         let wanted = key(shown);
         let looks = (0..).zip(&self.showing.looks);
@@ -176,7 +176,7 @@ impl ShowingWriter {
         self.places.get(&wanted).copied()
     }
 
-    /// Notes the place of the look from this window on.
+    /// Adds the index of the look from this window on.
     pub(super) fn turn(&mut self, window: u32, place: u32) {
         let runs = &mut self.showing.runs;
         if runs.last().map_or(AWAY, |last| last.1) != place {
@@ -207,7 +207,7 @@ fn key(shown: &Shown) -> LookKey {
     )
 }
 
-/// The windows in which one of two looks differs from the window before, with both looks.
+/// The windows in which one of two looks differs from the previous window, with both looks.
 pub(crate) fn both<'a>(
     a: &'a Showing,
     b: &'a Showing,
@@ -231,7 +231,7 @@ pub(crate) fn both<'a>(
 mod tests {
     use super::*;
 
-    #[expect(clippy::unnecessary_wraps, reason = "lists of what is there or not")]
+    #[expect(clippy::unnecessary_wraps, reason = "lists of optional looks")]
     fn shown(hz: f64, mark: Option<Mark>) -> Option<Shown> {
         Some(Shown {
             hz: Some(hz),

@@ -20,7 +20,7 @@ pub(super) fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Opt
 pub enum Mark {
     /// It began.
     Added,
-    /// It ended, listed in this one window as a ghost, or left to come back in a later window.
+    /// It ended and is listed in this one window as a ghost, or left and returns in a later window.
     Removed,
     /// Its rate rose.
     Faster,
@@ -28,22 +28,22 @@ pub enum Mark {
     Slower,
     /// It is a topic whose messages now come from other senders.
     HandedOver,
-    /// It is back: a node that ended and came back, or something silent that sends again.
+    /// It is back: a node that ended and returned, or a silent element that publishes again.
     Restarted,
     /// It paused.
     Paused,
     /// Its lifecycle state, type or quality of service changed.
     Changed,
-    /// Something inside a group or a collapsed namespace was added, removed or changed.
+    /// An element inside a group or a collapsed namespace was added, removed or changed.
     Inside,
-    /// It is a node that left in an earlier window and comes back in a later one.
+    /// It is a node that left in an earlier window and returns in a later one.
     Away,
-    /// It ended with others, whose one coloured frame says so.
+    /// It ended with others, as their common coloured frame shows.
     Gone,
 }
 
 impl Mark {
-    /// Its word in SVG: what exactly happened.
+    /// Its exact word in SVG.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Added => "added",
@@ -60,7 +60,7 @@ impl Mark {
         }
     }
 
-    /// Whether it has a colour of its own.
+    /// Whether it has its own colour.
     pub(crate) fn has_color(self) -> bool {
         self != Self::Gone
     }
@@ -80,7 +80,7 @@ impl Mark {
 /// The look of an item or arrow in one window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// Its place in `View::items` or `View::arrows`.
+    /// Its index in `View::items` or `View::arrows`.
     pub id: u32,
     /// Its state; for a ghost, the last one before its end.
     pub state: State,
@@ -90,21 +90,21 @@ pub struct Shown {
     pub mark: Option<Mark>,
     /// Messages per second in the window, if known (0 for a ghost).
     pub hz: Option<f64>,
-    /// Messages per second, averaged between the two changes of its rate that this window lies between.
+    /// Messages per second, averaged over the time between the rate changes before and after this window.
     pub steady_hz: Option<f64>,
-    /// The rate that is written, with its number of messages: that of an earlier window as long as chance alone may
-    /// make the difference.
+    /// The rate that is written, with its number of messages: that of an earlier window as long as the
+    /// difference may be random.
     pub held: Option<(f64, Option<u64>)>,
-    /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
+    /// Messages per second before and after, if `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
-    /// Whether it is silent or away all through the window, with a beginning and an end in the event log, or no message
-    /// came yet.
+    /// Whether it is silent or away during the whole window, with a beginning and an end in the event log, or
+    /// before its first message.
     pub is_paused: bool,
-    /// Whether the receiver gets nothing because the qualities of service do not match.
+    /// Whether the subscriber receives nothing because the qualities of service are incompatible.
     pub is_starved: bool,
-    /// The headlines behind `mark`, sorted: places in the event log.
+    /// The headlines behind `mark`, sorted: indices in the event log.
     pub events: Vec<EventId>,
-    /// The topics that a bundle carries, sorted by their places; empty for everything else.
+    /// The topics that a bundle carries, sorted by index; empty for everything else.
     pub topics: Vec<TopicRow>,
     /// The number of equal namespaces it represents in the window; 0 for everything else.
     pub each: usize,
@@ -128,8 +128,8 @@ pub struct Members {
 }
 
 impl Members {
-    /// The number that the box gives: of its nodes, or of its topics where it has no node; `None` for no folded
-    /// namespace.
+    /// The number written in the box: of its nodes, or of its topics if it has no nodes; `None` if it is not
+    /// a folded namespace.
     pub(crate) fn number(self) -> Option<(usize, &'static str)> {
         match (self.nodes, self.topics) {
             (0, 0) => None,
@@ -155,7 +155,7 @@ impl Shown {
         matches!(self.mark, Some(Mark::Removed | Mark::Gone))
     }
 
-    /// Makes it the look of a service, for which no messages do not mean silence.
+    /// Makes it the look of a service, whose lack of messages does not mean silence.
     pub(super) fn is_called(&mut self) {
         (self.state, self.is_paused) = (self.state.min(State::Active), false);
     }

@@ -11,8 +11,8 @@ use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::{EventId, Mission};
 
-/// Takes in an element of an item or arrow: the liveliest state and the strongest confidence count, rates and counts are
-/// summed.
+/// Adds an element of an item or arrow: the most active state and the strongest confidence are kept, rates
+/// and counts are summed.
 fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
     let (state, confidence) = (one.state, one.confidence);
     let shown = slot.get_or_insert_with(|| Shown {
@@ -20,7 +20,7 @@ fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
         is_starved: true,
         ..Shown::plain(id, state, confidence)
     });
-    // Those that exist without sending would dilute the rate of each.
+    // Elements that exist without publishing would dilute the rate of each.
     shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
     shown.is_paused &= one.is_paused;
     shown.is_starved &= one.is_starved;
@@ -42,7 +42,7 @@ struct One {
 }
 
 impl One {
-    /// An element that is alive without a message in the window.
+    /// An element that exists without a message in the window.
     const WITHOUT_MESSAGES: Self = Self {
         state: State::Silent,
         confidence: Confidence::Declared,
@@ -61,12 +61,12 @@ impl One {
     }
 }
 
-/// The items and arrows that have a living element at a moment.
+/// The items and arrows with an existing element at a point in time.
 #[derive(Default)]
 pub(crate) struct LivingItems {
     pub(crate) items: Vec<bool>,
     pub(crate) arrows: Vec<bool>,
-    /// Per arrow, the topics of a bundle that live.
+    /// Per arrow, the topics of a bundle that exist.
     pub(crate) topics: Vec<Vec<bool>>,
 }
 
@@ -125,17 +125,17 @@ pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
     viewed: &'a Viewed,
-    /// The present window, or an earlier one of the same length.
+    /// The current window, or an earlier one of the same length.
     span: Span,
-    /// The elements that live in it, and those that pause.
+    /// The elements that exist in it, and those that pause.
     lives: (Alive, Alive),
     /// The row of the graph for each element that is in it, by element.
     rows: PerElement<Option<Row>>,
-    /// The only publication of each topic, if there is but one.
+    /// The only publication of each topic; `None` if there are several.
     sole: Vec<Option<EdgeId>>,
     /// The publications of each topic.
     senders: Vec<Vec<EdgeId>>,
-    /// The subscriptions that get nothing, each from a time on.
+    /// The subscriptions that receive nothing, each from a time on.
     starved: Vec<(Element, Span)>,
 }
 
@@ -159,19 +159,19 @@ impl<'a> Now<'a> {
         }
     }
 
-    /// Sets the row of the graph for an element from now on; `None` where it has none.
+    /// Sets the row of the graph for an element from now on; `None` if it has none.
     pub(crate) fn apply(&mut self, what: Element, row: Option<Row>) {
         if let Some(slot) = self.rows.of_mut(what) {
             *slot = row;
         }
     }
 
-    /// Sets the elements that live and pause from this window on.
+    /// Sets the elements that exist and pause from this window on.
     pub(crate) fn live(&mut self, window: Span, alive: Alive, paused: Alive) {
         (self.span, self.lives) = (window, (alive, paused));
     }
 
-    /// Whether a window is longer or shorter than the present one, so that rates differ.
+    /// Whether a window is longer or shorter than the current one, so that rates differ.
     pub(crate) fn is_other_length(&self, window: Span) -> bool {
         window.nanos() != self.span.nanos()
     }
@@ -217,7 +217,7 @@ impl<'a> Now<'a> {
         self.rows.of(Element::Topic(*topic))?.as_ref()
     }
 
-    /// The topic of an element, if its first message comes only after the window. One that is latched needs none.
+    /// The topic of an element, if its first message comes after the window. A latched one needs no message.
     fn waits_for(&self, what: Element) -> Option<TopicId> {
         let (_, topic) = self.mission.elements.ends(what);
         let first = self.mission.elements.topics.get(topic? as usize)?.first;
@@ -240,7 +240,7 @@ impl<'a> Now<'a> {
     }
 
     fn node(&self, id: u32) -> Option<One> {
-        // What a node counts are the messages of its topics.
+        // The count of a node is that of its topics' messages.
         let one = self.one(Element::Node(id))?;
         Some(One { count: None, ..one })
     }
@@ -257,7 +257,7 @@ impl<'a> Now<'a> {
                 Element::Topic(topic) => self
                     .one(Element::Topic(*topic))
                     .filter(|one| shows_topic(one.state, self.options))
-                    // The nodes inside a collapsed namespace count what they publish already.
+                    // The nodes inside a collapsed namespace already count what they publish.
                     .map(|one| One {
                         hz: one.hz.filter(|_| !has_nodes(item)),
                         ..one
@@ -298,7 +298,7 @@ impl<'a> Now<'a> {
         members
     }
 
-    /// The look of an arrow, whether or not its ends are there.
+    /// The look of an arrow, whether or not its ends are present.
     pub(crate) fn arrow(&self, id: u32) -> Option<Shown> {
         let arrow = self.viewed.arrows.get(id as usize)?;
         let slot = match arrow.kind {
@@ -334,8 +334,8 @@ impl<'a> Now<'a> {
         slot
     }
 
-    /// An arrow from node to node: there in a window where both the publication and the subscription are, with the rate
-    /// of the publication, or of the topic where that is not known.
+    /// An arrow from node to node: present in a window with both the publication and the subscription, with
+    /// the rate of the publication, or of the topic if that is unknown.
     fn direct(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         let is_bundle = arrow.kind == ArrowKind::Bundle;
@@ -361,7 +361,7 @@ impl<'a> Now<'a> {
             }
             let topic = self.viewed.subscribed.get(*subscribe as usize).map(|s| s.1);
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
-            // The rate of the whole topic counts once, however many publish it.
+            // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
             let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
             let joined = One {
@@ -442,7 +442,8 @@ impl<'a> Now<'a> {
     }
 }
 
-/// The subscriptions that get nothing according to the event log: from that event to the end of the subscription.
+/// The subscriptions that receive nothing according to the event log: from that event to the end of the
+/// subscription.
 fn starved(mission: &Mission) -> Vec<(Element, Span)> {
     let events = mission.log.events.iter();
     let events = events.filter(|event| event.kind == Kind::Starved);

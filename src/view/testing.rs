@@ -1,4 +1,4 @@
-//! Small evolutions for tests, written as text.
+//! Small missions for tests, written as text.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! A window in which something changes: the marks of its items and arrows.
+//! A window with changes: the marks of its items and arrows.
 
 use super::items::Viewed;
 use super::marks::{Changed, News};
@@ -6,7 +6,7 @@ use super::state::{LivingItems, Now};
 use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
-/// The items and arrows there before and after a window, and the changes in between.
+/// The items and arrows that exist before and after a window, and the changes in between.
 #[derive(Default)]
 pub(super) struct WindowTurn {
     pub(super) before: LivingItems,
@@ -41,7 +41,7 @@ impl WindowTurn {
         ids.map(item).collect()
     }
 
-    /// An arrow comes and goes with its ends, if nothing is reported of itself.
+    /// An arrow appears and vanishes with its ends, unless it has events of its own.
     pub(super) fn arrows(
         &self,
         viewed: &Viewed,
@@ -54,7 +54,7 @@ impl WindowTurn {
             let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
             let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
             let at = id as usize;
-            // A node that restarts keeps its arrows, though it is away when the window ends.
+            // A node that restarts keeps its arrows, even if it is away when the window ends.
             let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
             let is_kept = ends.iter().any(is_back);
             let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
@@ -74,7 +74,7 @@ impl WindowTurn {
         (0..).zip(&viewed.arrows).map(arrow).collect()
     }
 
-    /// A changed bundle with the changes of its topics, unless it came or went as a whole.
+    /// A changed bundle with the changes of its topics, unless it appeared or vanished as a whole.
     fn with_topics(
         &self,
         viewed: &Viewed,
@@ -133,8 +133,8 @@ fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
     }
 }
 
-/// The changes of an arrow that follows from the marks of its ends and their events; `there` is whether it was there
-/// before and is there after.
+/// The changes of an arrow that follow from the marks of its ends and their events; `there` is whether it
+/// exists before and after.
 pub(super) fn with_ends(
     there: (bool, bool),
     ends: [Option<(Option<Mark>, &[EventId])>; 2],
@@ -157,7 +157,7 @@ pub(super) fn with_ends(
     })
 }
 
-/// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
+/// The look of an item or arrow that exists before, after, or both; `None` for one that ended without an
 /// event.
 pub(super) fn marked(
     shown: Shown,

@@ -3,8 +3,8 @@
 use crate::view::settle::Lengths;
 use crate::view::{SeenWindow, Showing, Shown, TopicRow, View, sum as added};
 
-/// The whole sequence as one window without marks: everything that was ever there, in its liveliest state, with rates
-/// averaged over the whole time and messages summed. `None` for a view without windows.
+/// The whole sequence as one window without marks: everything that ever existed, in its most active state,
+/// with rates averaged over the whole time and messages summed. `None` for a view without windows.
 pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     view.frames.first()?;
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
@@ -45,7 +45,8 @@ fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
     })
 }
 
-/// Adds a look that applies to `windows` windows, `length` nanoseconds together; rates become sums over time.
+/// Adds a look that applies to `windows` windows of `length` nanoseconds in total; rates become sums over
+/// time.
 fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
     let count = shown.count.map(|count| count.saturating_mul(windows));
     let rows = shown.topics.iter().map(|row| TopicRow {

@@ -1,8 +1,8 @@
-//! How fast frames are drawn: `cargo bench --bench drawing -- MISSION.json [FRAMES]`.
+//! Measures how fast frames are drawn: `cargo bench --bench drawing -- MISSION.json [FRAMES]`.
 //!
-//! Draws the mission (an evolution as JSON) at 1280×720 and prints a table: everything included on one core and on two,
-//! drawing alone, drawing over the last frame where less than a tenth of the elements changed, frames of a tween, and
-//! a long run with its memory. The latest results are in `drawing.md`.
+//! Draws the mission (in JSON) at 1280×720 and prints a table: everything included on one core and on two,
+//! drawing alone, drawing over the last frame where less than a tenth of the elements changed, frames of a
+//! tween, and a long run with its memory. The latest results are in `drawing.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

@@ -1,7 +1,9 @@
-//! How large and how fast each format is: `cargo bench --bench encoding -- MISSION.json [FOLDER] [OUTPUT…]`.
+//! Measures the size and speed of each format: `cargo bench --bench encoding -- MISSION.json [FOLDER]
+//! [OUTPUT…]`.
 //!
-//! Draws the mission (an evolution as JSON) at 1280×720 once for each format and reports bytes, milliseconds per frame
-//! above drawing, and for GIF the worst PSNR of a frame. With outputs, writes those into the folder in one run.
+//! Draws the mission (in JSON) at 1280×720 once for each format and reports bytes, milliseconds per frame
+//! above drawing, and for GIF the worst PSNR of a frame. With outputs, writes those into the folder in one
+//! run.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -131,7 +133,7 @@ fn main() {
     );
 }
 
-/// The lowest PSNR of a frame of the GIF against the frame as it was drawn, in dB.
+/// The lowest PSNR of a frame of the GIF compared with the drawn frame, in dB.
 fn worst_psnr(sequence: &Sequence<'_>, path: &Path) -> f64 {
     let mut decoder = gif::DecodeOptions::new();
     decoder.set_color_output(gif::ColorOutput::RGBA);

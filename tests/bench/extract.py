@@ -1,4 +1,4 @@
-"""Compares `bagreel extract` with pip `rosbags`: every value of every message, and the time that both take.
+"""Compares `bagreel extract` with pip `rosbags`: every value of every message, and the time of both.
 
 Usage: extract.py BAGREEL BAG…, in an environment with `rosbags` and `pyarrow`. Times are medians of processor time in
 processes of their own, ours with the Parquet files written; theirs without what the interpreter takes to begin. Three
@@ -31,7 +31,7 @@ def reader(bag):
 
 
 def flat(store, typename, message):
-    """The fields of a message as our columns name them."""
+    """The fields of a message, named like our columns."""
     row = {}
     for name, (kind, of) in store.fielddefs[typename][1]:
         if name == NOTHING:
@@ -73,7 +73,7 @@ def theirs_index(bag):
 
 
 def theirs_fields(bag):
-    """By topic and type the rows in order of time, and how many messages they cannot decode."""
+    """The rows in order of time, by topic and type, and the number of messages that they cannot decode."""
     rows, lost = {}, 0
     with reader(bag) as bag:
         for connection, at, data in bag.messages():
@@ -179,7 +179,7 @@ def seconds(command):
 
 
 def ratios(binary, bag, folder):
-    """What theirs and ours take for each of the jobs."""
+    """The times of both programs for each of the jobs."""
     own = [sys.executable, __file__]
     empty = seconds([*own, "--nothing"])
     theirs = [seconds([*own, *job]) - empty for job in (["--index", bag], ["--decode", bag], ["--tables", bag, folder / "p"])]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How time and memory grow with the names, nodes, topics and files of a recording. Run by hand:
+"""Measures how time and memory grow with the names, nodes, topics and files of a recording. Run by hand:
 
     tests/bench/growth.py BAGREEL [KIND...]
 
@@ -217,7 +217,7 @@ def measured(program, command, inputs, folder):
 
 
 def fault(command, before, now):
-    """What is more than promised, in a word."""
+    """Whether a limit is exceeded, in a word."""
     found = []
     if now[0] >= 1 / 3 and now[0] > MOST * max(before[0], 0.05):
         found.append("time")

@@ -78,13 +78,13 @@ impl Shape {
         topic % self.nodes
     }
 
-    /// Whether a node is alive: every tenth is absent from the middle to three quarters.
+    /// Whether a node is running: every tenth is absent from the middle to three quarters.
     fn lives(&self, node: usize, second: u64) -> bool {
         let away = self.seconds / 2..self.seconds / 4 * 3;
         node % 10 != 3 || !away.contains(&second)
     }
 
-    /// Messages of one second, sorted: time, topic. They come up to a twentieth of their period late.
+    /// Messages of one second, sorted: time, topic. They are up to a twentieth of their period late.
     fn second(&self, second: u64, all: &mut Vec<(u64, usize)>) {
         all.clear();
         let (from, to) = (second * SECOND, (second + 1) * SECOND);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is wrong in pictures of a mission, measured on their SVG. Run by hand:
+"""Counts defects in pictures of a mission, measured on their SVG. Run by hand:
 
     tests/bench/pictures.py BAGREEL BAG... [-- OPTION...]
 
@@ -79,7 +79,7 @@ def shape(group):
 
 
 def frame(root, sums):
-    """Adds what is found in one frame."""
+    """Adds the defects of one frame."""
     lines, labels, filled = {}, [], 0.0
     titles, badges, heads, coloured = [], [], [], set()
     smallest = 1e9

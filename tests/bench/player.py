@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast pages are in headless Chromium without a GPU. Run by hand, on a quiet machine:
+"""Measures how fast pages are in headless Chromium without a GPU. Run by hand, on a quiet machine:
 
     tests/bench/player.py PAGE.html...
 

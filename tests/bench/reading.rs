@@ -1,4 +1,5 @@
-//! How fast bags are read, against other readers, on bags that it makes itself below `target/bench/`.
+//! Measures how fast bags are read, compared with other readers, on bags that it creates below
+//! `target/bench/`.
 //!
 //! `cargo bench --bench reading [-- --gigabytes 10] [--keep]`. Other readers need Python with `rosbags`, `mcap` and
 //! `zstandard`:

@@ -1,4 +1,4 @@
-"""What the rules of axe find in pages: nothing. `npm install --prefix target/browser` with this folder's `package.json` brings axe."""
+"""Checks that axe finds no violations in pages. `npm install --prefix target/browser` with this folder's `package.json` installs axe."""
 
 import pathlib
 import shutil
@@ -17,7 +17,7 @@ axe.run(document, {resultTypes: ['violations', 'incomplete']}).then(found => don
 
 
 def missing():
-    """Why it cannot be asked; None if it can."""
+    """The reason why axe is unavailable; None if it is available."""
     if not shutil.which("node"):
         return "`node` is not installed"
     if not (PACKAGES / "axe-core/axe.min.js").exists():
@@ -33,14 +33,14 @@ def find(b, where):
 
 
 def as_page(report):
-    """The report as a host of code renders it."""
+    """The report as rendered by a code hosting service."""
     script = "const { marked } = require('marked'); process.stdout.write(marked.parse(require('fs').readFileSync(0, 'utf8')))"
     done = subprocess.run(["node", "-e", script], input=report, capture_output=True, text=True, check=True, cwd=PACKAGES.parent)
     return f'<!doctype html><html lang="en"><title>Report</title><main><h1>Report</h1>{done.stdout}</main></html>'
 
 
 def check(graph, board, report):
-    """A page in every state that people work in, a page with a board of topics, and a report."""
+    """A page in every state of use, a page with a topic timeline, and a report."""
     with Browser(1440, 900) as b:
         b.call("POST", "/timeouts", {"script": 120000})
         for url, states in ((graph, ("", "n", "t", "\ue00c", "b", "?")), (board, ("", "t"))):

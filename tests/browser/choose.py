@@ -1,4 +1,4 @@
-"""What a reader chooses in the page: a range of the timeline, namespaces, a plot, what is searched, what is embedded or printed."""
+"""Tests the reader's choices in the page: a range of the timeline, namespaces, a plot, searches, embedding and printing."""
 
 import base64
 import time
@@ -10,7 +10,7 @@ ENTER = "\ue007"
 
 
 def drag(b, start, end):
-    """A mouse that goes from one place of the life lines to another; both are shares of the time."""
+    """Drags the mouse from one point of the lifelines to another; both are fractions of the time."""
     x, y, w = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")
     move = lambda share: {"type": "pointerMove", "duration": 20, "x": round(x + share * w), "y": round(y)}
     steps = [move(start), {"type": "pointerDown", "button": 0}, *(move(start + (end - start) * k / 8) for k in range(1, 9)), {"type": "pointerUp", "button": 0}]
@@ -31,7 +31,7 @@ def ranges(b, url, evolution):
     assert where.startswith("windows 11 to 21 of 50"), where
     drawn = set(b.js("return [...document.querySelectorAll('#graph .items > g:not(.off)')].map(g => g.dataset.name)"))
     wanted = set().union(*(there(w) for w in windows[10:21]))
-    # What ended as the range began was there no longer than a moment.
+    # Elements that ended as the range began existed only for a moment.
     assert wanted <= drawn <= wanted | there(windows[9]), (wanted - drawn, drawn - wanted)
     link = b.js("return location.hash")
     assert "t=100" in link and "e=210" in link, link

@@ -1,4 +1,4 @@
-"""Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads what it says and what the console says.
+"""Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads its text and the console.
 
 usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html BOARD.html REPORT.md
 All but the hostile page are of the evolution, whose every window is compared with the page.
@@ -27,13 +27,13 @@ SHIFT, LEFT, RIGHT, END, HOME, ENTER, ESC, CTRL = "\ue008", "\ue012", "\ue014", 
 
 
 def hertz(hz):
-    """As the program writes a rate."""
+    """A rate in the program's format."""
     text = f"{hz:.0f}" if abs(hz) >= 99.95 else f"{hz:.1f}" if abs(hz) >= 0.95 else f"{hz:.2f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def data_of(page):
-    """What the page holds, unpacked."""
+    """The page's data, unpacked."""
     kind, text = re.search(r'<script id="data" type="([^"]*)">(.*?)</script>', page, re.S).groups()
     return json.loads(zlib.decompress(base64.b64decode(text), -15) if kind == "deflated" else text)
 
@@ -49,7 +49,7 @@ def at(spells, window):
 
 
 def compare_data(page, evolution):
-    """Every value of every window: who is there, how alive, how fast."""
+    """Every value of every window: presence, state, rate."""
     data, compared = data_of(page), 0
     graph = data["graphs"][0]
     facts = [" ".join(data["words"][f] for f in own) for own in graph["facts"]]
@@ -86,7 +86,7 @@ def compare_data(page, evolution):
 
 
 def headlines(evolution):
-    """Per window, the entries that are told by themselves."""
+    """Per window, the headlines."""
     parts = {part for e in evolution["events"] for part in e.get("parts", [])}
     own = [e for e in evolution["events"] if not e["quiet"] and e["id"] not in parts]
     inside = lambda e, w: w["start_ns"] <= e["time_ns"] < w["end_ns"]
@@ -104,7 +104,7 @@ def check_console(b):
 
 
 def until(b, script, wanted=True, seconds=10):
-    """Waits for a value, for pages answer in their own time; fails if it does not come."""
+    """Waits for a value, since pages respond asynchronously; fails if it does not appear."""
     for _ in range(10 * seconds):
         found = b.js("return " + script)
         if found == wanted:
@@ -205,7 +205,7 @@ def drive(b, url, evolution, data):
 
 
 def compare_drawing(b, windows):
-    """What is drawn in every window: classes of the boxes, and rates beside the arrows."""
+    """The drawing of every window: classes of the boxes, and rates beside the arrows."""
     b.keys(HOME, ESC, ESC)
     read = """return [...document.querySelectorAll('#graph [data-name], #graph [data-from]')].map(g =>
         [g.dataset.name || g.dataset.from + ' ' + g.dataset.to, g.getAttribute('class'), g.querySelector('.r')?.textContent])"""
@@ -226,7 +226,7 @@ def compare_drawing(b, windows):
 
 
 def compare_telling(b, evolution):
-    """Chips, list and marks of every window: each counts the headlines of the ledger."""
+    """Badges, list and marks of every window: each counts the headlines of the event log."""
     b.keys(HOME)
     for w, own in enumerate(headlines(evolution)):
         entries, numbers, listed = b.js("""const chips = document.getElementById('chips');
@@ -246,7 +246,7 @@ def compare_telling(b, evolution):
 
 
 def compare_table(b, evolution, data):
-    """Every row of the table in some windows: what is there, and how fast."""
+    """Every row of the table in some windows: presence and rate."""
     b.keys("t")
     for w in (0, 7, 23, 44):
         b.js(f"const s = document.getElementById('seek'); s.value = {w}; s.dispatchEvent(new Event('input'))")
@@ -259,14 +259,14 @@ def compare_table(b, evolution, data):
                 assert rate == hertz(state[key]["hz"]) + " Hz", (w, key, rate, state[key])
                 assert says.startswith(state[key]["state"]), (w, key, says)
             elif key not in state:
-                assert rate == "–" and says.startswith("not there"), (w, key, rate, says)
+                assert rate == "–" and says.startswith("absent"), (w, key, rate, says)
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('sheet').hidden")
     print("  the table says what the evolution says")
 
 
 def compare_windows(b, evolution, data):
-    """Two windows: what is told to differ, differs, and nothing else."""
+    """Two windows: exactly the elements that differ are reported."""
     def present(w):
         window, all_of = evolution["windows"][w], {}
         for kind, name in (("nodes", "node:{name}"), ("topics", "topic:{name}"),
@@ -276,7 +276,7 @@ def compare_windows(b, evolution, data):
     for before, after in ((3, 30), (30, 3), (10, 11)):
         b.js("document.activeElement.blur()")
         b.js(f"location.hash = '#t={data['starts'][after]}&b={data['starts'][before]}'")
-        until(b, "document.getElementById('newstitle').textContent", f"What differs from window {before + 1}")
+        until(b, "document.getElementById('newstitle').textContent", f"Differences from window {before + 1}")
         until(b, "+document.getElementById('seek').value", after)
         old, new = present(before), present(after)
         moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
@@ -284,7 +284,7 @@ def compare_windows(b, evolution, data):
         shown = b.js("""const more = document.querySelector('#news .more'); more?.click();
             const chips = document.getElementById('chips');
             return [[...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length, 'entries' in chips.dataset]""")
-        # What differs between any two windows is no event of the log: it is counted and listed, and names none.
+        # Differences between two arbitrary windows are not events of the log: they are counted and listed without event ids.
         counted = sum(int(n) for n in re.findall(r"\d+", " ".join(shown[0])))
         assert [counted, *shown[1:]] == [len(differs), len(differs), False], (before, after, shown, len(differs))
         drawn = b.js("return document.querySelectorAll('#graph .items > :is(.added, .removed, .changed), #graph .arrows > :is(.added, .removed, .changed)').length")
@@ -375,7 +375,7 @@ def animation(svg):
 
 
 def is_there(tool):
-    """Whether a tool is installed; says so if not."""
+    """Whether a tool is installed; prints a line if not."""
     reason = tool.missing()
     if reason:
         print(f"skipped: {reason}")

@@ -11,7 +11,7 @@ import time
 
 import webdriver
 
-# What each address of WebDriver is called in Marionette.
+# The names in Marionette of WebDriver's addresses.
 COMMANDS = {
     "/url": "WebDriver:Navigate", "/execute/sync": "WebDriver:ExecuteScript", "/execute/async": "WebDriver:ExecuteAsyncScript",
     "/element": "WebDriver:FindElement", "/actions": "WebDriver:PerformActions", "/frame": "WebDriver:SwitchToFrame",
@@ -92,5 +92,5 @@ class Firefox(webdriver.Browser):
         return self.command(COMMANDS[path], body or {})
 
     def log(self, kind):
-        """Firefox keeps no log for its drivers."""
+        """Firefox has no log for drivers."""
         return []

@@ -1,4 +1,4 @@
-"""What the picture draws as one, opened in place and folded again."""
+"""Tests that groups of the picture expand in place and collapse again."""
 
 import time
 

@@ -16,9 +16,9 @@ import firefox
 import webdriver
 from drive import END, LEFT, until, window
 
-# A page is drawn in three percent of the time, so that the next one may take a while on a busy machine.
+# A page is drawn in three percent of the time, so the next one may take a while on a busy machine.
 GROWN = 120
-# While the page reloads it has no slider: no number is more than another then, so that a wait goes on.
+# While the page reloads it has no slider, and comparisons with its value are false, so the wait continues.
 SEEK = "Number(document.getElementById('seek')?.max)"
 SHOWN = "Number(document.getElementById('seek')?.value)"
 
@@ -70,7 +70,7 @@ def drive(b, recording):
     recording.grow(0.6, 0.8)
     while recording.page() == served:
         time.sleep(0.1)
-    # Time enough to reload, if the page did so by mistake.
+    # Enough time for an erroneous reload.
     time.sleep(1)
     b.keys(LEFT)
     until(b, SHOWN, second - 2)

@@ -1,4 +1,4 @@
-"""What is seen first: on screens of four sizes no text of the graph is smaller than 9 pixels, and no page is wider than its screen."""
+"""Tests the initial view: on screens of four sizes no text of the graph is smaller than 9 pixels, and no page is wider than its screen."""
 
 import time
 

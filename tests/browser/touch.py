@@ -1,4 +1,4 @@
-"""The page under fingers: a phone in Chromium, whose touches come from the browser and not from a script of the page."""
+"""Tests the page with touch: a phone in Chromium, whose touches come from the browser and not from a script of the page."""
 
 import time
 
@@ -16,7 +16,7 @@ def touch(b, kind, *points):
 
 
 def drag(b, *ways, steps=8):
-    """Fingers that go from a place to another at once, and rest there, so that nothing goes on moving."""
+    """Fingers that move from one point to another and rest there, so that there is no momentum."""
     touch(b, "touchStart", *(way[0] for way in ways))
     for k in range(1, steps + 1):
         touch(b, "touchMove", *([a + (z - a) * k / steps for a, z in zip(*way)] for way in ways))

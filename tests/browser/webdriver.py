@@ -1,4 +1,4 @@
-"""A browser driven through chromedriver, with nothing but Python's own library."""
+"""A browser driven through chromedriver, using only Python's standard library."""
 
 import json
 import shutil
@@ -15,7 +15,7 @@ FLAGS = [
 
 
 def missing():
-    """Why there is no browser to drive; None if there is one."""
+    """The reason why there is no browser; None if there is one."""
     for program in ("chromium", "chromedriver"):
         if not shutil.which(program):
             return f"`{program}` is not installed"

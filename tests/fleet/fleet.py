@@ -1,4 +1,4 @@
-"""Counts one fleet in every way that the documents name, kills workers meanwhile, and compares digests.
+"""Counts one fleet in every documented way, kills workers meanwhile, and compares digests.
 
 Usage: fleet.py FOLDER, in an environment with the wheel (see `run`). Ends with 1 if anything differs.
 """
@@ -48,7 +48,7 @@ def bags(folder):
 
 
 def digest(tables, what):
-    """Of all rows, sorted."""
+    """The digest of all rows, sorted."""
     rows = sorted(repr(tuple(row.values())) for table in tables for row in table.to_pylist())
     if what == "bags":
         assert len({row for row in rows}) == len(rows), "a bag twice"
@@ -67,7 +67,7 @@ def tell(name, got, expected, started):
 
 
 def shards(fleet, to, count=16, jobs=2):
-    """As `seq 1 16 | xargs -P 2`: answers the running `xargs`."""
+    """As `seq 1 16 | xargs -P 2`; returns the running `xargs`."""
     numbers = "\n".join(map(str, range(1, count + 1)))
     args = ["xargs", "-P", str(jobs), "-I{}", *COMMAND, str(fleet), "-o", str(to), "--shard", "{}/" + str(count), "--skip-existing"]
     process = subprocess.Popen(args, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
@@ -91,8 +91,7 @@ def children(pid):
 
 
 def kill_one(pid, what, after, until=30, once=lambda: True):
-    """Kills the first process below `pid` whose command line holds `what`, `after` seconds from when it is there, not
-    before `once`."""
+    """Kills the first process below `pid` whose command line contains `what`, `after` seconds after it appears, but not before `once`."""
     def run():
         end = time.time() + until
         while not once() and time.time() < end:
@@ -122,7 +121,7 @@ def xargs(fleet, folder, expected):
     to = folder / "shards_killed"
     started = time.time()
     process = shards(fleet, to)
-    # A worker is there for a tenth of a second.
+    # A worker exists for a tenth of a second.
     begun = lambda: len(list((to / "bags").glob("*.parquet"))) >= COPIES // 16
     killer = kill_one(process.pid, "--shard", 0, once=begun)
     process.wait()
@@ -191,7 +190,7 @@ def dask(fleet, folder, expected):
 
     from dask.distributed import Client, LocalCluster
 
-    # That a worker is lost is what is tried here.
+    # The loss of a worker is intended.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
 
     def one(bag):
@@ -235,7 +234,7 @@ def main():
     uris = pa.concat_tables(pq.read_table(file) for file in (folder / "one/bags").glob("*.parquet"))
     assert sorted(uris["uri"].to_pylist()) == sorted(map(str, fleet.iterdir())), "not each bag exactly once"
     sys.path.insert(0, str(Path(__file__).parent))
-    # Spark before Sail, whose client leaves no way back to a session of its own.
+    # Spark before Sail, after whose client no new Spark session is possible.
     for way in (wheel, xargs, dask, spark, sail, s3, workers):
         if not ONLY or way.__name__ in ONLY:
             way(fleet, folder, expected)

@@ -1,4 +1,4 @@
-"""What `extract` and `render` write as Parquet, opened by other programs: the same values in each, those of the CSV files.
+"""Checks that other programs read the Parquet files of `extract` and `render` with the same values as the CSV files.
 
 Usage: opened.py [spark], in an environment with the wheel, pyarrow, pandas, DuckDB and Polars, and with PySpark if that
 is named. Ends with 1 if anything differs.
@@ -90,7 +90,7 @@ def rows(columns):
 
 
 def plain(cell):
-    """One value for what programs hold differently: lists, numbers that pandas made fractions of to hold nothing."""
+    """A common form of values that programs represent differently: lists, and integers that pandas converts because of missing values."""
     if cell is None or isinstance(cell, (str, bytes, bool)):
         return cell
     if isinstance(cell, datetime.datetime):
@@ -115,7 +115,7 @@ def differs(name, what):
 
 
 def same(name, path, readers):
-    """Every reader's rows are Arrow's."""
+    """Asserts that every reader's rows equal Arrow's."""
     expected = arrow(path)
     for reader in readers:
         try:
@@ -143,7 +143,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         for bag in BAGS:
-            # The table of messages, against what is written as text.
+            # The table of messages, compared with the text output.
             bagreel("extract", bag, "-o", folder / "m.parquet")
             bagreel("extract", bag, "-o", folder / "m.csv")
             messages = same(f"{bag.name}, messages", folder / "m.parquet", readers)

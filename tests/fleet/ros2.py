@@ -1,4 +1,4 @@
-"""`ros2 bagreel …` and `ros2 bag graph …` of the installed wheel do what `bagreel …` and `bagreel render …` do: the same output,
+"""`ros2 bagreel …` and `ros2 bag graph …` of the installed wheel behave like `bagreel …` and `bagreel render …`: the same output,
 messages and exit code, whatever the arguments. Run with Python; ends with 1 if anything differs.
 
 Where `ros2cli` and `ros2bag` are installed too, the arguments go through them (of ROS itself only `rclpy` is stood in for); elsewhere
@@ -60,7 +60,7 @@ def ros2(argv):
 
 
 def same(ours, theirs):
-    """Whether both command lines do the same; tells what they do."""
+    """Whether both command lines behave equally; prints their outcome."""
     runs = []
     for command in ([sys.executable, "-m", "bagreel", *ours], [sys.executable, __file__, "--", *theirs]):
         done = subprocess.run([str(word) for word in command], capture_output=True, check=False)

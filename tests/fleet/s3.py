@@ -1,4 +1,4 @@
-"""The fleet on an S3 server of this machine (moto), behind a proxy that counts, stumbles, refuses and replaces."""
+"""Tests the fleet on a local S3 server (moto), behind a proxy that counts requests, fails, refuses and replaces objects."""
 
 import http.client
 import json
@@ -14,7 +14,7 @@ import bagreel
 
 
 class Proxy(BaseHTTPRequestHandler):
-    """Passes requests on to moto; what it does besides stands in `rules`."""
+    """Forwards requests to moto, with the additional behaviour in `rules`."""
 
     protocol_version = "HTTP/1.1"
     rules = {"requests": 0, "bytes": 0, "stumbles": 0, "refuses": False, "at": None, "then": None}
@@ -58,7 +58,7 @@ class Proxy(BaseHTTPRequestHandler):
 
 
 class Server(ThreadingHTTPServer):
-    """Says nothing of clients that end before they have read everything."""
+    """Ignores clients that disconnect before they have read everything."""
 
     def handle_error(self, *_):
         pass
@@ -154,10 +154,10 @@ def run(fleet, folder, expected, tell, chunks, command):
     cells = lambda tables: [{k: v for k, v in row.items() if k not in ("mission", "bag")} for row in tables["counts"].to_pyarrow().to_pylist()]
     assert cells(far) == cells(near) and sum(row["n"] for row in cells(far)) == chunks
 
-    # A picture of it needs nothing else.
+    # A picture of it needs no further requests.
     few = bagreel.finish(far["counts"])
     assert bagreel.to_dict(few)["messages"] == chunks and len(few) > 5
-    # Every message's time, of a smaller one: moto reads all of an object for each part of it.
+    # The time of every message of a smaller object, since moto reads the whole object for each part.
     many = large(folder / "many.bag", MANY)
     s3.upload_file(str(many), "fleet", "many.bag")
     rules.update(requests=0, bytes=0)
@@ -165,7 +165,7 @@ def run(fleet, folder, expected, tell, chunks, command):
     share = rules["bytes"] / many.stat().st_size
     print(f"S3, the mission of a bag of {MANY} chunks: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
     assert rules["requests"] <= MANY + 20 and share <= 0.01
-    # Payloads of a small file are looked at, which tells their sizes.
+    # Payloads of a small file are read, so their sizes are known.
     sizeless = lambda mission: json.loads(mission.to_json(), object_hook=lambda value: {**value, "bytes": None})
     assert sizeless(mission) == sizeless(bagreel.read(many, period="10s"))
 
@@ -190,7 +190,7 @@ def run(fleet, folder, expected, tell, chunks, command):
 
 
 def plain(to, fleet):
-    """The digest with URLs as the paths that they stand for."""
+    """The digest with URLs replaced by the corresponding paths."""
     import pyarrow.parquet as pq
 
     import fleet as way

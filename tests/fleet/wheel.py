@@ -1,4 +1,4 @@
-"""The installed wheel: what its functions give, raise and leave alone. Run with Python; ends with 1 if anything is wrong."""
+"""Tests the installed wheel: results, exceptions and side effects of its functions. Run with Python; exits with 1 on failure."""
 
 import inspect
 import json
@@ -70,7 +70,7 @@ def parts_make_the_whole():
     cut = starts[len(starts) // 2] + 3_333_333_333
     parts = [bagreel.tables(WAREHOUSE, end_ns=cut)["counts"], bagreel.tables(WAREHOUSE, start_ns=cut)["counts"]]
     assert bagreel.merge(parts[::-1]).to_pyarrow().equals(whole)
-    # Whatever library they come from.
+    # From any library.
     assert bagreel.merge(pa.Table.from_batches([part.to_pyarrow() for part in parts])).to_pyarrow().equals(whole)
     mission = bagreel.finish(whole)
     assert len(mission) == len(starts) and len(mission.tables()["edges"]) > 100, mission
@@ -183,7 +183,7 @@ def the_examples_run():
     subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", tests], check=True, stdout=subprocess.DEVNULL)
     cells = json.loads((tests / "mission.ipynb").read_text())["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
-    # Notebooks show the last line of a cell, which a program computes in vain.
+    # Notebooks show the last line of a cell, which has no effect in a program.
     done = subprocess.run([sys.executable, "-c", "\n".join(code)], cwd=tests, capture_output=True, text=True, check=False)
     assert len(code) > 8 and done.returncode == 0, done.stderr
 

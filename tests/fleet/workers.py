@@ -1,4 +1,4 @@
-"""Bags on a server that answers late: how much faster more workers are, as threads of one process and as processes."""
+"""Measures the speedup by more workers, as threads and as processes, for bags on a slow server."""
 
 import subprocess
 import threading
@@ -13,7 +13,7 @@ WORKERS = (1, 2, 4, 8)
 
 
 class Late(BaseHTTPRequestHandler):
-    """Gives parts of files, each some time after it was asked for."""
+    """Serves parts of files, each after a delay."""
 
     protocol_version = "HTTP/1.1"
 
@@ -34,7 +34,7 @@ class Late(BaseHTTPRequestHandler):
 
 
 def run(root, folder, command, of_folder):
-    """Tells seconds by the number of workers; answers the ways whose digest is another."""
+    """Prints the seconds by number of workers; returns the variants with a different digest."""
     bag = (Path(root) / "examples/courier.mcap").read_bytes()
     server = ThreadingHTTPServer(("127.0.0.1", 0), Late)
     server.files = {f"/{k}.mcap": bag for k in range(BAGS)}

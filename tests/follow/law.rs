@@ -1,5 +1,5 @@
-//! The law of following, in one process: the mission collected from a growing recording equals that of the closed one
-//! byte for byte, and so do the printed lines, also where the follower or the recorder was killed.
+//! Tests of following in one process: the mission collected from a growing recording equals that of the
+//! closed one byte for byte, and so do the printed lines, even if the follower or the recorder was killed.
 
 use std::path::Path;
 
@@ -65,7 +65,7 @@ fn json(mut mission: Mission) -> String {
     String::from_utf8(json).unwrap()
 }
 
-/// A follower and what it has printed.
+/// A follower and its printed lines.
 struct Follower {
     follow: Follow,
     feed: Feed,
@@ -131,7 +131,8 @@ fn holds(name: &str, what: &str, recorder: Recorder, seed: u64) {
     };
     let log = log(&expected, LogFormat::Text, LogOptions::default());
     let known = known.unwrap().mission;
-    // Of a compressed chunk that will never be closed, only the reader of the closed recording tries to save a part.
+    // Only the reader of the closed recording tries to recover a part of a compressed chunk that was never
+    // closed.
     if end.is_none() || name != "bag, lz4" {
         assert!(json(known) == json(expected), "{name}, seed {seed}: JSON");
         let printed = follower.printed.as_bytes();

@@ -1,4 +1,4 @@
-//! Recorders: every way of writing a recording, step by step in random cuts.
+//! Recorders: every way of writing a recording, step by step with random cuts.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -23,7 +23,7 @@ impl Chance {
         usize::try_from((self.0 >> 33) % n as u64).unwrap()
     }
 
-    /// Sorted places in `0..=len`, the last `len` itself.
+    /// Sorted positions in `0..=len`, the last `len` itself.
     fn cuts(&mut self, len: usize) -> Vec<usize> {
         let count = 3 + self.below(12);
         let mut cuts: Vec<usize> = (0..count).map(|_| self.below(len)).collect();
@@ -36,11 +36,11 @@ impl Chance {
 /// Called between two writes; `None` kills the recorder.
 pub(super) type Step<'a> = &'a mut dyn FnMut(&mut Chance) -> Option<()>;
 
-/// A way of recording: writes a recording into a folder step by step. Returns the closed recording; `None` if the
-/// recorder was killed.
+/// A kind of recorder: writes a recording into a folder step by step. Returns the closed recording; `None` if
+/// the recorder was killed.
 pub(super) type Recorder = fn(&Path, &mut Chance, Step<'_>) -> Option<PathBuf>;
 
-/// Each way of recording: a name, what is followed, and the recorder.
+/// Each kind of recorder: a name, the followed path, and the recorder.
 pub(super) const RECORDERS: &[(&str, &str, Recorder)] = &[
     ("bag", "r.bag.active", |folder, chance, step| {
         rosbag(Pack::None, folder, chance, step)
@@ -80,7 +80,7 @@ pub(super) const RECORDERS: &[(&str, &str, Recorder)] = &[
     }),
 ];
 
-/// The examples, which are longer than what the recorders write.
+/// The examples, which are longer than the recorders' output.
 pub(super) const EXAMPLES: &[(&str, &str, Recorder)] = &[
     ("courier", "courier.mcap", |folder, chance, step| {
         example("courier.mcap", folder, chance, step)
@@ -170,7 +170,7 @@ fn rosbag(how: Pack, folder: &Path, chance: &mut Chance, step: Step<'_>) -> Opti
     Some(closed)
 }
 
-/// The first `cut` bytes of a bag as they are while it is recorded.
+/// The first `cut` bytes of a bag while it is recorded.
 fn active(bytes: &[u8], cut: usize) -> Vec<u8> {
     let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let mut now = bytes.to_vec();
@@ -243,7 +243,7 @@ fn database(
     Some(path.to_owned())
 }
 
-/// Leaves a database as a killed recorder does: what it wrote last is still in its log.
+/// Leaves a database as a killed recorder does: the last rows are still in its log.
 fn killed(db: Connection, path: &Path) {
     let files = [path.to_owned(), path.with_extension("db3-wal")];
     let kept = files.map(|file| fs::read(&file).map(|bytes| (file, bytes)));

@@ -33,10 +33,10 @@ pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {
     assert!(took < most, "{took:?} of processor time for {} bytes", bytes.len());
 }
 
-/// The processor time of this process so far, where the system tells it in `/proc`, in hundredths of a second.
+/// The processor time of this process so far, if `/proc` reports it, in hundredths of a second.
 fn processor_time() -> Duration {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // The name of the process, in parentheses, may hold spaces.
+    // The name of the process, in parentheses, may contain spaces.
     let behind = stat.rsplit(')').next().unwrap_or_default();
     let ticks = behind.split_whitespace().skip(11).take(2);
     Duration::from_millis(ticks.filter_map(|n| n.parse::<u64>().ok()).sum::<u64>() * 10)

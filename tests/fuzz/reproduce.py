@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs every command over every file of a folder of hostile inputs, and holds each run to what is promised.
+"""Runs every command over every file of a folder of hostile inputs, and checks each run against the documented limits.
 
     cargo build --release
     tests/fuzz/reproduce.py FOLDER [target/release/bagreel]
@@ -37,7 +37,7 @@ def commands(path):
 
 
 def run(program, arguments, folder):
-    """The exit code, seconds of processor time, megabytes and what was printed."""
+    """The exit code, seconds of processor time, megabytes and the output."""
     with open(os.path.join(folder, "printed"), "wb+") as printed:
         begin = time.monotonic()
         child = subprocess.Popen([program, *arguments], cwd=folder, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed)
@@ -54,7 +54,7 @@ def run(program, arguments, folder):
 
 
 def broken(code, seconds, megabytes, printed):
-    """What of the promises does not hold."""
+    """The violated limits."""
     if code not in range(4):
         yield f"exit code {code}"
     if seconds > SECONDS:

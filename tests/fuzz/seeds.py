@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lays out seeds for the targets: the small bags and files of the project, each also cut to its beginning."""
+"""Creates seeds for the targets: the small bags and files of the project, each also cut to its beginning."""
 import pathlib
 
 HERE = pathlib.Path(__file__).resolve().parent

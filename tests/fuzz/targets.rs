@@ -12,7 +12,7 @@ use libfuzzer_sys::fuzz_target;
 
 type Target = fn(&[u8]);
 
-/// The targets by name; `README.md` says what each is fed.
+/// The targets by name; `README.md` describes their inputs.
 const TARGETS: &[(&str, Target)] = &[
     ("rosbag1", |bytes| as_file("x.bag", bytes, |path| read_bag(path, false))),
     ("mcap", |bytes| as_file("x.mcap", bytes, |path| read_bag(path, false))),

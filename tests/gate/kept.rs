@@ -181,7 +181,7 @@ fn a_late_recorder_proves_no_node_missing() {
     let (code, said) = run(here, &late);
     assert!(!said.contains("error[") && code == 0, "{said}");
     assert!(
-        said.contains("unknown[node-missing]: cannot tell whether /amcl is there"),
+        said.contains("unknown[node-missing]: cannot tell whether /amcl is present"),
         "{said}"
     );
     // A node absent although all others are named is missing.

@@ -193,7 +193,7 @@ fn a_node_named_only_by_its_log_is_unknown_without_it() {
     assert_eq!(check("{known_by: rumour}").0, 2);
     let (code, said) = check("{within: ..5s, present_within: 5s}");
     assert!(
-        code == 2 && said.contains("`within: ..5s`") || said.contains("does not go with"),
+        code == 2 && said.contains("`within: ..5s`") || said.contains("cannot be combined with"),
         "{said}"
     );
 }

@@ -1,4 +1,4 @@
-"""Holds reports of a check against the published schemas of their formats; by hand, since both schemas are others' files.
+"""Validates check reports against the published schemas of their formats; run by hand, since both schemas are third-party files.
 
 Usage: validate.py JUNIT.xsd SARIF.json CHECK.xml CHECK.sarif QUALITY.json
 

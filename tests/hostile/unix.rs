@@ -214,7 +214,7 @@ fn a_verbose_ffmpeg_does_not_block() {
     );
 }
 
-/// A minute of mission has cells of a second each: elements that exist throughout must not take memory in each.
+/// A mission of a minute has cells of a second: elements that exist throughout must not take memory in each.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_hundred_thousand_nodes_fit_into_memory() {

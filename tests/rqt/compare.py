@@ -46,8 +46,7 @@ def name(rng):
 
 
 def random_graph(rng):
-    """Nodes, and edges as (node, topic, is it a publication). Every topic has an edge, as on a ROS master. No topic is
-    called like a node: rqt_graph takes the one for the other."""
+    """Nodes, and edges as (node, topic, is it a publication). Every topic has an edge, as on a ROS master. No topic has the name of a node, since rqt_graph confuses the two."""
     nodes = sorted({name(rng) for _ in range(rng.randint(1, 10))})
     topics = {name(rng) for _ in range(rng.randint(1, 8))} | set(rng.sample(TOPICS, rng.randint(0, 4)))
     for _ in range(rng.randint(0, 2)):
@@ -111,7 +110,7 @@ def theirs(rqt, nodes, edges, s):
 
 
 def evolution(nodes, edges):
-    """One window, with no more than an evolution must hold."""
+    """One window, with only the required keys of a mission."""
     window = {'index': 0, 'start_ns': 0, 'end_ns': 10**10, 'nodes': [{'name': n} for n in nodes],
               'topics': [{'name': t} for t in sorted({t for _, t, _ in edges})],
               'publishes': [{'node': n, 'topic': t} for n, t, pub in edges if pub],
@@ -142,7 +141,7 @@ def ours(binary, folder, nodes, edges, s):
 
 
 def read(graph):
-    """What a pydot graph shows: nodes, clusters, edges."""
+    """The content of a pydot graph: nodes, clusters, edges."""
     nodes, clusters, edges = {}, {}, set()
 
     def text(value):
@@ -167,7 +166,7 @@ def read(graph):
 
 
 def forgive(shown, settings, edges, counts):
-    """Take the documented differences out of what rqt_graph shows."""
+    """Remove the documented differences from rqt_graph's content."""
     nodes, clusters, lines = shown
     if settings['params']:
         topics = {t for _, t, _ in edges}

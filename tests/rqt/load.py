@@ -36,7 +36,7 @@ def bind_qt(name):
 
 
 def places(text):
-    """What the file says: centre and size per node and cluster, with y down; the tips of edges."""
+    """The content of the file: centre and size per node and cluster, with y down; the tips of edges."""
     boxes, tips = {}, []
     for line in text.split('\n'):
         if m := NODE.match(line):
@@ -51,7 +51,7 @@ def places(text):
 
 
 def check(generator, scene, path):
-    """Print what is wrong with a file; true if nothing is."""
+    """Print the problems of a file; true if there are none."""
     with open(path, encoding='utf-8') as file:
         text = file.read()
     nodes, edges = generator.dotcode_to_qt_items(text, highlight_level=3, same_label_siblings=True, scene=scene)

@@ -1,4 +1,4 @@
-//! Bags of a few kilobytes in every format: each of their bits can be tried, and cuts at each of their bytes.
+//! Bags of a few kilobytes in every format, small enough to flip every bit and to cut at every byte.
 
 use std::fs;
 
@@ -17,7 +17,7 @@ fn recording() -> Recording {
     recording
 }
 
-/// The bags with their names, which tell the format and whether they are read from the front.
+/// The bags with their names, which contain the format and whether they are read from the front.
 pub fn bags() -> Vec<(&'static str, Vec<u8>)> {
     let recording = recording();
     let bag = |how| rosbag1::write(&recording, how, 150);
@@ -57,7 +57,7 @@ pub fn bags() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// A database of the smallest pages that SQLite knows.
+/// A database of the smallest pages that SQLite supports.
 fn database(recording: &Recording) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.db3");

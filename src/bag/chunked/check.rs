@@ -1,4 +1,4 @@
-//! The messages found in a chunk, held until the index that follows it has been read.
+//! The messages found in a chunk, kept until the index that follows it has been read.
 
 use crate::bag::adapters::Gather;
 use crate::bag::model::{ConnectionId, Sink};

@@ -189,17 +189,17 @@ impl<G: Grammar> Query<'_, G> {
 }
 
 const OTHER_TIMES: &str = "chunks begin or end at other times than the bag's index states";
-const APART: &str = "chunks are not where the bag's index states, or have another length";
+const APART: &str = "chunks differ in position or length from the bag's index";
 
 /// The index of a chunk.
 struct Found {
     index: Index,
-    /// The place of the chunk's records, if its head is readable.
+    /// The position of the chunk's records, if its head is readable.
     body: Option<ChunkBody>,
     place: Place,
 }
 
-/// The place of a chunk's index.
+/// The position of a chunk's index.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     /// At the stated position, right after the chunk.

@@ -33,7 +33,7 @@ struct Early {
     dropped: u64,
 }
 
-/// The most early messages that are held: 3 MB.
+/// The most early messages that are kept: 3 MB.
 const MOST_EARLY: usize = 1 << 18;
 
 /// A walk through the records of a bag.
@@ -106,7 +106,7 @@ impl<G: Grammar> Forward<'_, G> {
             RecordHead::Chunk(head) => self.chunk(stream, &head),
             RecordHead::Message { raw, time, size } => {
                 if self.is_chunked {
-                    self.damage("messages lie between chunks");
+                    self.damage("messages are outside of chunks");
                 }
                 self.found.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))

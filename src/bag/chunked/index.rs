@@ -35,7 +35,7 @@ impl IndexSum {
     }
 }
 
-/// The step for picking records that lie close together: fits a processor's cache.
+/// The step for picking records that are close together: fits a processor's cache.
 const CLOSE: usize = 64 * 1024;
 
 /// An index longer than this, in bytes, is not loaded; its chunk is walked instead.
@@ -112,7 +112,7 @@ impl Index {
     }
 }
 
-/// The place of a chunk's records.
+/// The position of a chunk's records.
 pub(crate) struct ChunkBody {
     pub(crate) how: Compression,
     pub(crate) range: Range<u64>,

@@ -12,9 +12,9 @@ use crate::base::time::{Span, Stamp};
 /// A chunk as the tail describes it. Sums of its numbers do not overflow.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
-    /// The place of its record.
+    /// The position of its record.
     pub(crate) start: u64,
-    /// The expected place of its index.
+    /// The expected position of its index.
     pub(crate) index: Range<u64>,
     /// The latest possible end of its index.
     pub(crate) end: u64,
@@ -23,7 +23,7 @@ pub(crate) struct Chunk {
     pub(crate) last: Stamp,
     /// The expected sum of its index; `None` if it has none.
     pub(crate) promised: Option<IndexSum>,
-    /// The place of its message counts in [`ChunkPlan::counts`]; empty if they are not kept.
+    /// The range of its message counts in [`ChunkPlan::counts`]; empty if they are not kept.
     pub(crate) counts: Range<usize>,
 }
 

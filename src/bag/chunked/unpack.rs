@@ -30,8 +30,8 @@ pub(super) trait Visitor<G: Grammar> {
     }
 }
 
-/// Visits the records of the chunk whose body is next in `stream`, and goes to its end. Returns what is wrong with
-/// them, if anything.
+/// Visits the records of the chunk whose body is next in `stream`, and goes to its end. Returns the problem
+/// with them, if any.
 ///
 /// # Errors
 /// Fails if the file ends first or cannot be read. If a chunk is stated to exceed the file, the stream is then at the

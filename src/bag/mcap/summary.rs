@@ -102,7 +102,7 @@ struct Summary {
 }
 
 impl Summary {
-    /// Takes the records up to the footer. All of them are held, so none may be long.
+    /// Takes the records up to the footer. All of them are kept in memory, so none may be long.
     fn records(&mut self, stream: &mut ByteStream<'_>) -> Result<(), NoRecord> {
         let mut channels: Vec<Vec<u8>> = Vec::new();
         let stop = walk(stream, u64::MAX, |stream| {
@@ -176,7 +176,7 @@ impl Summary {
             return Unindexed::missing("its summary has no statistics to check its index by");
         };
         if all.chunks == 0 && all.messages > 0 && chunks.is_empty() {
-            return Unindexed::missing("its messages lie outside chunks");
+            return Unindexed::missing("its messages are outside chunks");
         }
         if all.chunks as usize != chunks.len() {
             return Unindexed::wrong("its index does not list all of its chunks");
@@ -200,7 +200,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
     for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
         if start < free || end > plan.body.end {
-            return Unindexed::wrong("its index lists chunks at impossible places");
+            return Unindexed::wrong("its index lists chunks at impossible positions");
         }
         let mut stream = ByteStream::of_file(source, free, start, NEAR);
         let mut hidden = false;

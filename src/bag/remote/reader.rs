@@ -30,7 +30,7 @@ pub(crate) fn open(url: &str, options: &OpenOptions) -> Result<Box<dyn Reader>> 
         let what = format!("`{}` is a prefix, not a bag", told_url(url));
         return Err(Error::usage(
             what,
-            "name one bag; `bagreel tables` counts all of a store",
+            "give one bag; `bagreel tables` counts all of a store",
         ));
     }
     let Opened {

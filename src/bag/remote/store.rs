@@ -142,7 +142,7 @@ fn wait<T: Send + 'static>(
     let runtime = runtime()?;
     let (to, from) = std::sync::mpsc::sync_channel(1);
     runtime.spawn(async move { to.send(answer.await) });
-    let given_up = |_| StoreRefusal::new(io::ErrorKind::Other, "it was given up", AGAIN);
+    let given_up = |_| StoreRefusal::new(io::ErrorKind::Other, "it was cancelled", AGAIN);
     from.recv().map_err(given_up)?
 }
 
@@ -351,7 +351,7 @@ pub(crate) fn list(url: &str) -> Result<Vec<String>, Error> {
 fn listed(url: &str) -> StoreResult<Vec<String>> {
     if url.starts_with("http") {
         let what = "a web server does not list its files";
-        let hint = "name the bags, or give a list of them with `--manifest`";
+        let hint = "give the bags, or a list of them with `--manifest`";
         return Err(StoreRefusal::new(io::ErrorKind::Unsupported, what, hint));
     }
     let (store, prefix) = store(url)?;
@@ -364,7 +364,7 @@ fn listed(url: &str) -> StoreResult<Vec<String>> {
             let object = object.map_err(|e| StoreRefusal::of(&e))?;
             all.push(format!("{root}/{}", object.location));
             if all.len() > MOST_LISTED {
-                let what = "more than a million objects lie there";
+                let what = "it contains more than a million objects";
                 let hint = "give a list of them with `--manifest`";
                 return Err(StoreRefusal::new(io::ErrorKind::Other, what, hint));
             }

@@ -66,10 +66,10 @@ fn placed(index_pos: u64, body: u64, len: u64) -> Result<(), Unindexed> {
     }
 }
 
-/// A notice about names that cannot be known.
+/// A notice about unknown names.
 fn encrypted(encryptor: &str) -> Option<Notice> {
     let text =
-        format!("the bag is encrypted by `{encryptor}`: counts are right, names are not known");
+        format!("the bag is encrypted by `{encryptor}`: counts are right, names are unknown");
     (!encryptor.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
 }
 

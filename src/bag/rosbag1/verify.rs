@@ -55,7 +55,7 @@ fn bound(
                 None => Err("a chunk is compressed in an unknown way".to_owned()),
             },
             Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => Ok(()),
-            _ => Err("a record among the chunks is not what it should be".to_owned()),
+            _ => Err("a record among the chunks is of an unexpected kind".to_owned()),
         };
         refused = found.err();
         refused.as_ref().map_or(Ok(()), |_| Err(NoRecord::Broken))
@@ -63,7 +63,7 @@ fn bound(
     match (stop, refused) {
         (NoRecord::End, _) => Ok(()),
         (_, Some(why)) => Err(why),
-        (_, None) => Err("the chunks are not one behind the other".to_owned()),
+        (_, None) => Err("the chunks are not contiguous".to_owned()),
     }
 }
 
@@ -75,10 +75,10 @@ fn bound_chunk(
     allowance: &Arc<Allowance>,
 ) -> Result<(), String> {
     let unpacked = unpacked_len(source, body, size, allowance);
-    let unpacked = unpacked.map_err(|e| format!("a chunk cannot be unpacked: {e}"))?;
+    let unpacked = unpacked.map_err(|e| format!("a chunk cannot be decompressed: {e}"))?;
     if unpacked != u64::from(size) || size > LARGEST_CHUNK {
         return Err(format!(
-            "a chunk unfolds to {unpacked} bytes, not to {size}"
+            "a chunk decompresses to {unpacked} bytes instead of {size}"
         ));
     }
     Ok(())

@@ -32,7 +32,10 @@ struct Part {
 }
 
 /// Follows a folder.
-#[expect(clippy::unnecessary_wraps, reason = "as every format opens one")]
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "the signature that all formats share"
+)]
 pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
     Ok(Box::new(GrowingFolder {
         path: path.to_owned(),

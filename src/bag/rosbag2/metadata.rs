@@ -114,7 +114,7 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
         return Err(format!("`{name}` leaves the folder and was not followed"));
     }
     let Some(last) = path.file_name() else {
-        return Err(format!("`{name}` names no file"));
+        return Err(format!("`{name}` is not a file name"));
     };
     let plain = folder.join(last);
     let found = [

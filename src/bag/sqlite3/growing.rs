@@ -14,7 +14,7 @@ use crate::bag::model::{Growing, Growth, OpenOptions, Sink, Want};
 use crate::bag::source::FileSource;
 use crate::base::error::Result;
 
-/// The database is opened at every this many polls: polling is cheap, starting SQLite is not.
+/// The number of polls between two openings of the database: polling is cheap, starting SQLite is not.
 const EVERY: u32 = 4;
 
 /// A database, read up to the last reported row.
@@ -30,7 +30,10 @@ struct GrowingDb {
 }
 
 /// Follows a database.
-#[expect(clippy::unnecessary_wraps, reason = "as every format opens one")]
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "the signature that all formats share"
+)]
 pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
     Ok(Box::new(GrowingDb {
         path: path.to_owned(),

@@ -20,7 +20,7 @@ pub(super) struct Ready {
 }
 
 impl Ready {
-    /// A database that is read in place, with its log if it has one.
+    /// A database that is read without a copy, with its log if it has one.
     pub(super) fn growing(path: &Path, has_log: bool) -> Self {
         Self {
             path: path.to_owned(),

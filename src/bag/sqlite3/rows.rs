@@ -77,7 +77,7 @@ impl RowReading<'_, '_> {
         loop {
             let result = self.some(&db, &format!("{}{order}", self.rows.sql), way);
             let refusal = match result {
-                Ok(()) if self.repeated => return Err("they come again and again".to_owned()),
+                Ok(()) if self.repeated => return Err("they repeat endlessly".to_owned()),
                 Ok(()) => return Ok(()),
                 Err(refusal) => refusal,
             };
@@ -206,8 +206,7 @@ impl<'a> RowReader<'a> {
         let size =
             data.and_then(|data| report_payload(data, (id, time), want, &self.allowance, sink));
         if size.is_none() {
-            let text =
-                "payloads larger than 16 MiB or badly compressed were counted and not looked into";
+            let text = "payloads larger than 16 MiB or badly compressed were counted but not read";
             sink.notice(Notice::new(NoticeKind::Undecodable, text));
         }
         gather.add(id, time, size.unwrap_or(stored), sink);
@@ -287,7 +286,7 @@ impl LostRows {
             (
                 Damaged,
                 self.payloads,
-                "rows could be counted and not looked into",
+                "rows were counted but could not be read",
             ),
             (Note, self.unused, unused),
         ];

@@ -20,7 +20,7 @@ pub(crate) struct FigureArgs {
     /// `out/<bag name>.pdf`.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Life lines, a map of who publishes to whom, or the reconfigurations one by one.
+    /// Lifelines, a map of who publishes to whom, or the reconfigurations one by one.
     #[arg(long, default_value = "lives", value_parser = kinds())]
     pub(crate) kind: String,
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]

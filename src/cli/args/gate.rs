@@ -114,7 +114,7 @@ pub(crate) struct CheckArgs {
     pub(crate) graph: GraphArgs,
 }
 
-/// What undecidable rules do to the exit code.
+/// The effect of undecidable rules on the exit code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lower")]
 pub(crate) enum Undecidable {
@@ -125,7 +125,7 @@ pub(crate) enum Undecidable {
     Error,
 }
 
-/// Which part of a mission is judged, and in which windows.
+/// The part of a mission that is checked, and its windows.
 #[derive(Debug, Default, Args)]
 pub(crate) struct GateTime {
     /// Length of the windows in which rates are checked: `60`, `30s`, `500ms`. [default: the file's `period`]

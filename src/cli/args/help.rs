@@ -1,4 +1,5 @@
-//! How help is arranged: the headings of `--help`, and what `-h` shows on one screen.
+//! The arrangement of help: the headings of `--help`, and the options and examples of `-h`, which fits one
+//! screen.
 
 use clap::{Command, CommandFactory as _};
 
@@ -46,7 +47,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
         "figure",
         "outputs kind width rows text phases start end ns_filter topic_filter",
         "
-  bagreel figure run.bag -o lives.pdf                 life lines, as wide as a column
+  bagreel figure run.bag -o lives.pdf                 lifelines, as wide as a column
   bagreel figure run.bag --kind map -o map.pdf -o map.tex   publishers and subscribers, with LaTeX
   bagreel figure run.bag --kind steps --steps 3,5 -o steps.pdf   how phases 3 and 5 begin",
     ),

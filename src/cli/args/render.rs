@@ -33,7 +33,7 @@ pub(crate) struct RenderArgs {
     pub(crate) look: LookArgs,
     #[command(flatten)]
     pub(crate) sequence: SequenceArgs,
-    /// Draw a figure for a paper: an older way to write `bagreel figure`.
+    /// Draw a figure for a paper; replaced by `bagreel figure`.
     #[arg(long, value_name = "KIND", hide = true, value_parser = kinds(), conflicts_with_all = [
         "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
         "expand", "rqt_defaults", "show_recorder", "title",
@@ -121,13 +121,13 @@ pub(crate) struct LookArgs {
     /// Title. [default: the bag's name]
     #[arg(long)]
     pub(crate) title: Option<String>,
-    /// What thicker lines show: messages or payload bytes per second. [default: rate]
+    /// Quantity shown by the width of lines: messages or payload bytes per second. [default: rate]
     #[arg(long, value_name = "rate|bytes", value_parser = ["rate", "bytes"])]
     pub(crate) line_width: Option<String>,
     /// Draw the graph without title, legend or timeline.
     #[arg(long)]
     pub(crate) bare: bool,
-    /// Captions to show: a file of `seconds|text` lines, or a topic of strings.
+    /// Captions to show: a file of `seconds|text` lines, or a string topic.
     #[arg(long, value_name = "FILE|TOPIC")]
     pub(crate) captions: Option<String>,
     /// Font file for characters that the bundled font lacks.

@@ -33,7 +33,7 @@ impl Axis {
     }
 }
 
-/// The text of a moment in figures: `4:56`, `1:02:03`.
+/// A point in time as text in figures: `4:56`, `1:02:03`.
 pub(crate) fn clock(nanos: i64) -> String {
     // To the nearest second.
     let text = words::offset_seconds(nanos.saturating_add(500_000_000));
@@ -119,8 +119,8 @@ pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     format!("{name}{counts}{}", again.unwrap_or_default())
 }
 
-/// Draws the names of the phases from `y` on: at their places on at most two lines where `axis` has room, else as
-/// running text. Returns the y at which they end.
+/// Draws the names of the phases from `y` on: at their positions on at most two lines if `axis` is long
+/// enough, else as running text. Returns the y at which they end.
 pub(crate) fn names(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,
@@ -145,8 +145,9 @@ pub(crate) fn names(
     flow(canvas, width, y, &items)
 }
 
-/// Draws the titles of the phases, set from the right: each is placed a line lower than every later one that it overlaps,
-/// so that no leader crosses a text. Returns the y at which they end; `None` where that takes more than three lines.
+/// Draws the titles of the phases, set from the right: each is placed a line lower than every later one that
+/// it overlaps, so that no leader crosses a text. Returns the y at which they end; `None` if that takes more
+/// than three lines.
 fn staircase(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

@@ -7,18 +7,19 @@ use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 use crate::mission::EventId;
 
-/// No line of a page has room for a text of more characters than this; what is behind them is not measured.
+/// The most characters of a text that are measured: no line of a page fits more.
 const LONGEST: usize = 1000;
 
 /// Pixels per millimetre of a page on paper, 96 to the inch.
 pub(crate) const PX_PER_MM: f64 = 96.0 / 25.4;
 /// Millimetres per point.
 pub(crate) const MM_PER_PT: f64 = 25.4 / 72.0;
-/// The thinnest line in millimetres: 0.5 pt, as printers ask for.
+/// The thinnest line in millimetres: 0.5 pt, as printers require.
 pub(crate) const HAIRLINE: f64 = 0.18;
 
-/// The colours of a figure, which is on white paper. Every mark has a shape of its own too, so that grey print loses
-/// nothing; the three colours of change are those of the pictures, distinguished by colour-blind readers.
+/// The colours of a figure, which is on white paper. Every mark also has its own shape, so that nothing is
+/// lost in greyscale print; the three colours of change are those of the pictures, distinguished by
+/// colour-blind readers.
 pub(crate) mod ink {
     use crate::draw::style::Color;
 
@@ -40,7 +41,7 @@ pub(crate) mod ink {
     pub(crate) const GROUND: Color = Color::of([0xf6, 0xf8, 0xfb]);
 }
 
-/// The kind of a text, which decides its size and weight.
+/// The kind of a text, which determines its size and weight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Type {
     /// A node, a topic.
@@ -80,7 +81,7 @@ impl Sizes {
     }
 }
 
-/// A drawing that is being made. Everything is in millimetres, y down.
+/// A drawing in progress. All lengths are in millimetres, y down.
 pub(crate) struct PaperCanvas<'a> {
     pub(crate) fonts: &'a Fonts,
     pub(crate) sizes: Sizes,
@@ -287,7 +288,7 @@ impl<'a> PaperCanvas<'a> {
         }
     }
 
-    /// The groups, for a page that the caller makes.
+    /// The groups, for a page of the caller.
     pub(crate) fn into_groups(self) -> Vec<Group> {
         let drawn = self.groups.into_iter();
         drawn.filter(|g| !g.pieces.is_empty()).collect()
@@ -327,7 +328,7 @@ mod tests {
     fn shortened_text_always_fits() {
         let fonts = Fonts::bundled();
         let canvas = PaperCanvas::new(&fonts, Sizes::of_names(7.0), PX_PER_MM);
-        // Held against every prefix, this would take hours.
+        // Measuring every prefix would take hours.
         let names = "/robot1/planner, ".repeat(50_000);
         let cut = canvas.cut(&names, Type::Small, 30.0);
         assert!(cut.ends_with('\u{2026}') && canvas.width(&cut, Type::Small) <= 30.0);

@@ -1,5 +1,5 @@
-//! The course of a mission beside its picture: phases and groups for the strip below frames, and the life lines of all
-//! for the timeline of a page.
+//! The course of a mission beside its picture: phases and groups for the strip below frames, and all
+//! lifelines for the timeline of a page.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,8 @@ use crate::graph::Element;
 use crate::mission::EventId;
 use crate::mission::event_log::{Event, Kind};
 
-/// The course of a mission below its picture: the phases, and a row per group of nodes that come and go together.
+/// The course of a mission below its picture: the phases, and a row per group of nodes that start and stop
+/// together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Course {
     /// The phases, none if there is only one.
@@ -22,7 +23,7 @@ pub struct Course {
     pub(crate) rows: Vec<CourseRow>,
 }
 
-/// A phase with its name, as long as there is room for it, else one of the shorter ones.
+/// A phase with its name, if it fits, else a shorter one.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CoursePhase {
     pub(crate) span: Span,
@@ -32,7 +33,7 @@ pub(crate) struct CoursePhase {
 /// A row of a course.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CourseRow {
-    /// The names of its members; of none for events that belong to no row.
+    /// The names of its members; empty for events that belong to no row.
     pub(crate) names: Vec<String>,
     /// The times in which a member exists.
     pub(crate) lives: Vec<Span>,
@@ -51,13 +52,13 @@ pub(crate) struct CourseMark {
 const BURST: i64 = 33;
 
 impl Course {
-    /// The course in at most `most` rows: of nodes, or of topics where publishers are unknown, as far as something
-    /// happens to them. From the lives of [`of_all`]. Events without a row share the last one.
+    /// The course in at most `most` rows: of nodes, or of topics if publishers are unknown, if they have
+    /// events. From the lifetimes of [`of_all`]. Events without a row share the last one.
     pub(crate) fn new(lives: &LivesFigure<'_>, most: usize) -> Self {
         let source = lives.source;
         let mut marks = lives.marks.clone().plain();
         let begun = source.span().start.plus(source.span().nanos() / BURST);
-        // What starts with the recording is there from the beginning, to the eye.
+        // Elements that start with the recording look as if they existed from the beginning.
         let is_first = |s: &RowMark| s.sign == Sign::Start && s.at < begun;
         marks.signs.retain(|s| !is_first(s));
         let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<usize>> = BTreeMap::new();
@@ -102,7 +103,8 @@ impl Course {
     }
 }
 
-/// The beginnings of the bursts of signs of a kind: those that follow within a short time belong to the first of them.
+/// The beginnings of the bursts of signs of a kind: signs that follow within a short time belong to the first
+/// of them.
 fn bursts(signs: &[RowMark], sign: Sign, whole: Span) -> Vec<Stamp> {
     let mut times: Vec<Stamp> = signs
         .iter()
@@ -120,7 +122,7 @@ fn burst(bursts: &[Stamp], at: Stamp) -> Stamp {
     next.checked_sub(1).map_or(at, |found| bursts[found])
 }
 
-/// The row of some tracks, with one sign for all that happen at once.
+/// The row of some tracks, with one sign for simultaneous events.
 fn row(lives: &LivesFigure<'_>, tracks: &[usize], signs: &[RowMark]) -> CourseRow {
     let members = || tracks.iter().map(|at| &lives.tracks[*at]);
     let is_shared = |name: &str| {
@@ -176,8 +178,8 @@ fn unplaced(source: &FigureSource<'_>, signs: &[RowMark]) -> Vec<CourseMark> {
     others.map(mark).collect()
 }
 
-/// The phases with their names: the user's, else by what starts or ends, else how many. Without a name a phase with the
-/// same nodes as the one before belongs to it.
+/// The phases with their names: the user's, else by the elements that start or end, else by their number. A
+/// phase without a name and with the same nodes as the previous one is merged with it.
 fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
     let mut phases: Vec<CoursePhase> = Vec::new();
     for (k, phase) in source.phases.iter().enumerate() {
@@ -211,7 +213,8 @@ fn phases(source: &FigureSource<'_>) -> Vec<CoursePhase> {
     phases
 }
 
-/// What began or ended, in ever fewer words: all that the phase names, then two and one of them.
+/// The elements that began or ended, in fewer and fewer words: all that the phase names, then two and one of
+/// them.
 fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
     let mut names = vec![format!("{sign} {those}")];
     let each: Vec<&str> = those
@@ -227,22 +230,22 @@ fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
     names
 }
 
-/// The lives behind both the course and the life lines: of nodes; of topics where publishers are unknown.
+/// The lifetimes for both the course and the lifelines: of nodes, or of topics if publishers are unknown.
 pub(crate) fn of_all<'a>(source: &'a FigureSource<'a>) -> LivesFigure<'a> {
     LivesFigure::new(source, !source.knows_publishers())
 }
 
-/// The lives of all, a row each with its name, in the order of the figure: the timeline of a page.
+/// All lifelines, a row each with its name, in the order of the figure: the timeline of a page.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LifeLines {
     pub(crate) rows: Vec<LifeLine>,
     /// Ticks, crosses and small circles, on rows.
     pub(crate) marks: Vec<RowMark>,
-    /// Topics that others send from a moment on, from row to row.
+    /// Topics that other nodes take over, from row to row.
     pub(crate) handovers: Vec<Handover>,
 }
 
-/// A row of the life lines: a node, a topic, or the title of the namespace of those that follow.
+/// A row of the lifelines: a node, a topic, or the title of the namespace of those that follow.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LifeLine {
     pub(crate) label: String,
@@ -255,7 +258,7 @@ pub(crate) struct LifeLine {
 }
 
 impl LifeLines {
-    /// The rows of nodes; of topics where publishers are unknown. From the lives of [`of_all`].
+    /// The rows of nodes, or of topics if publishers are unknown. From the lifetimes of [`of_all`].
     pub(crate) fn new(lives: LivesFigure<'_>) -> Self {
         let handovers = lives.marks.handovers.clone();
         let lives = lives.opened();
@@ -290,7 +293,7 @@ fn line(lives: &LivesFigure<'_>, row: &FigureRow) -> Option<LifeLine> {
                 bars: track.bars.clone(),
             })
         }
-        // Opened, they fold nothing.
+        // When expanded, they collapse nothing.
         FigureRow::Folded(..) => None,
     }
 }

@@ -1,5 +1,6 @@
-//! Groups: nodes of one namespace that exist in the same phases. A group hides no change, for its members come and go
-//! together. Where groups of whole namespaces are too many, shorter namespaces make fewer of them.
+//! Groups: nodes of one namespace that exist in the same phases. A group hides no change, since its members
+//! start and stop together. If there are too many groups of whole namespaces, shorter namespaces make fewer
+//! of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -16,7 +17,7 @@ pub(crate) struct NodeGroup {
     pub(crate) space: String,
     /// The phases in which it exists, counted from 0; empty without phases.
     pub(crate) phases: BTreeSet<usize>,
-    /// Places of its members in the list of names given.
+    /// Indices of its members in the given list of names.
     pub(crate) members: Vec<usize>,
 }
 
@@ -34,7 +35,8 @@ pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTre
     tracks.iter().map(of).collect()
 }
 
-/// The most parts of namespaces that distinguish groups: each is a layout to try, and names come from the bag.
+/// The most parts of namespaces that distinguish groups: each number requires a layout, and names come from
+/// the bag.
 const MOST_PARTS: usize = 8;
 
 /// The numbers of parts of namespaces that may distinguish groups, from all of them down to one.
@@ -67,7 +69,7 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) 
         .collect()
 }
 
-/// A row per group: alive while a member is, busy by the messages of all.
+/// A row per group: it exists while a member does, and sums the messages of all.
 pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<Track> {
     groups(source, tracks, depth)
         .iter()

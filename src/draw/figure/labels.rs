@@ -1,18 +1,20 @@
-//! The places of the labels of arrows: on their arrow or beside it, over no box, no title, no tip and no other label.
+//! The positions of arrow labels: on their arrow or beside it, without covering boxes, titles, arrowheads or
+//! other labels.
 
 use crate::base::geometry::{Point, Rect, Size};
 
-/// The number of places along an arrow that are tried on each side of its middle, and their distance as a part of its
-/// length.
+/// The number of positions along an arrow that are tried on each side of its middle, and their distance as a
+/// fraction of its length.
 const STATIONS: (usize, f64) = (15, 0.028);
 /// The cost of a label on another arrow, of one beside its own, and of one that is an arrow's length off its middle.
 const ON_ARROW: f64 = 2.0;
 const ASIDE: f64 = 0.8;
 const OFF_MIDDLE: f64 = 1.25;
-/// The distance in millimetres that a label keeps from other arrows, so that it is clear whose it is.
+/// The distance in millimetres that a label keeps from other arrows, so that it is clear which one it belongs
+/// to.
 const NEAR: f64 = 0.4;
 
-/// The things that labels are placed among.
+/// The shapes among which labels are placed.
 pub(crate) struct Room<'a> {
     /// The arrows as chains of short straight pieces.
     pub(crate) routes: &'a [Vec<Point>],
@@ -24,7 +26,7 @@ pub(crate) struct Room<'a> {
     pub(crate) fixed: Vec<Rect>,
 }
 
-/// The place of a label: its middle, and the place of its text among its alternatives.
+/// The position of a label: its middle, and the index of its text among the alternatives.
 pub(crate) type Spot = (Point, usize);
 
 /// The labels of a drawing while they are being placed.
@@ -33,7 +35,8 @@ struct Labels<'a> {
     spots: Vec<Option<Spot>>,
 }
 
-/// A place for each label that fits, those of short arrows first; one that does not fit may displace another one.
+/// A position for each label that fits, those of short arrows first; one that does not fit may displace
+/// another one.
 pub(crate) fn set(room: &Room<'_>) -> Vec<Option<Spot>> {
     let mut order: Vec<usize> = (0..room.labels.len()).collect();
     order.retain(|at| !room.labels[*at].is_empty());
@@ -70,7 +73,7 @@ impl Room<'_> {
         others.filter(|(_, route)| crosses(route, rect)).count()
     }
 
-    /// Every place along an arrow where a label covers nothing that is fixed, with its cost.
+    /// Every position along an arrow at which a label covers nothing fixed, with its cost.
     fn spots(&self, at: usize, which: usize) -> Vec<(f64, Spot)> {
         let size = self.labels[at][which];
         let mut all = Vec::new();
@@ -98,7 +101,7 @@ impl Room<'_> {
 }
 
 impl Labels<'_> {
-    /// The best free place of a label, of its first alternative that has any.
+    /// The best free position of a label, for its first alternative that has one.
     fn best(&self, at: usize) -> Option<Spot> {
         let free = |which: usize| {
             let spots = self.room.spots(at, which).into_iter();
@@ -119,7 +122,7 @@ impl Labels<'_> {
         })
     }
 
-    /// Puts a label at the place of one other label that has room elsewhere.
+    /// Puts a label at the position of one other label that fits elsewhere.
     fn push_aside(&mut self, at: usize) {
         for which in 0..self.room.labels[at].len() {
             let mut all = self.room.spots(at, which);
@@ -139,15 +142,15 @@ impl Labels<'_> {
     }
 }
 
-/// The distances from the middle of an arrow at which a label is tried, each with its place along the arrow; both are
-/// parts of its length.
+/// The distances from the middle of an arrow at which a label is tried, each with its position along the
+/// arrow; both are fractions of its length.
 fn stations() -> impl Iterator<Item = (f64, f64)> {
     let (many, step) = STATIONS;
     let off = (0..many).map(move |k| k as f64 * step);
     off.flat_map(|off| [(off, 0.5 - off), (off, 0.5 + off)])
 }
 
-/// The point at this part of a line, and the direction across it.
+/// The point at this fraction of a line, and the direction across it.
 fn along(points: &[Point], part: f64) -> Option<(Point, Point)> {
     let mut left = length(points) * part;
     for pair in points.windows(2) {

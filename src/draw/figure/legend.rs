@@ -30,13 +30,13 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
         (
             open.iter().any(|t| !t.bars.is_empty()),
             (3.2, bar),
-            "sends (height: share of the row’s most)",
+            "publishes (height: share of the row’s maximum)",
         ),
         (silent, (3.2, |c, x, y| line(c, x, y, &[])), "silent"),
         (
             all_lives().any(|l| l.is_inferred),
             (3.2, |c, x, y| line(c, x, y, &[0.55, 0.5])),
-            "alive by inference",
+            "inferred",
         ),
         (
             has(Sign::Start),
@@ -51,12 +51,12 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
         (
             !lives.marks.handovers.is_empty(),
             (3.2, arrow),
-            "topic changes hands",
+            "topic is taken over",
         ),
         (
             has(Sign::Dot),
             (1.0, |c, x, y| dot(c, x + 0.5, y)),
-            "changes otherwise",
+            "other change",
         ),
     ];
     let drawn = all.into_iter().filter(|(is, ..)| *is);

@@ -1,4 +1,4 @@
-//! Life lines in a frame of a sequence: the parts that a frame adds to the rows.
+//! Lifelines in a frame of a sequence: the parts that a frame adds to the rows.
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::lives::{LivesFigure, RowPlace, thick};
@@ -8,7 +8,7 @@ use crate::base::name::last_part;
 use crate::base::time::Stamp;
 
 impl LivesFigure<'_> {
-    /// The same with a row for everything, nothing folded, and without letters and arrows.
+    /// The same with a row for every element, without collapsed rows, letters and arrows.
     pub(crate) fn opened(mut self) -> Self {
         let tracks = &self.tracks;
         let open = |row: FigureRow| match row {
@@ -91,7 +91,7 @@ impl LivesFigure<'_> {
         }
     }
 
-    /// Draws the bars of sending up to a moment.
+    /// Draws the publishing bars up to a point in time.
     pub(crate) fn past(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace, until: Stamp) {
         for (y, track, ..) in self.lines(canvas, place) {
             for bar in track.bars.iter().filter(|b| b.span.start < until) {

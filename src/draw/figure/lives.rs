@@ -1,11 +1,10 @@
-//! Life lines: a row per node (or topic), time to the right; when it is alive, how busily it sends, what changed.
+//! Lifelines: a row per node (or topic), time to the right; when it exists, its rate, and its changes.
 //!
-//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page already, the rows
-//! alone.
-//! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives the height of the rows, and
-//! `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A canvas in pixels (a timeline below
-//! frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with pixels per millimetre as its scale, and gives
-//! its groups by `into_groups`.
+//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page
+//! already, only the rows. `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives
+//! the height of the rows, and `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A
+//! canvas in pixels (a timeline below frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with
+//! pixels per millimetre as its scale, and gives its groups by `into_groups`.
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
@@ -23,8 +22,8 @@ use crate::mission::events::sentence;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
-/// The least width of a figure with a column of the topics that each row sends and receives, and the width of that
-/// column; in millimetres.
+/// The least width of a figure with a column of the topics that each row publishes and subscribes to, and the
+/// width of that column; in millimetres.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
 
 /// The content of a figure of lives.
@@ -35,7 +34,7 @@ pub(crate) struct LivesFigure<'a> {
     pub(crate) marks: Marks,
 }
 
-/// The places of the rows of a figure, in millimetres.
+/// The positions of the rows of a figure, in millimetres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowPlace {
     /// The top of the band.
@@ -46,14 +45,16 @@ pub(crate) struct RowPlace {
     pub(crate) axis: Axis,
     /// The right end of the column of rates, if there is one.
     pub(crate) rates: Option<f64>,
-    /// The left end and the width of the column of topics that each row sends and receives, if there is room.
+    /// The left end and the width of the column of topics that each row publishes and subscribes to, if it
+    /// fits.
     pub(crate) talk: Option<(f64, f64)>,
-    /// Whether names and bars of sending are drawn by [`super::live`], frame by frame; the bars here are then pale.
+    /// Whether names and publishing bars are drawn by [`super::live`], frame by frame; the bars here are then
+    /// pale.
     pub(crate) is_live: bool,
 }
 
 impl<'a> LivesFigure<'a> {
-    /// The lives of nodes, or of topics.
+    /// The lifelines of nodes, or of topics.
     pub(crate) fn new(source: &'a FigureSource<'a>, by_topics: bool) -> Self {
         let tracks = if by_topics {
             of_topics(source)
@@ -63,7 +64,7 @@ impl<'a> LivesFigure<'a> {
         Self::of(source, tracks)
     }
 
-    /// The lives of these rows.
+    /// The lifelines of these rows.
     pub(crate) fn of(source: &'a FigureSource<'a>, tracks: Vec<Track>) -> Self {
         let marks = Marks::new(source, &tracks);
         let rows = rows(&tracks, source.span(), &marks);
@@ -81,7 +82,7 @@ impl<'a> LivesFigure<'a> {
         self.band() + rows + 0.4 + canvas.sizes.line() + 1.2
     }
 
-    /// The height of the band with the room below it; nothing without phases.
+    /// The height of the band with the space below it; 0 without phases.
     fn band(&self) -> f64 {
         let has_band = !self.source.phases.is_empty();
         if has_band { band::HEIGHT + 0.9 } else { 0.0 }
@@ -182,7 +183,7 @@ impl<'a> LivesFigure<'a> {
             canvas.text_end(right, head, Type::Small, ink::QUIET, "Hz");
         }
         if let Some((x, _)) = place.talk.filter(|_| !self.is_of_topics()) {
-            let text = "→ sends  ← receives, as far as known";
+            let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, Type::Small, ink::QUIET, text);
         }
     }
@@ -275,7 +276,7 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
-    /// Draws the arrows of hand-overs; returns the places of them and their labels: x, from y, to y.
+    /// Draws the arrows of hand-overs; returns the positions of arrows and labels: x, from y, to y.
     fn arrows(
         &self,
         canvas: &mut PaperCanvas<'_>,
@@ -312,7 +313,7 @@ impl<'a> LivesFigure<'a> {
                 let text = canvas.cut(&handover.topic, Type::Small, most);
                 let wide = canvas.width(&text, Type::Small);
                 let left = (x + 0.6).min(place.axis.right - wide);
-                // Between two rows, so that it covers no mark of theirs.
+                // Between two rows, so that it covers none of their marks.
                 let (top, pitch) = (self.top(place), canvas.sizes.pitch());
                 let rows = libm::round((from + (to - from) * 0.66 - top) / pitch);
                 let y = top + rows * pitch;
@@ -326,7 +327,7 @@ impl<'a> LivesFigure<'a> {
 
 fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>) {
     let Some(right) = place.rates else { return };
-    // Two digits from 1 Hz on, one below: more is not known, and not needed.
+    // Two digits from 1 Hz on, one below: more are neither known nor needed.
     let digits = |hz: f64| if hz < 0.95 { 1 } else { 2 };
     // Four digits are wider than the column.
     let shown = |hz: f64| match words::significant(hz, digits(hz)) {
@@ -337,7 +338,7 @@ fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>)
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }
 
-/// Draws the lives and the bars of a row.
+/// Draws the lifetimes and the bars of a row.
 fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
@@ -355,7 +356,7 @@ fn thin(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, life: &TrackLife
     canvas.line(Point::new(from, y), Point::new(to, y), &stroke);
 }
 
-/// Draws a stretch of sending.
+/// Draws a publishing interval.
 pub(crate) fn thick(
     canvas: &mut PaperCanvas<'_>,
     place: &RowPlace,
@@ -369,8 +370,8 @@ pub(crate) fn thick(
     canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
 }
 
-/// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room; of a
-/// topic its types.
+/// Draws as many of the topics that a node publishes, the fastest first, and subscribes to as fit; for a
+/// topic, its types.
 fn talk(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

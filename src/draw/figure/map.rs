@@ -1,5 +1,5 @@
-//! The map: the nodes of the whole mission with arrows from publisher to subscriber, and the phases in which each
-//! lives.
+//! The map: the nodes of the whole mission with arrows from publisher to subscriber, and the phases in which
+//! each exists.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -21,13 +21,13 @@ use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
 use crate::layout::{Cluster, Outline, Plan, Vertex};
 
-/// The height of a map of nodes, in millimetres, from which on groups are drawn instead where these fit.
+/// The height of a map of nodes, in millimetres, above which groups are drawn instead, if they fit.
 const HIGH: f64 = 130.0;
 /// The height of a node in millimetres.
 const PILL: f64 = 3.3;
 /// The most members that a group names.
 const NAMED: usize = 4;
-/// The most nodes that are laid out one by one; more never fit.
+/// The most nodes that are laid out separately; more never fit.
 const MOST_NODES: usize = 120;
 /// The most groups that are laid out; more never fit.
 const MOST_GROUPS: usize = 60;
@@ -65,8 +65,8 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let talks = Talks::new(sheet.source, &tracks);
     if talks.between(&each, sheet.source.span(), false).is_empty() {
         return Err(Error::usage(
-            "no topic has both a known publisher and a known subscriber, so there is nothing to map",
-            "`--kind lives` shows what there is; `--topology FILE` adds connections",
+            "no topic has both a known publisher and a known subscriber, so there is no map to draw",
+            "draw `--kind lives` instead, or add connections with `--topology FILE`",
         ));
     }
     let asked = sheet.options.rows;
@@ -86,7 +86,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         .flatten();
     if let Some(scene) = grouped {
         let remark = format!(
-            "boxes are groups: {} one by one are too many for this width",
+            "boxes are groups, since {} do not fit separately at this width",
             words::count(tracks.len(), "node")
         );
         let remarks = if asked.is_none() {
@@ -119,11 +119,11 @@ fn too_large(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Error {
     let width = sheet.options.width_mm;
     let many = words::count(tracks.len(), "node");
     let hint = if width < 181.0 && page_at(sheet, tracks, 181.0) {
-        "`--width 181mm` would do".to_owned()
+        "use `--width 181mm`".to_owned()
     } else {
         filter_that_fits(tracks, FITTING, "--ns-filter", "node")
     };
-    Error::usage(format!("a map of {many} does not fit on {width} mm"), hint)
+    Error::usage(format!("a map of {many} does not fit in {width} mm"), hint)
 }
 
 /// Whether groups would fit at another width.
@@ -184,9 +184,9 @@ fn below(
     let mut text = String::new();
     if !sheet.options.is_bare {
         text.push_str(if is_grouped {
-            "Box: nodes of one namespace that come and go together; number and bar: the phases they live in. "
+            "Box: nodes of one namespace that start and stop together; number and bar: the phases in which they exist. "
         } else {
-            "Number: the phases in which a node lives; filled: all of them. Dashed frame: nodes without a known partner. "
+            "Number: the phases in which a node exists; filled: all of them. Dashed frame: nodes without a known partner. "
         });
         text.push_str("Arrow: topics, thicker = more Hz, dashed = inferred. ");
     }
@@ -208,7 +208,7 @@ fn below(
     )
 }
 
-/// The map with every node as a pill, namespaces as frames; `None` where it does not fit.
+/// The map with every node as a rounded box, namespaces as frames; `None` if it does not fit.
 fn of_pills(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
@@ -279,7 +279,7 @@ fn of_pills(
     })
 }
 
-/// The map with every group as a box; `None` where it does not fit.
+/// The map with every group as a box; `None` if it does not fit.
 fn of_groups(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
@@ -349,7 +349,7 @@ fn finished(
     })
 }
 
-/// The phases as people write them: `2–4`, `1,3–5`; empty for all of them.
+/// The phases as text: `2–4`, `1,3–5`; empty for all of them.
 pub(crate) fn ranges(phases: &BTreeSet<usize>, many: usize) -> String {
     if phases.len() >= many {
         return String::new();

@@ -30,7 +30,7 @@ pub(crate) enum Sign {
 /// A mark on a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowMark {
-    /// The row: a place among the tracks.
+    /// The row: an index into the tracks.
     pub(crate) track: usize,
     pub(crate) at: Stamp,
     pub(crate) sign: Sign,
@@ -56,7 +56,7 @@ pub(crate) struct Letter {
     pub(crate) text: String,
 }
 
-/// A topic that another row sends from a time on.
+/// A topic that another row publishes from a time on.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Handover {
     pub(crate) at: Stamp,
@@ -68,7 +68,7 @@ pub(crate) struct Handover {
 }
 
 impl Handover {
-    /// The same from and to the rows of its tracks; `None` if they have none, or share one.
+    /// The same between the rows of its tracks; `None` if they have none, or share one.
     pub(crate) fn on(&self, row: impl Fn(usize) -> Option<usize>) -> Option<Self> {
         let (from, to) = (row(self.from)?, row(self.to)?);
         (from != to).then(|| Self {
@@ -144,8 +144,8 @@ impl Marks {
         marks
     }
 
-    /// Gives letters to the weightiest events other than ticks and crosses, in order of time; a restart without a letter
-    /// has its cross and tick.
+    /// Gives letters to the most important events other than ticks and crosses, in order of time; a restart
+    /// without a letter has its cross and tick.
     fn letter(&mut self, source: &FigureSource<'_>, tracks: &[Track], circles: Vec<RowMark>) {
         let events = &source.mission.log.events;
         let whole = source.span().nanos().max(1) as f64;
@@ -187,7 +187,7 @@ impl Marks {
             .sort_by_key(|l| (l.mark.at, l.mark.track, l.mark.event));
     }
 
-    /// The same with small circles instead of letters, and without arrows: for rows without room for words.
+    /// The same with small circles instead of letters, and without arrows: for rows without space for words.
     pub(crate) fn plain(mut self) -> Self {
         let letters = std::mem::take(&mut self.letters).into_iter();
         let is_restart = |mark: &RowMark| self.signs.iter().any(|s| s.event == mark.event);
@@ -217,7 +217,7 @@ impl Marks {
         own.into_iter().collect()
     }
 
-    /// The rows with any mark but ticks, which a folded row can bear too.
+    /// The rows with any mark other than ticks, which collapsed rows can also have.
     pub(crate) fn marked(&self) -> BTreeSet<usize> {
         let letters = self.letters.iter().map(|l| l.mark.track);
         let hands = self.handovers.iter().flat_map(|h| [h.from, h.to]);
@@ -249,7 +249,7 @@ fn weight(event: &Event, whole: f64) -> f64 {
     }
 }
 
-/// The text of a letter, the name as short as the row allows, the rest in the log's words.
+/// The text of a letter, with the name as short as the row allows, and the log's words.
 fn text(source: &FigureSource<'_>, event: &Event, track: &Track) -> String {
     let said = predicate(source.mission, &[], event);
     let (node, topic) = source.mission.elements.ends(event.what);
@@ -302,7 +302,7 @@ impl Rows {
         }
     }
 
-    /// The rows that hand a topic over and take it.
+    /// The rows from which and to which a topic is handed over.
     fn hands(&self, source: &FigureSource<'_>, event: &Event) -> (Option<usize>, Option<usize>) {
         let topic = source.mission.elements.ends(event.what).1;
         let is_shown = topic.is_some_and(|topic| source.shows(topic));
@@ -313,8 +313,9 @@ impl Rows {
         (row(from), row(to))
     }
 
-    /// The row on which an event is marked: that of its element; of an edge that of its node or topic; of a topic,
-    /// among nodes, that of a sender. A part of another event is marked only where it is a row that begins or ends.
+    /// The row on which an event is marked: that of its element; for an edge, that of its node or topic; for
+    /// a topic among nodes, that of a sender. A part of another event is only marked if it is a row that
+    /// begins or ends.
     fn of(&self, source: &FigureSource<'_>, event: &Event) -> Option<usize> {
         let elements = &source.mission.elements;
         let (node, topic) = elements.ends(event.what);

@@ -17,10 +17,10 @@ pub(crate) enum TextRun {
 /// Runs of text that are kept on one line if possible.
 pub(crate) type Unbroken = Vec<TextRun>;
 
-/// The most bytes of a text that is measured as a whole: no line has room for a longer one.
+/// The most bytes of a text that is measured as a whole: no line fits a longer one.
 const LONG: usize = 2000;
 
-/// The room between items in millimetres.
+/// The space between items in millimetres.
 const GAP: f64 = 2.6;
 
 /// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that is

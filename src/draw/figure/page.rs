@@ -18,7 +18,7 @@ use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
 
-/// The shortest time axis in millimetres on which anything can be seen.
+/// The shortest legible time axis, in millimetres.
 const SHORTEST_AXIS: f64 = 15.0;
 
 /// The most names of one kind that are reported in a note; the others are counted.
@@ -85,7 +85,7 @@ impl<'a> FigureSheet<'a> {
             if scene.is_some() && !is_grouped {
                 let many = words::count(first.tracks.len(), "node");
                 remarks.push(format!(
-                    "{many} do not fit on a page; rows are groups of nodes that come and go together"
+                    "{many} do not fit on a page; rows are groups of nodes that start and stop together"
                 ));
             }
         }
@@ -93,7 +93,7 @@ impl<'a> FigureSheet<'a> {
         Ok((scene, remarks))
     }
 
-    /// The page of some lives, of any height; `None` where it is too narrow.
+    /// The page of some lifelines, of any height; `None` if it is too narrow.
     fn lives_page(&self, lives: &LivesFigure<'_>) -> Option<Scene> {
         let width = self.options.width_mm;
         let mut canvas = self.canvas();
@@ -110,14 +110,14 @@ impl<'a> FigureSheet<'a> {
             y = flow(&mut canvas, width, y + 0.15, &legend::items(lives));
         }
         let what = if lives.is_of_topics() {
-            "Life lines of topics"
+            "Lifelines of topics"
         } else {
-            "Life lines"
+            "Lifelines"
         };
         Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
     }
 
-    /// The error of a figure that does not fit, with a namespace that would.
+    /// The error for a figure that does not fit, with a namespace that would fit.
     fn too_high(&self, lives: &LivesFigure<'_>) -> Error {
         let canvas = self.canvas();
         let width = self.options.width_mm;
@@ -126,8 +126,8 @@ impl<'a> FigureSheet<'a> {
             let enough = wider.filter(|w| lives_place(lives, &canvas, *w).is_some());
             let enough = enough.take(1).next().unwrap_or(88.0);
             return Error::usage(
-                format!("{width} mm leave no room for time beside the names"),
-                format!("`--width {enough}mm` would do"),
+                format!("{width} mm leave no space for the time axis beside the names"),
+                format!("use `--width {enough}mm`"),
             );
         }
         let high = lives.height(&canvas);
@@ -159,7 +159,7 @@ pub(crate) fn filter_that_fits(tracks: &[Track], most: usize, flag: &str, word: 
     let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
     let most = words::count(most, word);
     match best {
-        None => format!("at most {most} fit; choose some with `{flag}`"),
+        None => format!("at most {most} fit; select some with `{flag}`"),
         Some((name, many)) => {
             format!("`{flag} '{name}/.*'` leaves {many}; at most {most} fit")
         }
@@ -172,17 +172,17 @@ fn top_space(name: &str) -> Option<&str> {
     name.get(..=end)
 }
 
-/// The error of a figure with nothing to draw: filters leave nothing, or no nodes are known.
+/// The error for a figure with nothing to draw: filters leave nothing, or no nodes are known.
 pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
     if source.shown_topics().next().is_some() && source.knows_no_node() {
         return Error::usage(
             "no nodes were found",
-            "`--kind lives` draws its topics; `bagreel info` lists what would reveal more",
+            "draw its topics with `--kind lives`; `bagreel info` explains how to record more",
         );
     }
     Error::usage(
         "nothing is left to draw",
-        "`--ns-filter` and `--topic-filter` leave nothing; `bagreel info` lists what there is",
+        "widen `--ns-filter` or `--topic-filter`; `bagreel info` lists all names",
     )
 }
 
@@ -190,7 +190,7 @@ pub(crate) fn fits(scene: &Scene) -> bool {
     scene.size.h <= MOST_HEIGHT * PX_PER_MM
 }
 
-/// The columns of a page of lives; `None` where too little is left for the time axis.
+/// The columns of a page of lifelines; `None` if too little is left for the time axis.
 fn lives_place(lives: &LivesFigure<'_>, canvas: &PaperCanvas<'_>, width: f64) -> Option<RowPlace> {
     let names = lives.names_width(canvas, width.min(WIDE.0));
     let talk = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
@@ -228,8 +228,8 @@ fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     lives.marks.letters.iter().enumerate().map(item).collect()
 }
 
-/// The notes below the legend: the members of folded rows where no column lists them, and the number of events
-/// without a letter.
+/// The notes below the legend: the members of collapsed rows if no column lists them, and the number of
+/// events without a letter.
 fn lives_notes(lives: &LivesFigure<'_>, is_reported: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
     for row in lives.rows.iter().filter(|_| !is_reported) {

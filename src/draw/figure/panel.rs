@@ -9,7 +9,7 @@ use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
 use crate::mission::EventId;
 
-/// The room inside a panel's border in millimetres.
+/// The space inside a panel's border in millimetres.
 pub(crate) const INSIDE: f64 = 1.3;
 
 /// The state of a box in a step.
@@ -32,7 +32,7 @@ pub(crate) struct PanelBox {
 }
 
 impl PanelBox {
-    /// Whether the namespace has a line of its own: because it is long, or that of several names.
+    /// Whether the namespace has a separate line, because it is long or shared by several names.
     fn has_head(&self) -> bool {
         match self.space.as_str() {
             "" => false,
@@ -74,7 +74,7 @@ pub(crate) struct Panel {
     pub(crate) height: f64,
     /// The height of the notes in millimetres.
     pub(crate) foot: f64,
-    /// The number of nodes that live before or after the step and are not drawn.
+    /// The number of nodes that exist before or after the step and are not drawn.
     pub(crate) undrawn: usize,
 }
 
@@ -160,7 +160,7 @@ fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     };
     canvas.frame(rect, 0.6, fill, &Stroke::dashed(color, width, dash));
     if look.state == BoxState::ChangedHands {
-        // A double frame, to be distinguishable in grey print.
+        // A double frame, to be distinguishable in greyscale print.
         let inner = Stroke::solid(ink::CHANGED, HAIRLINE);
         canvas.frame(rect.grown(-0.45), 0.3, Color::NONE, &inner);
     }

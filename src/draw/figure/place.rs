@@ -1,4 +1,4 @@
-//! The places of boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed
+//! The positions of boxes and arrows within a width: our own layout tried at several densities, labels placed
 //! afterwards.
 
 use super::canvas::{PaperCanvas, Type, ink};
@@ -11,17 +11,18 @@ use crate::layout::{
     parts, shelves,
 };
 
-/// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
-/// tightest comes first: where it is too wide, all are.
+/// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more pixels make a denser
+/// drawing. The densest comes first: if it is too wide, all are.
 const TIGHTNESS: [f64; 5] = [12.0, 9.0, 6.5, 4.8, 3.6];
-/// The factor over the width from which on a drawing is too wide at every tightness; below it the engine, which has
-/// several ways, may still find one that fits.
+/// The factor over the width above which a drawing is too wide at every density; below it, the engine may
+/// still find a layout that fits.
 const HOPELESS: f64 = 1.25;
-/// The shortest arrow in millimetres that shows its direction, minus the room that the engine leaves around a label.
+/// The shortest arrow in millimetres that shows its direction, minus the space that the engine leaves around
+/// a label.
 const SHORTEST: f64 = 3.4;
-/// The height of the page that the engine is to fill, in widths: low.
+/// The height of the page that the engine should fill, in widths.
 const ASPECT: f64 = 0.45;
-/// The room between parts in millimetres: side by side, and between shelves.
+/// The space between parts in millimetres: side by side, and between shelves.
 const PARTED: (f64, f64) = (3.0, 3.0 * 0.7);
 /// The number of pieces in which a curve is measured.
 const PIECES: u32 = 8;
@@ -33,16 +34,16 @@ pub(crate) struct PlacedPanel {
     pub(crate) clusters: Vec<Rect>,
     pub(crate) routes: Vec<Vec<Point>>,
     curves: Vec<Route>,
-    /// The spot of each label; `None` for one without room.
+    /// The position of each label; `None` for one that does not fit.
     pub(crate) labels: Vec<Option<Spot>>,
     pub(crate) left_out: usize,
     /// The number of labels on or near an arrow that is not theirs.
     pub(crate) unclear: usize,
 }
 
-/// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all
-/// are wider. Parts without links between them are laid out each by itself and put side by side. `labels` contains, per
-/// link, the sizes of the texts that may be written on it, the best first.
+/// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` if
+/// all are wider. Parts without links between them are laid out separately and put side by side. `labels`
+/// contains, per link, the sizes of the texts that may be written on it, the best first.
 pub(crate) fn place(
     canvas: &PaperCanvas<'_>,
     plan: &Plan,
@@ -92,15 +93,15 @@ pub(crate) fn place(
     Some(whole)
 }
 
-/// A choice of a drawing for every part, by place among its candidates, and the corner of each.
+/// A choice of a drawing for every part, by index among its candidates, and the corner of each.
 struct Arrangement {
     cost: f64,
     parts: Vec<(usize, Point)>,
     size: Size,
 }
 
-/// Ways to take one candidate of every part: for each candidate of the largest part, the others chosen to fit beside
-/// it.
+/// Combinations of one candidate of every part: for each candidate of the largest part, the others chosen to
+/// fit beside it.
 fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
     let area = |all: &Vec<PlacedPanel>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
     let order = |a: &usize, b: &usize| area(&tried[*a]).total_cmp(&area(&tried[*b])).then(b.cmp(a));
@@ -124,7 +125,7 @@ fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
     Some(ways)
 }
 
-/// The cost of a label that is left out, and of one near a foreign arrow, in millimetres of height.
+/// The cost of a label that is left out, and of one near another arrow, in millimetres of height.
 const LOST: f64 = 3.0;
 const UNCLEAR: f64 = 2.0;
 /// The share of labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
@@ -139,7 +140,8 @@ fn choice(all: &[PlacedPanel], most: f64) -> Option<usize> {
     best.or_else(|| (0..all.len()).min_by(|a, b| all[*a].size.w.total_cmp(&all[*b].size.w)))
 }
 
-/// Every drawing of a part that fits. The ways are searched side by side, for searching is most of a figure's time.
+/// Every drawing of a part that fits. They are searched in parallel, since searching takes most of a figure's
+/// time.
 fn candidates(
     plan: &Plan,
     labels: &[Vec<Size>],
@@ -166,8 +168,8 @@ fn candidates(
 /// A layout engine that several threads may use.
 type Searcher = dyn Engine + Sync;
 
-/// The drawings of one orientation, from the tightest to the loosest that fits; with room kept for labels
-/// between neighbours, or without.
+/// The drawings of one orientation, from the tightest to the loosest that fits; with or without space for
+/// labels between neighbours.
 fn tightened(
     plan: &Plan,
     labels: &[Vec<Size>],
@@ -198,7 +200,7 @@ fn tightened(
         }
         all.push(PlacedPanel::new(plan, &layout, labels, tightness, width));
         if plan.links.is_empty() {
-            // More room would not change anything else.
+            // More space would not change anything else.
             break;
         }
     }
@@ -218,7 +220,7 @@ fn scaled(plan: &Plan, by: f64) -> Plan {
 }
 
 impl PlacedPanel {
-    /// Room for a whole plan, still empty.
+    /// An empty drawing for a whole plan.
     fn empty(plan: &Plan, labels: usize, size: Size) -> Self {
         Self {
             size,
@@ -232,7 +234,7 @@ impl PlacedPanel {
         }
     }
 
-    /// Only these boxes and these lines with their labels, at their places.
+    /// Only these boxes and these lines with their labels, at their positions.
     pub(crate) fn only(&self, boxes: &[usize], links: &[usize]) -> Self {
         Self {
             boxes: boxes.iter().map(|at| self.boxes[*at]).collect(),
@@ -243,7 +245,7 @@ impl PlacedPanel {
         }
     }
 
-    /// Adds the places of a part.
+    /// Adds the positions of a part.
     fn take(&mut self, part: &Component, placed: Self) {
         for (at, rect) in part.vertices.iter().zip(placed.boxes) {
             self.boxes[*at] = rect;
@@ -374,7 +376,7 @@ impl PlacedPanel {
         }
     }
 
-    /// Draws the label of one arrow: the lines of that alternative that found room, centred.
+    /// Draws the label of one arrow: the lines of the alternative that fits, centred.
     pub(crate) fn label(
         &self,
         canvas: &mut PaperCanvas<'_>,
@@ -394,7 +396,7 @@ impl PlacedPanel {
     }
 }
 
-/// The room that each alternative of a label takes.
+/// The size of each alternative of a label.
 fn rooms(canvas: &PaperCanvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
     let room = |lines: &Vec<String>| {
         let widths = lines.iter().map(|l| canvas.width(l, Type::Small));

@@ -1,4 +1,4 @@
-//! The rows of a figure of lives and their order: the staircase, namespaces, folded rows.
+//! The rows of a figure of lives and their order: the staircase, namespaces, collapsed rows.
 
 use std::collections::BTreeSet;
 
@@ -12,9 +12,9 @@ use crate::base::words;
 const BURST: i64 = 66;
 /// The number of parts of the mission that make the grid on which ends are compared.
 const END: i64 = 33;
-/// The least number of rows that live throughout and are folded.
+/// The least number of constant rows that are collapsed.
 const FEWEST_FOLDED: usize = 3;
-/// The most rows that are drawn one by one in a figure in which nothing comes or goes.
+/// The most rows that are drawn separately in a figure without starts and stops.
 const MOST_OPEN: usize = 12;
 
 /// One row of the figure.
@@ -22,9 +22,9 @@ const MOST_OPEN: usize = 12;
 pub(crate) enum FigureRow {
     /// The title of a namespace.
     Space(String),
-    /// A track, by place, with its label; members of a titled namespace are indented.
+    /// A track, by index, with its label; members of a titled namespace are indented.
     Track(usize, String, bool),
-    /// Tracks that live throughout, by place, and their namespace.
+    /// Tracks that exist throughout, by index, and their namespace.
     Folded(Vec<usize>, String),
 }
 
@@ -39,7 +39,7 @@ impl FigureRow {
     }
 }
 
-/// All rows in order. Marked tracks are not folded.
+/// All rows in order. Marked tracks are not collapsed.
 pub(crate) fn rows(tracks: &[Track], whole: Span, marks: &Marks) -> Vec<FigureRow> {
     let marked = marks.marked();
     let mut spaces: Vec<(bool, Stamp, &str, Vec<usize>)> = Vec::new();
@@ -94,7 +94,7 @@ fn of_space(
     rows
 }
 
-/// Whether a track is there from (nearly) the first moment to the last, without a break or a step.
+/// Whether a track exists from (nearly) the first moment to the last, without a gap or a step.
 fn is_throughout(track: &Track, whole: Span) -> bool {
     let [life] = track.lives[..] else {
         return false;
@@ -134,7 +134,7 @@ fn in_order(tracks: &[Track], whole: Span, marks: &Marks, mut own: Vec<usize>) -
     bursts.concat()
 }
 
-/// The label of a folded row: `8 nodes throughout`.
+/// The label of a collapsed row: `8 nodes throughout`.
 pub(crate) fn folded_label(tracks: &[Track], all: &[usize]) -> String {
     let word = match all.first().and_then(|at| tracks[*at].topic) {
         Some(_) => "topic",

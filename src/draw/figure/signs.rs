@@ -35,7 +35,7 @@ pub(crate) fn dot(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.disc(Point::new(x, y), DOT, ink::PAPER, &stroke);
 }
 
-/// Draws a circled letter at a moment of a row, beside the letters and arrows that are there already.
+/// Draws a circled letter at a moment of a row, beside existing letters and arrows.
 pub(super) fn put_letter(
     canvas: &mut PaperCanvas<'_>,
     place: &RowPlace,
@@ -49,7 +49,7 @@ pub(super) fn put_letter(
         };
         taken.iter().find(hit).map(|t| t.0)
     };
-    // The nearest free place, to the right or to the left.
+    // The nearest free position, to the right or to the left.
     let free = |mut x: f64, step: f64| {
         for _ in 0..12 {
             let Some(other) = near(x, taken) else { break };

@@ -13,8 +13,8 @@ use crate::mission::event_log::Phase;
 use crate::mission::phases::knows_publishers;
 use crate::view::NameFilter;
 
-/// The mission as figures see it: by roles, without housekeeping, recorders, and nodes and topics that filters leave
-/// out.
+/// The mission as figures show it: by roles, without housekeeping, recorders, and nodes and topics excluded
+/// by filters.
 pub(crate) struct FigureSource<'a> {
     pub(crate) mission: &'a Mission,
     /// Roles with their nodes.
@@ -23,7 +23,7 @@ pub(crate) struct FigureSource<'a> {
     topics: Vec<bool>,
     /// Per node, its publications on shown topics.
     published: Vec<Vec<EdgeId>>,
-    /// The only publication of each topic, if there is but one.
+    /// The only publication of each topic; `None` if there are several.
     sole: Vec<Option<EdgeId>>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
@@ -115,8 +115,8 @@ impl<'a> FigureSource<'a> {
         own
     }
 
-    /// The messages of some publications; of the only one of its topic, all that are not known to come from others. One
-    /// that is latched represents its node by its message, and is not busy.
+    /// The messages of some publications; for the only one of its topic, all that are not known to come from
+    /// others. A latched publication represents its node by its message, and has no rate.
     pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
         let edges = edges
             .iter()

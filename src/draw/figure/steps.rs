@@ -1,5 +1,5 @@
-//! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that changed hands, and the
-//! nodes linked to them.
+//! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that were taken
+//! over, and the nodes linked to them.
 
 pub(crate) mod changes;
 mod events;
@@ -28,13 +28,13 @@ use crate::layout::{Outline, Plan, Vertex};
 use crate::mission::EventId;
 use crate::mission::phases::{Configuration, configurations};
 
-/// The number of steps shown unless some are asked for.
+/// The number of steps shown unless some are requested.
 const SHOWN: usize = 6;
-/// The largest number of changed nodes that are drawn one by one; more are drawn as groups.
+/// The largest number of changed nodes that are drawn separately; more are drawn as groups.
 const ONE_BY_ONE: usize = 8;
 /// The most names in a box.
 const NAMED: usize = 4;
-/// The room between two panels in millimetres.
+/// The space between two panels in millimetres.
 const BETWEEN: f64 = 2.0;
 
 /// The source of panels.
@@ -75,7 +75,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         if chosen.len() == 1 || !sheet.options.steps.is_empty() {
             return Err(Error::usage(
                 format!("these steps are higher than {MOST_HEIGHT} mm"),
-                "`--steps 3` shows fewer of them, `--rows groups` makes them smaller, `--ns-filter` leaves nodes out",
+                "show fewer with `--steps 3`, make them smaller with `--rows groups`, or omit nodes with `--ns-filter`",
             ));
         }
         steps.drop_least(&mut chosen);
@@ -109,7 +109,7 @@ impl<'s> StepSource<'s> {
         })
     }
 
-    /// The boundaries to show, by the place of the phase that begins.
+    /// The boundaries to show, by the index of the phase that begins.
     fn chosen(&self) -> Result<Vec<usize>> {
         let many = self.sheet.source.phases.len();
         let asked = &self.sheet.options.steps;
@@ -126,8 +126,8 @@ impl<'s> StepSource<'s> {
         all.retain(|k| self.weight(*k) > 0);
         if all.is_empty() {
             return Err(Error::usage(
-                "no node with a known partner starts, stops or hands over a topic, so no step has anything to show",
-                "`--kind lives` shows what there is",
+                "no node with a known partner starts, stops or hands over a topic, so there is no step to draw",
+                "draw `--kind lives` instead",
             ));
         }
         if !asked.is_empty() {
@@ -150,8 +150,8 @@ impl<'s> StepSource<'s> {
     fn too_wide(&self) -> Error {
         let width = self.sheet.options.width_mm;
         let hint = match self.sheet.options.rows {
-            _ if width < 181.0 => "`--width 181mm` has more room".to_owned(),
-            Some(RowKind::Nodes) => "`--rows groups` makes it smaller".to_owned(),
+            _ if width < 181.0 => "use `--width 181mm`".to_owned(),
+            Some(RowKind::Nodes) => "use `--rows groups`, which is smaller".to_owned(),
             _ => filter_that_fits(&self.tracks, FITTING, "--ns-filter", "node"),
         };
         Error::usage(format!("a step is wider than {width} mm"), hint)
@@ -166,7 +166,7 @@ impl<'s> StepSource<'s> {
         self.tracks.iter().position(|t| &*t.name == name)
     }
 
-    /// The panel of the boundary into phase `k`; `None` where it is too wide.
+    /// The panel of the boundary into phase `k`; `None` if it is too wide.
     fn panel(&self, k: usize) -> Option<Panel> {
         let source = self.sheet.source;
         let canvas = self.sheet.canvas();
@@ -232,7 +232,7 @@ impl<'s> StepSource<'s> {
         Some(panel)
     }
 
-    /// The panel of phase `k` under a number, with these boxes at their places, and without arrows.
+    /// The panel of phase `k` under a number, with these boxes at their positions, and without arrows.
     fn drawn(&self, k: usize, number: String, looks: Vec<PanelBox>, placed: PlacedPanel) -> Panel {
         let source = self.sheet.source;
         let handed = if k > 0 { self.handed(k) } else { Vec::new() };
@@ -263,7 +263,7 @@ impl<'s> StepSource<'s> {
         }
     }
 
-    /// The changed nodes: one by one if they are few, else by groups.
+    /// The changed nodes: separately if they are few, else by groups.
     fn boxes(&self, kinds: &[(BoxState, &BTreeSet<usize>)]) -> Vec<(BoxState, Vec<usize>)> {
         let many: usize = kinds.iter().map(|(_, own)| own.len()).sum();
         let grouped = match self.sheet.options.rows {
@@ -336,8 +336,8 @@ impl<'s> StepSource<'s> {
         linked
     }
 
-    /// The arrows at changed nodes: those of the phase before for nodes that ended, of the phase after for nodes that
-    /// began; and those of the topics that changed hands.
+    /// The arrows at changed nodes: those of the previous phase for nodes that ended, of the next phase for
+    /// nodes that began; and those of the topics that were taken over.
     fn talks(
         &self,
         k: usize,
@@ -361,7 +361,7 @@ impl<'s> StepSource<'s> {
                 {
                     continue;
                 }
-                // Of a partner only what it hands over, or takes over.
+                // For a partner, only the topics that it hands over or takes over.
                 talk.topics.retain(|(topic, _)| {
                     let moved = handed.iter().find(|(t, ..)| t == topic);
                     moved.is_some_and(|(_, from, to, _)| {
@@ -470,7 +470,7 @@ impl<'s> StepSource<'s> {
             .map(|text| sentence(ink::TEXT, text.as_str()));
         let mut items: Vec<Unbroken> = again.collect();
         if !sheet.options.is_bare {
-            let text = "+ solid: began. − dashed: ended. Double: a topic was taken over. Thin: who is linked to them.";
+            let text = "+ solid: began. − dashed: ended. Double: a topic was taken over. Thin: linked nodes.";
             items.push(sentence(ink::QUIET, text));
         }
         let lost: usize = panels.iter().map(|p| p.placed.left_out).sum();

@@ -17,7 +17,7 @@ use crate::layout::Link;
 pub(crate) struct Talk {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    /// The topics with their rates in messages per second while they are sent, the fastest first.
+    /// The topics with their rates in messages per second while they are published, the fastest first.
     pub(crate) topics: Vec<(TopicId, f64)>,
     /// Whether all of them are known by inference only.
     pub(crate) is_inferred: bool,
@@ -66,7 +66,7 @@ impl Talk {
 /// The longest name on an arrow, in characters.
 const LONGEST: usize = 22;
 
-/// The presence of an edge.
+/// The lifetimes of an edge.
 struct EdgePresence {
     track: usize,
     topic: TopicId,
@@ -75,7 +75,7 @@ struct EdgePresence {
     hz: f64,
 }
 
-/// Every edge of the tracks, so that the talks of any time are at hand.
+/// Every edge of the tracks, from which the arrows of any time are made.
 pub(crate) struct Talks<'a> {
     source: &'a FigureSource<'a>,
     sends: Vec<EdgePresence>,
@@ -120,8 +120,8 @@ impl<'a> Talks<'a> {
         }
     }
 
-    /// The talks between boxes, `vertex` being the box of each track, that exist at any moment of `time`, or in half of
-    /// it.
+    /// The arrows between boxes that exist at any moment of `time`, or in half of it; `vertex` is the box of
+    /// each track.
     pub(crate) fn between(
         &self,
         vertex: &[Option<usize>],

@@ -5,7 +5,7 @@ use super::source::FigureSource;
 use super::{Figure, FigureKind, FigureOptions};
 use crate::base::words;
 
-/// The caption: what is drawn, the phases with their times, bag and length, the legend in words.
+/// The caption: the content, the phases with their times, bag and length, the legend in words.
 pub(crate) fn caption(
     source: &FigureSource<'_>,
     options: &FigureOptions,
@@ -38,25 +38,22 @@ pub(crate) fn caption(
 
 fn what(kind: FigureKind) -> &'static str {
     match kind {
-        FigureKind::Lives => "What was alive when, how busy it was, and what changed.",
-        FigureKind::Map => "Who talks to whom, and in which phases.",
+        FigureKind::Lives => "When each element was running, how busy it was, and its changes.",
+        FigureKind::Map => "Publishers and subscribers, and the phases in which they exist.",
         FigureKind::Changes => {
-            "Phase by phase, at the same places: who is there, and what changed."
+            "Phase by phase, at fixed positions: the running nodes, and their changes."
         }
-        FigureKind::Steps => {
-            "The reconfigurations one by one: what started, what stopped, what was taken over."
-        }
+        FigureKind::Steps => "The reconfigurations one by one: starts, stops and takeovers.",
     }
 }
 
 fn legend(kind: FigureKind) -> &'static str {
     match kind {
         FigureKind::Lives => {
-            "Bars: it sends, as high as its rate against the row's highest; thin lines: silent, dashed: alive by inference; \
-             tick: starts; cross: ends; arrows from a dot: another node takes over a topic; circled letters: returns and steps of rates."
+            "Bars: publishing, with the height of the rate relative to the row's highest; thin lines: silent, dashed: inferred; tick: start; cross: end; arrows from a dot: another node takes over a topic; circled letters: returns and steps of rates."
         }
         FigureKind::Map => {
-            "Numbers: the phases that a node lives in, none for all; arrows: topics, thicker for more messages per second, dashed \
+            "Numbers: the phases in which a node exists, none for all; arrows: topics, thicker for more messages per second, dashed \
              if inferred; dashed frames: nodes without a known partner."
         }
         FigureKind::Steps | FigureKind::Changes => {
@@ -72,7 +69,7 @@ fn capital(text: &str) -> String {
     })
 }
 
-/// The text with everything escaped that `LaTeX` would take for a command; our signs become those of `LaTeX`.
+/// The text with everything escaped that `LaTeX` would interpret; our signs become those of `LaTeX`.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {

@@ -1,5 +1,6 @@
-//! The rows of a figure of lives: the times at which each node or topic was there and sent, and how busily. Lives and
-//! rates are those of the mission's history; a bar has another height only where the log has another rate.
+//! The rows of a figure of lifelines: the times at which each node or topic existed and published, and its
+//! rates. Lifetimes and rates are those of the mission's history; the height of a bar only changes where the
+//! log has another rate.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -11,13 +12,14 @@ use crate::graph::history::{Sender, Stretch};
 use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::event_log::Kind;
 
-/// The length from which on a silence interrupts a bar, so that it can be seen: in nanoseconds, and as one in so many
-/// parts of the mission.
+/// The length above which a silence visibly interrupts a bar: in nanoseconds, and as a fraction of the
+/// mission (one in so many).
 const SILENCE: (i64, i64) = (4_000_000_000, 83);
-/// The shortest piece of a bar that can be seen: one in so many parts of the mission. Shorter ones join the one before.
+/// The shortest visible piece of a bar, as a fraction of the mission (one in so many). Shorter ones join the
+/// previous one.
 const SEEN: i64 = 400;
 
-/// One life of a row: a time in which it was there.
+/// One lifetime of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackLife {
     pub(crate) span: Span,
@@ -25,7 +27,7 @@ pub(crate) struct TrackLife {
     pub(crate) is_inferred: bool,
 }
 
-/// A time of sending at one rate.
+/// An interval of publishing at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SendingBar {
     pub(crate) span: Span,
@@ -42,7 +44,7 @@ pub(crate) struct Track {
     pub(crate) topic: Option<TopicId>,
     pub(crate) lives: Vec<TrackLife>,
     pub(crate) bars: Vec<SendingBar>,
-    /// Messages per second while it sends; `None` where it never does, or where that is not known.
+    /// Messages per second while it publishes; `None` if it never does, or if that is unknown.
     pub(crate) hz: Option<f64>,
 }
 
@@ -131,7 +133,7 @@ fn silence(whole: Span) -> i64 {
     SILENCE.0.max(whole.nanos() / SILENCE.1)
 }
 
-/// A time at one rate, in messages per second.
+/// An interval at one rate, in messages per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Piece {
     pub(crate) span: Span,
@@ -156,8 +158,8 @@ impl Steps {
         is(sender.node) || is(None)
     }
 
-    /// The rates of a sender: its stretches, of which those are joined that no step of the log and no long silence
-    /// parts.
+    /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
+    /// them.
     pub(crate) fn pieces(&self, sender: &Sender, whole: Span) -> Vec<Piece> {
         let least = silence(whole);
         let parts =
@@ -181,7 +183,7 @@ impl Steps {
     }
 }
 
-/// The mean rate while there is any; `None` where no time passes.
+/// The mean rate over the bars; `None` if they have no length.
 pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
     let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
     let time: f64 = pieces.iter().map(seconds).sum();
@@ -200,7 +202,7 @@ fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
     pieces.into_iter().map(bar).collect()
 }
 
-/// The sum of several rates over time; pieces too short to be seen belong to their neighbours.
+/// The sum of several rates over time; pieces too short to be visible belong to their neighbours.
 fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
     let all = || rates.iter().flatten();
     let mut turns: Vec<(Stamp, f64, i64)> = all().map(|p| (p.span.start, p.hz, 1)).collect();
@@ -231,7 +233,7 @@ fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
             }),
         }
     }
-    // Bars that follow one another within a silence too short to be seen are drawn without it.
+    // Bars separated by a silence too short to be visible are drawn without it.
     let mut joined: Vec<Piece> = Vec::new();
     for piece in found {
         match joined.last_mut() {

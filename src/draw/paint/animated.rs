@@ -1,7 +1,8 @@
-//! Scenes one after the other as one animated SVG: each group once for each of its looks, seen while it has that look.
+//! Scenes one after the other as one animated SVG: each group once for each of its looks, visible while it
+//! has that look.
 //!
-//! It runs inside `<img>`, and looks as every other film does. A user who asks for less motion, or a reader without
-//! animations, gets one of the scenes.
+//! It runs inside `<img>`, and looks like every other animation. Users who prefer reduced motion, and viewers
+//! without animations, get one of the scenes.
 
 use std::collections::BTreeMap;
 
@@ -9,27 +10,27 @@ use super::svg;
 use super::xml::Xml;
 use crate::draw::scene::{Group, Scene};
 
-/// Scenes as a film.
+/// Scenes as an animation.
 #[derive(Default)]
 pub(crate) struct AnimatedScenes {
     slots: Vec<Slot>,
     /// The slots in the order in which they are painted.
     order: Vec<usize>,
-    /// The slots of each group, by its id: one, or more where it is painted before another group and after it.
+    /// The slots of each group, by its id: several if it is painted both before and after another group.
     of: BTreeMap<String, Vec<usize>>,
     first: Scene,
     /// The time for which each scene is shown, in milliseconds.
     times: Vec<u32>,
 }
 
-/// The looks of a group at one place among the others.
+/// The looks of a group at one position in the painting order.
 struct Slot {
     looks: Vec<(Group, Vec<usize>)>,
 }
 
 impl AnimatedScenes {
-    /// The scenes with the times for which they are shown, in milliseconds. All have one size; tooltips, which show
-    /// numbers that differ from scene to scene, are left out.
+    /// The scenes with the times for which they are shown, in milliseconds. All have the same size; tooltips,
+    /// which show numbers that differ from scene to scene, are left out.
     pub(crate) fn new(scenes: impl Iterator<Item = (Scene, u32)>) -> Self {
         let mut all = Self::default();
         for (mut scene, ms) in scenes {
@@ -43,7 +44,7 @@ impl AnimatedScenes {
         all
     }
 
-    /// Adds the groups of the next scene, each to a slot behind that of the group before.
+    /// Adds the groups of the next scene, each to a slot behind that of the previous group.
     fn add(&mut self, groups: Vec<Group>) {
         let at = self.times.len();
         let mut place: Vec<usize> = vec![0; self.slots.len()];
@@ -78,7 +79,7 @@ impl AnimatedScenes {
         }
     }
 
-    /// The film as SVG text; `still` is the scene for those who see no motion.
+    /// The animation as SVG text; `still` is the scene for users with reduced motion.
     pub(crate) fn write(&self, title: &str, still: usize) -> String {
         let mut xml = Xml::default();
         svg::open(&mut xml, &self.first);
@@ -99,7 +100,7 @@ impl AnimatedScenes {
         xml.finish()
     }
 
-    /// Writes a look of a group, with the times at which it is seen, unless that is always.
+    /// Writes a look of a group, with the times at which it is visible, unless always.
     fn look(&self, xml: &mut Xml, (k, group): (usize, &Group), scenes: &[usize], still: usize) {
         if scenes.len() == self.times.len() {
             svg::write_group(xml, group);
@@ -132,7 +133,7 @@ impl AnimatedScenes {
         xml.close().raw("\n");
     }
 
-    /// The length of one round in milliseconds.
+    /// The length of one cycle in milliseconds.
     fn whole(&self) -> f64 {
         self.sum(self.times.len())
     }
@@ -143,7 +144,7 @@ impl AnimatedScenes {
         all.map(|ms| u64::from(*ms)).sum::<u64>() as f64
     }
 
-    /// The part of the round at which a scene begins.
+    /// The fraction of the cycle at which a scene begins.
     fn part(&self, at: usize) -> String {
         let text = format!("{:.6}", self.sum(at) / self.whole().max(1.0));
         let text = text.trim_end_matches('0').trim_end_matches('.');

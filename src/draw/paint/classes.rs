@@ -1,5 +1,5 @@
-//! The graph of a whole mission as one compact drawing without colours: classes determine how elements look in a window, and
-//! their rules follow from the style. The player's page is painted with it.
+//! The graph of a whole mission as one compact drawing without colours: classes determine the look of
+//! elements in a window, and their rules follow from the style. The player's page uses it.
 
 mod css;
 
@@ -26,8 +26,8 @@ pub(crate) trait ElementLook {
     fn class(&self) -> String;
     /// The words of its live text.
     fn text(&self) -> String;
-    /// Writes its live text at a place, as one element or more; `tells_changes` where it is shown only in windows in
-    /// which its rate changed.
+    /// Writes its live text at a position, as one or more elements; `tells_changes` if it is shown only in
+    /// windows in which its rate changed.
     fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
         xml.open("text")
             .attribute("class", if tells_changes { "r c" } else { "r" })
@@ -53,7 +53,7 @@ impl<'a> Classes<'a> {
         }
     }
 
-    /// Writes the arrow at this place of the view.
+    /// Writes the arrow with this index in the view.
     pub(crate) fn arrow(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
         let name = |id: u32| &*self.view.items[id as usize].name;
@@ -62,7 +62,7 @@ impl<'a> Classes<'a> {
         Self::element(xml, part, &what, &ends, look, 0.8);
     }
 
-    /// Writes the item at this place of the view.
+    /// Writes the item with this index in the view.
     pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
         Self::element(xml, part, item.class(), &[("name", &item.name)], look, 1.0);
@@ -100,7 +100,7 @@ impl<'a> Classes<'a> {
         xml.close().raw("\n");
     }
 
-    /// Writes shapes and texts; of an element with its latch before its first text, and its live text as its last.
+    /// Writes shapes and texts; for an element, with its latch before its first text, and its live text last.
     fn pieces(xml: &mut Xml, group: &Group, element: Option<(&UnionElement, &dyn ElementLook)>) {
         let is_text = |p: &&Piece| matches!(p, Piece::Text(_));
         let texts = group.pieces.iter().filter(is_text).count();
@@ -138,7 +138,7 @@ impl<'a> Classes<'a> {
     fn form(xml: &mut Xml, form: &Form, class: Option<&str>) {
         match form {
             Form::Rect(r, radius) => {
-                // Edges are rounded, not lengths, so that touching shapes still touch.
+                // Coordinates of edges are rounded, not lengths, so that adjacent shapes stay adjacent.
                 xml.open("rect");
                 if let Some(class) = class {
                     xml.attribute("class", class);
@@ -167,7 +167,8 @@ impl<'a> Classes<'a> {
     }
 }
 
-/// Writes the badge of a mark under the mark's word as its id, without colours, and seen only with a style sheet.
+/// Writes the badge of a mark with the mark's word as its id, without colours, and visible only with a style
+/// sheet.
 pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
     xml.open("g")
         .attribute("id", word(mark))
@@ -269,7 +270,7 @@ impl ClassPen {
         (units(p.x, self.parts), units(p.y, self.parts))
     }
 
-    /// Writes the command, unless the one before was the same and so goes on.
+    /// Writes the command, unless the previous one was the same and continues.
     fn letter(&mut self, letter: char) {
         if self.last != letter || letter == 'M' {
             self.out.push(letter);

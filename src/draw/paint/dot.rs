@@ -1,7 +1,7 @@
 //! The viewed graph as DOT text: laid out, as `rqt_graph` saves and loads it, or plain, for Graphviz to lay out.
 //!
-//! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s `pydotfactory.py`; nothing
-//! is written that `dot_to_qt.py` cannot load.
+//! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s
+//! `pydotfactory.py`; everything that is written can be loaded by `dot_to_qt.py`.
 
 mod names;
 mod plain;
@@ -28,12 +28,12 @@ const HEIGHT: f64 = 36.0;
 /// The height of a line of text.
 const LINE: f64 = 15.0;
 
-/// What a profile writes behind the bracket of a namespace, given by its place and the indent; and between those of an
-/// item.
+/// The text of a profile after the bracket of a namespace, given by its index and the indent; and between the
+/// brackets of an item.
 type SpaceText<'a> = &'a dyn Fn(usize, &str) -> String;
 type ItemText<'a> = &'a dyn Fn(usize, &Item, &Shown) -> String;
 
-/// A view with the parts that every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
+/// A view with the parts that all its DOT files share: unique ids and, for the profile `rqt`, one layout.
 #[derive(Clone, Debug)]
 pub(crate) struct DotView<'a> {
     elements: &'a Elements,
@@ -58,7 +58,7 @@ impl<'a> DotView<'a> {
         }
     }
 
-    /// Gives everything its place, with sizes by full names as `qt_dotgraph` writes them.
+    /// Lays everything out, with sizes by full names as in `qt_dotgraph`.
     #[must_use]
     pub(crate) fn laid_out(mut self, fonts: &Fonts) -> Self {
         self.plan = plan(self.view, fonts);
@@ -87,8 +87,8 @@ impl<'a> DotView<'a> {
         words.join(" ")
     }
 
-    /// Writes the namespaces and items that are directly in a namespace, given by its place, with the attributes that a
-    /// profile has for them. Namespaces nest 16 deep at most.
+    /// Writes the namespaces and items that are directly in a namespace, given by its index, with the
+    /// attributes of a profile. Namespaces nest 16 deep at most.
     fn members(
         &self,
         out: &mut String,
@@ -116,7 +116,7 @@ impl<'a> DotView<'a> {
         }
     }
 
-    /// The colour of a change; `None` for an element that stayed as it was.
+    /// The colour of a change; `None` for an unchanged element.
     fn colour(&self, shown: &Shown) -> Option<String> {
         let change = match shown.mark? {
             Mark::Added => &self.style.added,
@@ -139,7 +139,8 @@ fn line(shown: &Shown) -> &'static str {
     }
 }
 
-/// The label of an arrow in a window, lines parted by a newline: the topic between two nodes, and the rate.
+/// The label of an arrow in a window, with lines separated by newlines: the topic between two nodes, and the
+/// rate.
 fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
     match (arrow.carries(shown), rate(shown)) {
         (Some(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
@@ -147,7 +148,7 @@ fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
     }
 }
 
-/// A rate as `rqt_graph` writes it; `None` where nothing flows.
+/// A rate as in `rqt_graph`; `None` if there are no messages.
 fn rate(shown: &Shown) -> Option<String> {
     let hz = shown.hz.filter(|hz| *hz > 0.0 && hz.is_finite())?;
     (shown.mark != Some(Mark::Removed)).then(|| words::rate(hz))

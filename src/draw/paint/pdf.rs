@@ -28,10 +28,10 @@ pub(crate) struct PdfPage {
     pub(crate) entry: String,
 }
 
-/// The document as a file's bytes. Pages are drawn as they come, so that only their vectors are held.
+/// The document as a file's bytes. Pages are drawn as they arrive, so that only their vectors are kept in
+/// memory.
 ///
-/// # Errors
-/// The reason for which a font cannot be embedded.
+/// # Errors The reason why a font cannot be embedded.
 pub(crate) fn write(
     pages: impl Iterator<Item = PdfPage>,
     fonts: &Fonts,
@@ -48,7 +48,7 @@ pub(crate) fn write(
         pdf: Pdf::new(),
         last: 0,
     };
-    // What every TeX takes as a figure.
+    // The version that every TeX accepts as a figure.
     file.pdf.set_version(1, 5);
     let [catalog, tree, outline, info] = file.ids();
     let mut used = Vec::new();
@@ -93,7 +93,7 @@ struct DrawnPage {
     entry: String,
 }
 
-/// A document that is being written.
+/// A document in progress.
 struct PdfFile {
     pdf: Pdf,
     last: i32,
@@ -253,7 +253,7 @@ impl PdfPen<'_> {
         if let Some((color, width)) = text.halo {
             let halo = scene::Stroke::solid(color, width);
             if stroke(content, &halo, LineJoinStyle::RoundJoin) {
-                // As an outline, so that the words are found once and not twice.
+                // As an outline, so that a search finds the words only once.
                 for (file, run) in &runs {
                     if let Some(Some(face)) = self.faces.get(*file) {
                         face.outline(content, run, size);
@@ -272,7 +272,7 @@ impl PdfPen<'_> {
         content.restore_state();
     }
 
-    /// A text piece by piece where its characters are in several fonts: the font of each piece, and its glyphs.
+    /// A text in pieces, as its characters may be in several fonts: the font of each piece, and its glyphs.
     fn runs<'t>(&self, text: &'t Text, start: Point) -> Vec<(usize, Vec<Glyph<'t>>)> {
         let (mut at, mut rest, mut runs) = (start, text.text.as_str(), Vec::new());
         while let Some(first) = rest.chars().next() {
@@ -289,7 +289,7 @@ impl PdfPen<'_> {
     }
 }
 
-/// Sets what areas are filled with; whether there is something.
+/// Sets the fill colour; returns whether there is one.
 fn fill(content: &mut Content, color: Color) -> bool {
     let Some([r, g, b]) = color.rgb().map(shares) else {
         return false;
@@ -303,13 +303,13 @@ fn shares(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|value| f32::from(value) / 255.0)
 }
 
-/// Sets the line that paths are drawn with; whether there is one.
+/// Sets the stroke of paths; returns whether there is one.
 fn stroke(content: &mut Content, stroke: &scene::Stroke, join: LineJoinStyle) -> bool {
     let rgb = stroke.color.rgb().filter(|_| stroke.width > 0.0);
     let Some([r, g, b]) = rgb.map(shares) else {
         return false;
     };
-    // As SVG has it.
+    // As in SVG.
     let miter_limit = 4.0;
     content
         .set_stroke_rgb(r, g, b)
@@ -317,7 +317,7 @@ fn stroke(content: &mut Content, stroke: &scene::Stroke, join: LineJoinStyle) ->
         .set_line_join(join)
         .set_miter_limit(miter_limit);
     if stroke.dash.iter().any(|d| *d > 0.0) {
-        // SVG repeats an odd number of dashes to make it even; PDF does the same by itself.
+        // SVG repeats an odd number of dashes to make it even, and so does PDF.
         content.set_dash_pattern(stroke.dash.iter().map(|d| f(*d)), 0.0);
         if stroke.is_round() {
             content.set_line_cap(LineCapStyle::RoundCap);
@@ -340,7 +340,7 @@ fn shape(content: &mut Content, shape: &Shape) {
     content.restore_state();
 }
 
-/// Adds a path; whether there is one.
+/// Adds a path; returns whether it is not empty.
 fn path(content: &mut Content, form: &Form) -> bool {
     match form {
         Form::Rect(rect, radius) => {
@@ -361,7 +361,7 @@ fn add(content: &mut Content, step: Step) {
         Step::Close => content.close_path(),
     };
 }
-/// A rectangle with corners of these radii; an ellipse where they are half its sides.
+/// A rectangle with corners of these radii; an ellipse if they are half its sides.
 fn rounded(content: &mut Content, rect: Rect, rx: f64, ry: f64) {
     let (left, top, right, bottom) = (rect.x, rect.y, rect.right(), rect.bottom());
     let (kx, ky) = (rx * (1.0 - QUARTER), ry * (1.0 - QUARTER));
@@ -390,7 +390,7 @@ fn rounded(content: &mut Content, rect: Rect, rx: f64, ry: f64) {
         Step::Curve([at(left, top + ky), at(left + kx, top), at(left + rx, top)]),
         Step::Close,
     ];
-    // Without corners or without sides some steps lead nowhere, which would show in dashes.
+    // Without corners or without sides, some steps have no length, which would be visible in dashes.
     let round = rx > 0.0 && ry > 0.0;
     let wanted = |step: &&Step| round || !matches!(step, Step::Curve(_));
     steps

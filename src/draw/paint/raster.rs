@@ -34,10 +34,10 @@ pub struct Pixels {
 const MOST_SIDE: f64 = 65_535.0;
 /// The most pixels in a picture: 256 MB of memory.
 const MOST_PIXELS: f64 = 64e6;
-/// The number of drawn groups that are kept twice over, so that a later frame need not draw them again: more than
-/// a page contains, few enough for 20 MB.
+/// The number of drawn groups in each of two generations that are cached for later frames: more than a page
+/// contains, few enough for 20 MB.
 const MOST_KEPT: usize = 1000;
-/// The bytes of their pixels that are kept twice over: about one page of them.
+/// The bytes of their pixels in each generation: about one page.
 const MOST_BYTES: usize = 10 << 20;
 
 /// A group, drawn once, and the tiles of the page that it may touch.
@@ -46,7 +46,7 @@ struct RasterGroup {
     tiles: Tiles,
 }
 
-/// Turns scenes into pixels. It may be shared among threads.
+/// Rasterizes scenes. It may be shared among threads.
 pub struct Painter {
     options: usvg::Options<'static>,
     fonts: Fonts,
@@ -90,7 +90,7 @@ impl Kept {
 }
 
 impl Painter {
-    /// A painter with these fonts and no others.
+    /// A painter with only these fonts.
     pub fn new(fonts: &Fonts) -> Self {
         let mut db = fontdb::Database::new();
         for file in fonts.files() {
@@ -111,14 +111,13 @@ impl Painter {
 
     /// The scene in pixels, `scale` times as large.
     ///
-    /// # Errors
-    /// [`Error::Usage`] where the picture would have no pixels, a side of more than 65,535, or more than 64 million
-    /// pixels.
+    /// # Errors [`Error::Usage`] if the picture would have no pixels, a side of more than 65,535, or more
+    /// than 64 million pixels.
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
         Ok(PixelSheet::covered(self, scene, scale)?.0.pixels)
     }
 
-    /// The group in pixels, from memory where it was drawn before.
+    /// The group in pixels, from the cache if it was drawn before.
     fn read(&self, scene: &Scene, group: &Group, sheet: &PixelSheet) -> Result<Arc<RasterGroup>> {
         let text = svg::write_alone(scene, group);
         let known = self.kept.read().unwrap_or_else(PoisonError::into_inner);
@@ -128,7 +127,7 @@ impl Painter {
         drop(known);
         let tree = Tree::from_str(&text, &self.options).map_err(|e| {
             let hint =
-                "this is a mistake of ours; please report it with the picture's size and style";
+                "this is a bug in bagreel; please report it with the picture's size and style";
             Error::usage(
                 format!("the picture of `{}` cannot be drawn: {e}", group.title),
                 hint,
@@ -144,23 +143,22 @@ impl Painter {
     }
 }
 
-/// A sheet of pixels to draw on.
+/// A page of pixels to draw on.
 struct PixelSheet {
-    /// All of them opaque, so that what tiny-skia calls premultiplied is plain.
+    /// All of them are opaque, so that premultiplied colours equal plain ones.
     pixels: Pixels,
     scale: f64,
 }
 
 impl PixelSheet {
-    /// An empty sheet for the scene.
+    /// An empty page for the scene.
     fn of(scene: &Scene, scale: f64) -> Result<Self> {
         let (w, h) = (
             libm::round(scene.size.w * scale),
             libm::round(scene.size.h * scale),
         );
         if !(w >= 1.0 && h >= 1.0 && w <= MOST_SIDE && h <= MOST_SIDE && w * h <= MOST_PIXELS) {
-            let hint =
-                "give `--size` at most 65535 a side and 64 million pixels, such as `1920x1080`";
+            let hint = "use a `--size` of at most 65535 per side and 64 million pixels, such as `1920x1080`";
             return Err(Error::usage(
                 format!("cannot draw a picture of {w} x {h} pixels"),
                 hint,
@@ -176,7 +174,7 @@ impl PixelSheet {
         Ok(Self { pixels, scale })
     }
 
-    /// A sheet with the whole scene on it, and the scene's groups.
+    /// A page with the whole scene, and the scene's groups.
     fn covered(
         painter: &Painter,
         scene: &Scene,
@@ -204,7 +202,7 @@ impl PixelSheet {
     }
 }
 
-/// Gives all pixels a background.
+/// Fills all pixels with a background.
 fn fill(rgba: &mut [u8], background: Color) {
     let background = opaque(background);
     for pixel in rgba.chunks_exact_mut(4) {

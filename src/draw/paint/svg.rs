@@ -34,7 +34,8 @@ pub(super) fn ground(xml: &mut Xml, scene: &Scene) {
     }
 }
 
-/// A document of the scene's size with this group alone and no background, for painters that keep groups apart.
+/// A document of the scene's size with this group alone and no background, for painters that process groups
+/// separately.
 pub(crate) fn write_alone(scene: &Scene, group: &Group) -> String {
     let mut xml = Xml::with_capacity(1024);
     open(&mut xml, scene);
@@ -71,7 +72,7 @@ pub(super) fn write_group(xml: &mut Xml, group: &Group) {
     }
     xml.attribute("id", &group.id);
     if group.fade.0 < 1.0 {
-        // A hundredth: fine enough for the eye, and a group that has all but vanished vanishes.
+        // To a hundredth: finer steps are invisible, and a nearly invisible group vanishes.
         xml.attribute("opacity", hundredth(group.fade.0.max(0.0)));
     }
     xml.leaf("title", &group.title);
@@ -116,7 +117,8 @@ fn write_shape(xml: &mut Xml, shape: &Shape) {
     xml.close_empty();
 }
 
-/// Whether a path is one closed run of straight lines: heads of arrows and signs, which tools should not take for routes.
+/// Whether a path is one closed run of straight lines: heads of arrows and signs, which tools should not
+/// confuse with routes.
 fn is_polygon(steps: &[Step]) -> bool {
     matches!(steps, [Step::Move(_), lines @ .., Step::Close] if lines.iter().all(|s| matches!(s, Step::Line(_))))
 }
@@ -191,7 +193,7 @@ fn write_text(xml: &mut Xml, text: &Text) {
             .attribute("stroke-linejoin", "round")
             .attribute("paint-order", "stroke");
     }
-    // Without it, blanks at the ends and in a row would vanish.
+    // Without it, blanks at the ends and consecutive blanks would vanish.
     if text.text.starts_with(' ') || text.text.ends_with(' ') || text.text.contains("  ") {
         xml.attribute("xml:space", "preserve");
     }

@@ -11,12 +11,12 @@ pub(crate) struct Xml {
     out: String,
     /// Tags that are open, the innermost last.
     tags: Vec<&'static str>,
-    /// Whether the innermost tag still takes attributes.
+    /// Whether attributes can still be added to the innermost tag.
     is_start: bool,
 }
 
 impl Xml {
-    /// Empty XML with room for `bytes` bytes.
+    /// Empty XML with capacity for `bytes` bytes.
     pub(crate) fn with_capacity(bytes: usize) -> Self {
         Self {
             out: String::with_capacity(bytes),
@@ -34,7 +34,7 @@ impl Xml {
         self
     }
 
-    /// Gives the tag that was just opened an attribute; without effect behind its start.
+    /// Adds an attribute to the tag that was just opened; no effect after its start.
     pub(crate) fn attribute(&mut self, key: impl Display, value: impl Display) -> &mut Self {
         if self.is_start {
             // Writing to a string cannot fail.
@@ -52,7 +52,7 @@ impl Xml {
         self
     }
 
-    /// Writes text of our own without escapes: style sheets, and line ends for readers of the source.
+    /// Writes trusted text without escapes: style sheets, and line ends for readers of the source.
     pub(crate) fn raw(&mut self, text: &str) -> &mut Self {
         self.end_start();
         self.out.push_str(text);
@@ -81,7 +81,7 @@ impl Xml {
         self
     }
 
-    /// Writes a tag with text and no attributes; nothing where the text is empty.
+    /// Writes a tag with text and no attributes; nothing if the text is empty.
     pub(crate) fn leaf(&mut self, tag: &'static str, text: &str) -> &mut Self {
         if !text.is_empty() {
             self.open(tag).text(text).close();
@@ -115,8 +115,8 @@ impl fmt::Write for Escaped<'_> {
     }
 }
 
-/// `text` for use between tags and in attributes; characters that XML does not allow are spelled out, and those that would
-/// hide or turn round the page's own text are written as a number.
+/// `text` for use between tags and in attributes; characters that XML does not allow are written as `\u{…}`,
+/// and those that would hide or reverse the page's own text as a number.
 fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {

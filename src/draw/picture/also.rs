@@ -14,9 +14,9 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{AlsoHere, Item, Mark, Shown, View};
 
-/// The width at which the words are broken where their namespace is no wider, in the height of their text.
+/// The width at which the words are wrapped unless their namespace is wider, in text heights.
 const WIDTH: f64 = 22.0;
-/// The room above the words, in the height of their text.
+/// The space above the words, in text heights.
 const ABOVE: f64 = 0.4;
 /// The distance of the words from the frame of their namespace, in pixels.
 const INSET: f64 = 8.0;
@@ -27,11 +27,11 @@ const MOST_LISTED: usize = 60;
 /// The words for the nodes of one namespace.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Footer {
-    /// The namespace: a place in the view's; `None` for the words outside of all.
+    /// The namespace: an index into the view's; `None` for the words outside of all.
     pub(crate) cluster: Option<usize>,
-    /// The names as they are drawn.
+    /// The names as drawn.
     names: Vec<String>,
-    /// The room that they need where their namespace is no wider.
+    /// The space that they need unless their namespace is wider.
     pub(crate) room: Size,
 }
 
@@ -85,7 +85,7 @@ fn said(item: &Item, shown: &Shown, name: &str) -> String {
     }
 }
 
-/// The places of the names that are listed, in order: those of the highest ranks if there are too many.
+/// The indices of the listed names, in order: those of the highest ranks if there are too many.
 fn listed<T, R: Ord>(all: &[T], rank: impl Fn(&T) -> R) -> Vec<usize> {
     let mut places: Vec<usize> = (0..all.len()).collect();
     if places.len() > MOST_LISTED {
@@ -96,7 +96,7 @@ fn listed<T, R: Ord>(all: &[T], rank: impl Fn(&T) -> R) -> Vec<usize> {
     places
 }
 
-/// Names as they follow each other, each with its comma, after the words before them; then the number of the others.
+/// The names, each with its comma, after the introductory words; then the number of the others.
 fn words(names: impl Iterator<Item = String>, more: usize) -> Vec<String> {
     let mut words = vec![FIRST.to_owned()];
     words.extend(names.map(|name| name + ","));
@@ -108,7 +108,8 @@ fn words(names: impl Iterator<Item = String>, more: usize) -> Vec<String> {
     words
 }
 
-/// The place of each word from the left, and its line, in lines of at most this width as far as no word is longer.
+/// The distance of each word from the left, and its line, in lines of at most this width unless a word is
+/// longer.
 fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
     let blank = fonts.width(" ", size, Weight::Regular);
     let mut at = Point::default();
@@ -125,7 +126,8 @@ fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
 }
 
 impl Boxes<'_> {
-    /// The words in window `k` at the bottom of this place: a namespace, or the room of the words outside of all.
+    /// The words in window `k` at the bottom of a rectangle: a namespace, or the area of the words outside of
+    /// all.
     pub(crate) fn footer(
         &self,
         footer: &Footer,

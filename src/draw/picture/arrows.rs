@@ -12,7 +12,8 @@ use crate::draw::text::{Fonts, Weight};
 use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Mark, Shown};
 
-/// The number of straight pieces in which a curve is measured, and of those in which its way out of a frame is found.
+/// The number of straight pieces in which a curve is measured, and of those in which its exit from a frame is
+/// searched.
 const PIECES: u32 = 10;
 const EXIT: u32 = 64;
 /// The largest distance of a label from its line in pixels.
@@ -25,27 +26,27 @@ pub(crate) struct Arrows<'a> {
     pub(crate) fit: GraphFit,
 }
 
-/// The places of the parts of one arrow on the page, the same in every frame.
+/// The positions of the parts of one arrow on the page, equal in every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ArrowPath {
     pub(crate) id: String,
     /// The names of its ends.
     pub(crate) ends: [String; 2],
-    /// The names of its topics as they are drawn, where it represents several.
+    /// The names of its topics as drawn, if it represents several.
     pub(crate) topics: Vec<String>,
     start: Point,
     curves: Vec<[Point; 3]>,
-    /// The place of its label.
+    /// The position of its label.
     label: Option<LabelPlace>,
     /// The middle of its badge.
     pub(crate) badge: Point,
-    /// The places where its badge does not cover its label; the first is the best.
+    /// The positions at which its badge does not cover its label, the best first.
     pub(super) spots: Vec<Point>,
-    /// Its length in pixels, about.
+    /// Its approximate length in pixels.
     pub(crate) length: f64,
 }
 
-/// The room of an arrow's label, and the side of it at which the arrow runs.
+/// The space for an arrow's label, and the side of it on which the arrow runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LabelPlace {
     area: Rect,
@@ -55,7 +56,7 @@ struct LabelPlace {
 }
 
 impl LabelPlace {
-    /// The place of a label in this room beside an arrow through these points.
+    /// The position of a label in this space beside an arrow through these points.
     fn new(area: Rect, points: &[Point]) -> Self {
         let centre = area.centre();
         let far = |p: &&Point| distance(**p, centre);
@@ -73,7 +74,7 @@ impl LabelPlace {
         Self { area, side, line }
     }
 
-    /// The middle of words of this width, which are next to the arrow however wide the room is.
+    /// The middle of words of this width, which are next to the arrow regardless of the width of the space.
     fn middle(&self, width: f64) -> Point {
         let (centre, slack) = (self.area.centre(), (self.area.w - width).max(0.0) / 2.0);
         match self.side {
@@ -125,7 +126,7 @@ impl ArrowPath {
         }
     }
 
-    /// The room of its label.
+    /// The space for its label.
     pub(crate) fn label_area(&self) -> Option<Rect> {
         self.label.map(|label| label.area)
     }
@@ -140,7 +141,8 @@ impl ArrowPath {
         }
     }
 
-    /// The part of it outside of a frame that it begins in, or else ends in; `None` if its label is not at it.
+    /// The part of it outside of the frame in which it begins or ends; `None` if its label is not at that
+    /// part.
     pub(super) fn outside(&self, frame: Rect, begins_inside: bool) -> Option<Self> {
         let label = self.label.filter(|label| !label.area.overlaps(&frame))?;
         let mut path = self.clone();
@@ -177,7 +179,7 @@ impl ArrowPath {
         pieces.any(|piece| piece.overlaps(&near)).then_some(path)
     }
 
-    /// Turns it to run from its end to its start.
+    /// Reverses it.
     fn turn(&mut self) {
         let points = self.curves.iter().flatten().copied();
         let mut points: Vec<Point> = std::iter::once(self.start).chain(points).collect();
@@ -196,7 +198,7 @@ impl ArrowPath {
 }
 
 impl Arrows<'_> {
-    /// One arrow in one window, whose ends are `ends` there.
+    /// One arrow in one window, with its ends in that window.
     pub(crate) fn arrow(
         &self,
         arrow: &Arrow,
@@ -209,7 +211,7 @@ impl Arrows<'_> {
         group
     }
 
-    /// Its line, and its rate and badge, which no line may cover.
+    /// Its line, and its rate and badge, which lines must not cover.
     pub(crate) fn parts(
         &self,
         arrow: &Arrow,
@@ -279,8 +281,8 @@ impl Arrows<'_> {
         let along = direction(&[before, last[0], last[1]], last[2]);
         let against = direction(&[first[2], first[1], first[0]], track.start);
         let head = (self.style.edge.arrow + look.stroke.width) * scale;
-        // The line ends inside a head, so that its own blunt end does not show beside the tip; at the same place
-        // whatever its width.
+        // The line ends inside the head, so that its blunt end is not visible beside the tip, and always at
+        // the same point, regardless of its width.
         let short = self.style.edge.arrow * 0.7 * scale;
         let back = |from: Point, along: Point, by: f64| {
             Point::new(from.x - along.x * by, from.y - along.y * by)
@@ -334,7 +336,7 @@ impl Arrows<'_> {
         let rows = topics::rows(shown, &track.topics);
         let edge = place.middle(halo);
         let middle = rows.len() as f64 / 2.0 - 0.5;
-        // Fewer rows than in other windows stay next to the line.
+        // If there are fewer rows than in other windows, they stay next to the line.
         let slack = (place.area.h - size * LINE * rows.len() as f64).max(0.0) / 2.0;
         let y = edge.y + slack * place.line;
         let is_upright = place.side != Anchor::Middle;
@@ -403,7 +405,7 @@ impl Arrows<'_> {
     }
 }
 
-/// Whether a changed arrow carries a badge: not if one of its ends or its rate shows the same.
+/// Whether a changed arrow has a badge: not if one of its ends or its rate shows the same change.
 pub(crate) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
     let rate = matches!(mark, Mark::Faster | Mark::Slower);
     let mut marks = ends.into_iter().flatten().filter_map(|end| end.mark);
@@ -413,16 +415,16 @@ pub(crate) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
 /// The sign at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tip {
-    /// A triangle: messages arrive.
+    /// A triangle: messages.
     Arrow,
-    /// A diamond: a service is called.
+    /// A diamond: service calls.
     Service,
-    /// A bar before the end: nothing arrives.
+    /// A bar before the end: nothing is received.
     Stop,
 }
 
 impl Tip {
-    /// The sign with its end here, pointing along a direction of length 1.
+    /// The sign with its end at a point, along a unit direction.
     pub(crate) fn form(self, tip: Point, along: Point, length: f64) -> Form {
         // Back along the line, and to its left.
         let at = |back: f64, left: f64| {
@@ -440,7 +442,7 @@ impl Tip {
     }
 }
 
-/// The direction in which a curve reaches `end`: from its last control that is not there already.
+/// The direction in which a curve reaches `end`: from its last control that differs from it.
 fn direction(controls: &[Point], end: Point) -> Point {
     for from in controls.iter().rev() {
         let length = distance(*from, end);
@@ -455,7 +457,7 @@ fn distance(a: Point, b: Point) -> f64 {
     libm::hypot(a.x - b.x, a.y - b.y)
 }
 
-/// The point at `part` (0..=1) of the way.
+/// The point at `part` (0..=1) of the curve.
 fn at_part(points: &[Point], length: f64, part: f64) -> Point {
     let mut left = length * part;
     for pair in points.windows(2) {

@@ -1,4 +1,4 @@
-//! The signs of change: a round badge at a corner, and a pill with a rate on it.
+//! The signs of change: a round badge at a corner, and a rate label.
 
 use super::measured::{PILL_HEIGHT, PILL_PAD};
 use super::options;
@@ -10,7 +10,7 @@ use crate::view::Mark;
 
 /// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
 pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
-    // Its words show since when it is away; the frame of others shows that it went with them.
+    // Its text shows how long it has been away; for a crowd, the common frame shows the end.
     if matches!(mark, Mark::Away | Mark::Gone) {
         return;
     }
@@ -108,12 +108,12 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
     }
 }
 
-/// The width of a pill with this text.
+/// The width of a rate label with this text.
 pub(crate) fn pill_width(fonts: &Fonts, text: &str, size: f64) -> f64 {
     fonts.width(text, size, Weight::SemiBold) + size * PILL_PAD
 }
 
-/// A pill around `text` with its middle at `centre`; `size` is its font size.
+/// A rate label with `text` and its middle at `centre`; `size` is its font size.
 pub(crate) fn pill(
     group: &mut Group,
     fonts: &Fonts,

@@ -23,7 +23,7 @@ pub(crate) struct Boxes<'a> {
     pub(crate) fit: GraphFit,
 }
 
-/// The parts of an item that are the same in every window.
+/// The parts of an item that are equal in every window.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ItemBox {
     pub(crate) id: String,
@@ -38,7 +38,7 @@ pub(crate) struct ItemBox {
 }
 
 impl Boxes<'_> {
-    /// The box around a namespace; a faint dotted one while nothing inside it is there, with these words.
+    /// The box around a namespace; faint and dotted, with these words, while it has no content.
     pub(crate) fn space(&self, space: &Space, place: Rect, id: &str, empty: Option<&str>) -> Group {
         let style = &self.style.cluster;
         let scale = self.fit.scale;
@@ -90,8 +90,8 @@ impl Boxes<'_> {
         group
     }
 
-    /// The coloured frame of a crowd in the place of a namespace or the whole graph, and the number on it, left of those
-    /// of `others`, which have the same frame.
+    /// The coloured frame of a crowd around a namespace or the whole graph, and the number on it, to the left
+    /// of those of `others`, which share the frame.
     pub(crate) fn crowd<'a>(
         &self,
         crowd: &Crowd,
@@ -203,8 +203,8 @@ impl Boxes<'_> {
         group
     }
 
-    /// The middle of the rate label of a box and its font size: over the lower edge, clear of the name, and at most as far
-    /// down as boxes are apart.
+    /// The middle of the rate label of a box and its font size: on the lower edge, without covering the name,
+    /// and within the gap between boxes.
     fn below(&self, place: Rect) -> (Point, f64) {
         let size = self.style.edge.size * self.fit.scale * 0.95;
         (
@@ -213,7 +213,7 @@ impl Boxes<'_> {
         )
     }
 
-    /// The words of the rate label of a box, without the pill.
+    /// The text of the rate label of a box, without its outline.
     pub(crate) fn rate_label_text(&self, place: Rect, text: &str) -> Text {
         let (below, size) = self.below(place);
         Text {
@@ -255,7 +255,7 @@ impl Boxes<'_> {
         if matches!(kind, ItemKind::Node | ItemKind::Topic) {
             return place;
         }
-        // Several in one: a second card in front of the first.
+        // Several in one: a second card behind the first.
         let front = self.front(place);
         group.shape(Shape {
             form: Form::Rect(front, radius),
@@ -265,7 +265,7 @@ impl Boxes<'_> {
         front
     }
 
-    /// The soft light around a box that changed.
+    /// The glow around a box that changed.
     pub(crate) fn glow(&self, group: &mut Group, form: &Form, stroke: &Stroke, look: &BoxLook) {
         if look.glow != Color::NONE {
             let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
@@ -299,7 +299,7 @@ impl Boxes<'_> {
         ));
     }
 
-    /// The bar at the left of a box whose last message is kept for late subscribers.
+    /// The bar at the left of a latched box.
     fn latch_bar(&self, place: Rect, body: &Body) -> Form {
         let width = self.style.latched.bar * self.fit.scale;
         let inset = body.width * self.fit.pen / 2.0;
@@ -324,7 +324,7 @@ impl Boxes<'_> {
         let scale = self.fit.scale;
         let middle = place.centre();
         let small = if label.second { body.small * LINE } else { 0.0 };
-        // A line that is missing in this window leaves its room, so that the name stays where it is.
+        // A line that is missing in this window keeps its space, so that the name does not move.
         let top = middle.y - (body.size * LINE + small) * scale / 2.0;
         let line = |y: f64, size: f64, weight, color, text: &str| Text {
             at: Point::new(middle.x, y),
@@ -357,7 +357,8 @@ pub(super) fn hexagon(place: Rect, point: f64) -> Form {
     ])
 }
 
-/// The places at the corners of a box where its badge may be placed, clear of its name, the best first: at its top right.
+/// The positions at the corners of a box at which its badge may be placed without covering its name, the best
+/// first: at its top right.
 pub(super) fn corners(place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
     let (x, y) = (place.w / 2.0 - 4.0 * scale, place.h / 2.0 - scale);
@@ -376,7 +377,7 @@ pub(crate) fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
     reported(data, shown)
 }
 
-/// The attributes of an element, with the places in the event log of its headlines in this window.
+/// The attributes of an element, with the log indices of its headlines in this window.
 pub(crate) fn reported(
     mut data: Vec<(&'static str, String)>,
     shown: &Shown,

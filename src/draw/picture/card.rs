@@ -13,34 +13,35 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::view::{CardRow, Mark, Shown, View};
 
-/// The height of a row over the size of its text.
+/// The height of a row, relative to the size of its text.
 const STEP: f64 = 1.5;
-/// The room before and behind the words of a row, and between a name and its rate, over the size of the text.
+/// The space before and after the words of a row, and between a name and its rate, relative to the size of
+/// the text.
 const PAD: f64 = 1.1;
 /// The most names in a row of topics without messages.
 const MOST_SILENT: usize = 3;
-/// The size of a badge in a row, as a part of that on a box.
+/// The size of a badge in a row, relative to that on a box.
 const BADGE: f64 = 0.7;
 
 /// The rows of a box.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Card {
     lines: Vec<Line>,
-    /// The room below the name of the node.
+    /// The space below the name of the node.
     pub(crate) room: Size,
     /// The height of the part with the name of the node.
     pub(crate) head: f64,
 }
 
-/// One row: a topic, or several that never carry a message or are of the plumbing.
+/// One row: a topic, or several that never carry a message or are hubs.
 #[derive(Clone, Debug, PartialEq)]
 struct Line {
     sign: &'static str,
-    /// The places of the topics in the view's rows, with their names as they are drawn.
+    /// The indices of the topics in the view's rows, with their names as drawn.
     topics: Vec<(usize, String)>,
 }
 
-/// The cards of all boxes; one without rows where a box has none.
+/// The cards of all boxes; without rows for boxes that have none.
 pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
     let mut cards = vec![Card::default(); view.items.len()];
     for (at, row) in view.rows.iter().enumerate() {
@@ -74,7 +75,7 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
     cards
 }
 
-/// Whether nothing is ever reported of a topic, and either it never carries a message or it is of the plumbing.
+/// Whether a topic has no events and either never carries a message or is a hub.
 fn is_quiet(row: &CardRow) -> bool {
     row.shown.looks().iter().all(|look| {
         let is_silent = look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
@@ -82,7 +83,7 @@ fn is_quiet(row: &CardRow) -> bool {
     })
 }
 
-/// The name of a topic as it is drawn: relative to the frame around the node.
+/// The name of a topic as drawn: relative to the frame around the node.
 fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
     let space = view.items[row.owner as usize].cluster;
     let inside = space.map_or("", |at| &*view.namespaces[at].name);
@@ -108,7 +109,7 @@ impl Line {
         words + rates.fold(0.0, f64::max) + 3.0 * PAD * size
     }
 
-    /// The sign and the names of those of its topics that are there.
+    /// The sign and the names of its existing topics.
     fn words(&self, is_there: impl Fn(usize) -> bool) -> String {
         let names = self.topics.iter().filter(|(at, _)| is_there(*at));
         let names: Vec<&str> = names.map(|(_, name)| name.as_str()).collect();
@@ -121,14 +122,14 @@ impl Line {
     }
 }
 
-/// The rate of a topic as its row has it.
+/// The rate of a topic as its row shows it.
 fn rate(shown: &Shown) -> Option<String> {
     let latched = || (shown.state == State::Latched).then(|| "latched".to_owned());
     second_line(shown, ShownRates::Rates).or_else(latched)
 }
 
 impl Boxes<'_> {
-    /// The outline of a card with its head, which is the part that it returns.
+    /// The outline of a card, and its head, which is returned.
     pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
         let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
         let radius = self.style.node.radius.max(self.style.topic.radius) * scale * 0.7;
@@ -147,7 +148,7 @@ impl Boxes<'_> {
         head
     }
 
-    /// The rows of a card that are there in window `k`.
+    /// The rows of a card that exist in window `k`.
     pub(crate) fn card_rows(&self, card: &ItemBox, view: &View, k: usize) -> Vec<Group> {
         let (size, place) = (self.style.topic.size * self.fit.scale, card.place);
         let Some(rows) = &card.card else {
@@ -190,7 +191,7 @@ impl Boxes<'_> {
         let (style, size) = (self.style, self.style.topic.size * self.fit.scale);
         let look = options::of_box(style, &style.topic, shown);
         let middle = place.centre().y;
-        // The colour of the whole card shows it already.
+        // The colour of the whole card already shows it.
         let owner = view.items_shown.get(row.owner as usize);
         let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
         let is_new = |mark: &Mark| mark.has_color() && owner.map(Mark::class) != Some(mark.class());
@@ -238,7 +239,7 @@ impl Boxes<'_> {
 /// A rectangle with round corners at its top.
 fn round_top(place: Rect, radius: f64) -> Form {
     let (left, right, top, low) = (place.x, place.right(), place.y, place.bottom());
-    // The part of a radius at which the control points of a quarter circle are placed.
+    // The fraction of a radius at which the control points of a quarter circle are placed.
     let near = radius * 0.45;
     let at = Point::new;
     Form::Path(vec![

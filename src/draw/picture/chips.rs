@@ -1,9 +1,10 @@
-//! The words on the picture: chips, and facts about an element.
+//! The words on the picture: badges with counts, and facts about an element.
 
 use crate::base::words::{count, rate, rate_change, rate_of};
 use crate::view::{Counts, Shown};
 
-/// The words on the chips for what came, went and changed, each with the number of headlines it counts; empty for none.
+/// The texts of the badges for beginnings, ends and other changes, each with the number of headlines it
+/// counts; empty for none.
 pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
     let came = [counts.nodes_added, counts.topics_added, counts.edges_added];
     let went = [
@@ -18,7 +19,7 @@ pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
     ]
 }
 
-/// The words of one chip, from the numbers of nodes, topics and edges: `+1 node +2 topics`.
+/// The text of one badge, from the numbers of nodes, topics and edges: `+1 node +2 topics`.
 fn chip(sign: char, numbers: [usize; 3]) -> String {
     let mut parts = Vec::new();
     for (n, word) in numbers.into_iter().zip(["node", "topic", "edge"]) {

@@ -12,16 +12,16 @@ use crate::mission::EventId;
 
 /// The smallest text on a screen, in pixels.
 const SMALLEST_TEXT: f64 = 10.0;
-/// The height of a row and of its bar, in pixels at least, and by the unit of the page.
+/// The height of a row and of its bar, in pixels at least, and in units of the page.
 const ROW: f64 = 14.0;
 const BAR: f64 = 7.0;
-/// The largest part of the width for the names of rows.
+/// The largest fraction of the width for the names of rows.
 const NAMES: f64 = 0.22;
 /// The space between names and bars, and around the text of a phase.
 const GAP: f64 = 8.0;
 /// The most names that are written for a row.
 const MOST_NAMES: usize = 3;
-/// The name of the row of events that belong to no other.
+/// The name of the row for events without their own row.
 const OTHERS: &str = "other changes";
 
 /// The sizes of the course in pixels.
@@ -34,7 +34,8 @@ pub(crate) struct CourseSizes {
 }
 
 impl CourseSizes {
-    /// The sizes on a page whose furniture has this scale; on paper text may be smaller than on a screen.
+    /// The sizes on a page with this scale of title, legend and timeline; on paper text may be smaller than
+    /// on a screen.
     pub(crate) fn new(style: &Style, unit: f64, is_paper: bool) -> Self {
         let least = if is_paper { 0.0 } else { 1.0 };
         let text = (style.timeline.size * unit).max(SMALLEST_TEXT * least);
@@ -89,13 +90,13 @@ fn label(row: &CourseRow, fits: impl Fn(&str) -> bool) -> String {
     texts.find(|text| fits(text)).unwrap_or_else(|| text(1))
 }
 
-/// The strip in which the course is drawn, with the place of each moment.
+/// The strip in which the course is drawn, with the position of each point in time.
 pub(crate) struct CourseStrip<'a> {
     pub(crate) style: &'a Style,
     pub(crate) fonts: &'a Fonts,
     pub(crate) course: &'a Course,
     pub(crate) sizes: CourseSizes,
-    /// The rows, or the bars of messages where there are none.
+    /// The rows, or the bars of messages if there are none.
     pub(crate) plot: Rect,
     pub(crate) span: Span,
     pub(crate) unit: f64,
@@ -112,7 +113,7 @@ impl CourseStrip<'_> {
         self.plot.y - self.sizes.band(self.course)
     }
 
-    /// The phases and the lives of all rows.
+    /// The phases and the lifetimes of all rows.
     pub(crate) fn ground(&self) -> Vec<Group> {
         let mut band = Group::named("phases");
         for (k, phase) in self.course.phases.iter().enumerate() {
@@ -147,7 +148,7 @@ impl CourseStrip<'_> {
         rows.flat_map(|(k, row)| self.marks(k, row)).collect()
     }
 
-    /// The names of all rows, the bars of those that live in a time, and its phase.
+    /// The names of all rows, the bars of those that exist in a time range, and its phase.
     pub(crate) fn now(&self, time: Span) -> Group {
         let mut group = Group::named("past");
         let style = &self.style.timeline;
@@ -203,7 +204,7 @@ impl CourseStrip<'_> {
         });
         let mut fitting = names.filter(|name| wide(name) <= room);
         let text = fitting.next().map(std::borrow::Cow::into_owned);
-        // Words that are cut are more informative than a number, if some of them are left.
+        // Truncated words are more informative than a number, if enough of them remain.
         let is_number = |text: &&String| text.chars().all(|c| c.is_ascii_digit());
         let text = match (text, cut) {
             (text, Some(cut)) if text.as_ref().is_none_or(|t| is_number(&t)) => {
@@ -243,7 +244,7 @@ impl CourseStrip<'_> {
         });
     }
 
-    /// The lives of a row as one shape.
+    /// The lifetimes of a row as one shape.
     fn bars(&self, k: usize, row: &CourseRow, color: Color) -> Shape {
         let (y, half) = (self.y(k), self.sizes.bar / 2.0);
         let mut steps = Vec::new();
@@ -261,8 +262,8 @@ impl CourseStrip<'_> {
         Shape::filled(Form::Path(steps), color)
     }
 
-    /// The events of a row: ticks for starts, crosses for ends, and discs for all else; those that would cover each other
-    /// are one.
+    /// The events of a row: ticks for starts, crosses for ends, and discs for all other events; overlapping
+    /// ones are merged.
     fn marks(&self, k: usize, row: &CourseRow) -> Vec<Group> {
         let (y, bar, pen) = (self.y(k), self.sizes.bar, 1.8 * self.unit.max(0.8));
         let mut groups: Vec<Group> = Vec::new();

@@ -1,5 +1,5 @@
-//! Lines that are one: those from the boxes of a namespace to the same box outside begin at its frame while they are
-//! quiet, and those over which one topic goes to several readers part only after their label.
+//! Merged lines: those from the boxes of a namespace to the same box outside begin at its frame while they
+//! are unchanged, and those of one topic to several subscribers separate only after their label.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,12 +13,13 @@ use crate::draw::text::Fonts;
 use crate::layout::Layout;
 use crate::view::{Arrow, ArrowKind, Showing, Shown, TopicRow, View};
 
-/// The lines between the boxes of a namespace and one box outside of it, drawn as one as long as they are quiet.
+/// The lines between the boxes of a namespace and one box outside of it, drawn as one while they are
+/// unchanged.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Gate {
-    /// The namespace: a place in [`View::namespaces`].
+    /// The namespace: an index into [`View::namespaces`].
     space: usize,
-    /// The line that runs as the one for all does: a place in [`View::arrows`].
+    /// The line whose route is used for all: an index into [`View::arrows`].
     pub(crate) lead: usize,
     /// Every line, and whether it begins inside.
     members: Vec<(usize, bool)>,
@@ -63,7 +64,7 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
     found.map(gate).collect()
 }
 
-/// The number of windows in which something is there without a mark.
+/// The number of windows in which an element exists without a mark.
 fn quiet_windows(shown: &Showing, windows: usize) -> usize {
     let mut runs: Vec<(usize, bool)> = shown
         .runs()
@@ -100,7 +101,7 @@ fn crossed(view: &View, arrow: &Arrow) -> Option<(usize, bool)> {
 }
 
 impl Gate {
-    /// The places of its lines.
+    /// The indices of its lines.
     pub(crate) fn lines(&self) -> impl Iterator<Item = usize> {
         self.members.iter().map(|(at, _)| *at)
     }
@@ -112,7 +113,7 @@ impl Gate {
         shown.flat_map(Showing::runs).map(|run| run.0).collect()
     }
 
-    /// Whether each line is drawn on its own in some window.
+    /// Whether each line is drawn separately in some window.
     pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (usize, bool)> {
         let changed = |at: usize| {
             let shown = view.arrows_shown.get(at);
@@ -123,8 +124,8 @@ impl Gate {
         all.map(move |(at, _)| (*at, is_lead_news || changed(*at)))
     }
 
-    /// The look of the line for all that are quiet in a window, and those; `None` if there are none, or if the lead is
-    /// changed itself.
+    /// The look of the line for all lines that are unchanged in a window, and these lines; `None` if there
+    /// are none, or if the leading line has changed.
     pub(crate) fn shown<'a>(
         &self,
         view: &View,
@@ -182,7 +183,7 @@ impl Gate {
         Some((shown, quiet))
     }
 
-    /// The way of the one line outside of the frame; `None` where its label is inside.
+    /// The route of the merged line outside of the frame; `None` if its label is inside.
     pub(crate) fn path(
         &self,
         view: &View,
@@ -199,8 +200,8 @@ impl Gate {
     }
 }
 
-/// Gives the labels of lines that are drawn as one the same room: that of a gate to the line that leads it, that of a
-/// fork to all of its lines.
+/// Gives the labels of merged lines the same space: for a gate, on its leading line; for a fork, on all of
+/// its lines.
 pub(crate) fn share(
     (view, fonts, style): (&View, &Fonts, &Edge),
     rooms: &mut [Option<Size>],
@@ -243,8 +244,8 @@ pub(crate) fn larger(a: Option<Size>, b: Option<Size>) -> Option<Size> {
     }
 }
 
-/// The fork of each line: the number of the first line from the same box over the same topic, and nothing else, where
-/// there are several. Of the lines of a gate all are of one fork, or none.
+/// The fork of each line: the number of the first line from the same box with the same single topic, if there
+/// are several. Either all lines of a gate belong to one fork, or none do.
 pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<usize>> {
     let mut forks: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
     let single = |at: usize| {

@@ -8,7 +8,7 @@ use crate::base::words;
 use crate::draw::text::Fonts;
 use crate::view::{Arrow, ArrowKind, Item, View};
 
-/// The notice about names with characters that no font has; `None` if there are none.
+/// The notice about names with characters that no font contains; `None` if there are none.
 pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
     let items = view
         .items

@@ -147,7 +147,7 @@ pub(crate) fn rows(
     rows
 }
 
-/// The legend, the same in every frame.
+/// The legend, equal in every frame.
 pub(crate) fn legend(
     rows: &[Vec<(LegendSign, String, f64)>],
     style: &Style,

@@ -1,4 +1,4 @@
-//! The lines of a window: those of a namespace as one while they are quiet, and one label for each fork.
+//! The lines of a window: those of a namespace merged while they are unchanged, and one label for each fork.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ use crate::draw::scene::{Group, Piece};
 use crate::view::SeenWindow;
 
 impl Picture<'_> {
-    /// The lines of a window, and their labels; those that changed are last, so that they lie on top.
+    /// The lines of a window, and their labels; changed ones last, so that they are on top.
     pub(super) fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
         let measured = &self.measured;
         let links = &measured.graph.plan.links;

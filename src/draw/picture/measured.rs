@@ -18,25 +18,25 @@ use crate::view::{Arrow, ArrowKind, Item, ItemKind, Showing, Shown, View};
 
 /// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
-/// The height of a line of text over its font size.
+/// The height of a line of text, relative to its font size.
 pub(crate) const LINE: f64 = 1.22;
-/// The height of a pill, and its width beyond its text, over the font size.
+/// The height of a rate label, and its width beyond its text, relative to the font size.
 pub(crate) const PILL_HEIGHT: f64 = 1.5;
 pub(crate) const PILL_PAD: f64 = 1.2;
 /// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
 const OWN_RATE: f64 = 0.15;
 
-/// The room above and below the name in a pill, as a part of that in an ellipse.
+/// The space above and below the name in a rounded box, relative to that in an ellipse.
 const FLAT: f64 = 0.7;
 
 /// The label of a box.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Label {
-    /// The name as it is drawn.
+    /// The name as drawn.
     pub(crate) name: String,
     /// Whether a smaller line is drawn below it in some window.
     pub(crate) second: bool,
-    /// The name as it is, where the font lacks some of its characters.
+    /// The original name, if the font lacks some of its characters.
     pub(crate) unshown: Option<String>,
 }
 
@@ -51,7 +51,7 @@ impl Label {
     }
 }
 
-/// The text in the place of a rate where no message came.
+/// The text instead of a rate if there was no message.
 const NO_MESSAGE: &str = "no msg";
 
 /// The labels of a view, and the plan that follows from them.
@@ -62,11 +62,11 @@ pub(crate) struct MeasuredGraph {
     pub(crate) spaces: Vec<Space>,
     /// Whether each arrow carries its rate.
     pub(crate) rated: Vec<bool>,
-    /// The names of the topics of each bundle as they are drawn; none for other arrows.
+    /// The names of the topics of each bundle as drawn; none for other arrows.
     pub(crate) topics: Vec<Vec<String>>,
     /// The lines of namespaces that are drawn as one, with the names of their topics.
     pub(crate) gates: Vec<(Gate, Vec<String>)>,
-    /// The window in which something is first there, by namespace.
+    /// The first window with any content, by namespace.
     pub(crate) first_seen: Vec<usize>,
     /// The rows of each box.
     pub(crate) cards: Vec<Card>,
@@ -224,8 +224,8 @@ impl Measurer<'_> {
         }
     }
 
-    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; of one with rows,
-    /// that of the part above them.
+    /// The size of a box with this label, whose changing smaller lines are at most `second` wide; for one
+    /// with rows, that of the part above them.
     fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
         let body = self.body(item);
         let width = self.fonts.width(&label.name, body.size, body.weight());
@@ -266,7 +266,7 @@ impl Measurer<'_> {
         widest
     }
 
-    /// The room for the widest label that each arrow shows in some window.
+    /// The space for the widest label that each arrow shows in some window.
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
         let reported = told_by_arrows(self.view);
@@ -326,7 +326,7 @@ fn widen(most: &mut Option<f64>, width: f64) {
 pub(crate) enum ShownRates {
     /// None: it is not a topic.
     Nothing,
-    /// Those of the whole topic that changed: several publish it, whose arrows show the rest.
+    /// Changed rates of the whole topic: several nodes publish it, whose arrows show the other rates.
     Changes,
     /// All: at most one is ever known to publish it.
     Rates,
@@ -359,7 +359,7 @@ fn told_by_arrows(view: &View) -> Vec<bool> {
     view.arrows.iter().map(reported).collect()
 }
 
-/// The text of an arrow in a window, and whether it is drawn on a pill because it changed.
+/// The text of an arrow in a window, and whether it is drawn as a rate label because it changed.
 pub(crate) fn arrow_label(
     arrow: &Arrow,
     shown: &Shown,
@@ -388,7 +388,7 @@ pub(crate) fn arrow_label(
             let rate = rate.unwrap_or_default();
             Some(((topic + &rate).trim_end().to_owned(), false))
         }
-        // Its topics have a row each.
+        // Each of its topics has a row.
         ArrowKind::Bundle => None,
     }
 }

@@ -1,4 +1,4 @@
-//! The paint of an element: its mark counts more than its state, and that more than its confidence.
+//! The paint of an element: its mark takes precedence over its state, and that over its confidence.
 
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Quiet, Style};
@@ -15,7 +15,7 @@ pub(crate) struct BoxLook {
     pub(crate) text: Color,
     /// The smaller line.
     pub(crate) small: (Weight, Color),
-    /// A soft light around it, so that the eye finds it.
+    /// A glow around it, to draw attention.
     pub(crate) glow: Color,
 }
 
@@ -24,9 +24,9 @@ pub(crate) struct BoxLook {
 pub(crate) struct ArrowLook {
     pub(crate) stroke: Stroke,
     pub(crate) text: Color,
-    /// Whether it begins with a dot: alive by a latched message.
+    /// Whether it begins with a dot: active through a latched message.
     pub(crate) dot: bool,
-    /// A soft light around it.
+    /// A glow around it.
     pub(crate) glow: Color,
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn change(style: &Style, mark: Mark) -> &Change {
     }
 }
 
-/// The paint of something that is away, or went with others.
+/// The paint of an element that is away, or ended in a crowd.
 fn absent(style: &Style, shown: &Shown) -> Option<Quiet> {
     match shown.mark {
         Some(Mark::Away) => Some(style.away()),
@@ -110,7 +110,7 @@ pub(crate) fn of_arrow(
         let change = change(style, mark);
         let width = match mark {
             Mark::Removed => change.width * 0.8,
-            // As wide as its rate asks for, but never mistaken for one that did not change.
+            // As wide as its rate requires, but never narrower than a visible change.
             _ => (change.width * 0.65).max(width_of(style, flow)),
         };
         return ArrowLook {

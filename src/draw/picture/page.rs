@@ -4,16 +4,16 @@ use super::{PageOptions, timeline};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Style;
 
-/// The page that furniture lengths are given for.
+/// The page size for which lengths of title, legend and timeline are given.
 const STANDARD: Size = Size::new(1280.0, 720.0);
 /// The largest scale of the graph, over its natural size.
 const LARGEST: f64 = 1.35;
 
-/// The places of everything on the page, the same in every frame.
+/// The positions of all parts of the page, equal in every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PageFrame {
     pub(crate) size: Size,
-    /// The scale of furniture: 1 on a page of 1280 × 720.
+    /// The scale of title, legend and timeline: 1 on a page of 1280 × 720.
     pub(crate) unit: f64,
     /// Empty parts (`--bare`) have no height.
     pub(crate) title: Rect,
@@ -22,7 +22,7 @@ pub(crate) struct PageFrame {
     pub(crate) timeline: Rect,
 }
 
-/// The scale and the place of the graph in its part of the page.
+/// The scale and the position of the graph in its part of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GraphFit {
     pub(crate) scale: f64,
@@ -74,8 +74,8 @@ impl PageFrame {
         }
     }
 
-    /// The largest scale at which a layout of this size fits, and the place of its corner, so that it is in the
-    /// middle.
+    /// The largest scale at which a layout of this size fits, and the position of its corner, so that it is
+    /// centred.
     pub(crate) fn fit(&self, layout: Size) -> GraphFit {
         let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
         let scale = (self.graph.w / w)
@@ -90,7 +90,8 @@ impl PageFrame {
     }
 }
 
-/// The scale of furniture on a page, of its size unless it is asked for: on a larger page it grows less than the graph.
+/// The scale of title, legend and timeline on a page, by its size unless given: on a larger page it grows
+/// less than the graph.
 pub(crate) fn unit(options: &PageOptions) -> f64 {
     if let Some(unit) = options.unit {
         return unit;

@@ -1,4 +1,4 @@
-//! The member list of equal namespaces that are drawn as one: a chip for each, and their number over time.
+//! The member list of equal namespaces that are drawn as one: a badge for each, and their number over time.
 
 use super::boxes::Boxes;
 use super::spaces::Space;
@@ -8,7 +8,8 @@ use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Attendance, View};
 
-/// The chips of the member list of a namespace that represents several: left edges and widths, from where the title begins.
+/// The badges in the member list of a namespace that represents several: left edges and widths, relative to
+/// the title.
 pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
     if space.replicas.len() > MOST_CHIPS {
         return Vec::new();
@@ -23,16 +24,16 @@ pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> 
     space.replicas.iter().map(chip).collect()
 }
 
-/// The largest number of equal namespaces with a chip each; more are only counted.
+/// The largest number of equal namespaces with a badge each; more are only counted.
 const MOST_CHIPS: usize = 32;
-/// The font size of a chip over that of the title.
+/// The font size of a badge, relative to that of the title.
 const CHIP_TEXT: f64 = 0.8;
 
-/// The width of the line of their number over time, over the font size of the title.
+/// The width of the line of their number over time, relative to the font size of the title.
 const COURSE: f64 = 6.0;
 
-/// The left edge and the width of the line of their number over time, from where the title begins; `None` where it does
-/// not change.
+/// The left edge and the width of the line of their number over time, relative to the title; `None` if it
+/// does not change.
 pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f64)> {
     if space.course.len() < 2 {
         return None;
@@ -43,7 +44,7 @@ pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f6
     Some((end + size * 0.7, size * COURSE))
 }
 
-/// The share of the equal namespaces of one kind that is there at the end of each window, where it changes.
+/// The share of the equal namespaces of one kind that exist at the end of each window, where it changes.
 pub(crate) fn shares(view: &View, nth: usize) -> Vec<(f64, f64)> {
     let mut shares: Vec<(f64, f64)> = Vec::new();
     for (k, frame) in view.frames.iter().enumerate() {
@@ -85,7 +86,8 @@ fn steps(course: &[(f64, f64)], area: &Rect) -> Form {
 }
 
 impl Boxes<'_> {
-    /// The chips of several equal namespaces: one for each, filled while it is there, in the colour of its change.
+    /// The badges of several equal namespaces: one for each, filled while it exists, in the colour of its
+    /// change.
     pub(crate) fn member_list(
         &self,
         space: &Space,
@@ -111,7 +113,7 @@ impl Boxes<'_> {
             id: format!("s{id}..roll"),
             class: "roll".to_owned(),
             data: vec![("name", space.name.clone())],
-            title: format!("{} of {} are there", here.count(), who.len()),
+            title: format!("{} of {} present", here.count(), who.len()),
             ..Group::default()
         };
         let chips = chips(space, self.fonts, size);
@@ -130,7 +132,7 @@ impl Boxes<'_> {
         group
     }
 
-    /// The chip of one namespace.
+    /// The badge of one namespace.
     fn chip(&self, group: &mut Group, index: &str, who: Attendance, area: Rect) {
         let (style, scale) = (self.style, self.fit.scale);
         let (fill, color, text) = match who {

@@ -1,20 +1,20 @@
-//! Room for badges and titles: the corner of a box, or the part of an arrow, where a badge covers least; the place along
-//! the top of a frame where no line runs under its title.
+//! Space for badges and titles: the corner of a box, or the part of an arrow, where a badge covers least; the
+//! position along the top of a frame where no line runs under its title.
 
 use super::arrows::ArrowPath;
 use super::boxes::{ItemBox, corners};
 use crate::base::geometry::{Point, Rect, Size};
 
-/// The most boxes and arrows among which room is looked for: each place is held against all of them, and in a drawing
-/// of more a badge is smaller than a point.
+/// The most boxes and arrows for which space is searched: each position is compared with all of them, and in
+/// a larger drawing a badge is smaller than a point.
 const MOST: usize = 3000;
 
 /// The distance of titles from the left of their frames, and from lines, in pixels of the graph.
 const INSET: f64 = 8.0;
 const CLEAR: f64 = 3.0;
 
-/// How far each title moves along the top of its frame until no line and no label is below it, and its place; one that
-/// finds none stays.
+/// The distance by which each title moves along the top of its frame until no line and no label is below it,
+/// and its position; a title without free space does not move.
 pub(super) fn place_titles(
     titles: impl Iterator<Item = (Rect, Size)>,
     tracks: &[ArrowPath],
@@ -48,8 +48,8 @@ pub(super) fn place_titles(
     placed.collect()
 }
 
-/// Moves all badges of this radius to places where they cover no line, no title and no other box, as far as there are
-/// any; those of very large drawings stay where they are.
+/// Moves all badges of this radius to positions at which they cover no line, title or other box, if possible;
+/// in very large drawings they do not move.
 pub(super) fn place_badges(
     cards: &mut [ItemBox],
     tracks: &mut [ArrowPath],
@@ -74,7 +74,7 @@ pub(super) fn place_badges(
     }
 }
 
-/// All that a badge may cover.
+/// All shapes that a badge may cover.
 struct Room {
     /// Boxes, then labels.
     boxes: Vec<Rect>,
@@ -100,7 +100,7 @@ impl Room {
         }
     }
 
-    /// The first of the places with the least under a badge there, besides the box or the line that carries it.
+    /// The first of the positions at which a badge covers least, apart from its own box or line.
     fn best(&self, places: &[Point], own: (Option<usize>, Option<usize>)) -> Option<Point> {
         let covered = |place: &&Point| self.covered(**place, own);
         let free = places.iter().find(|place| covered(place) == 0);
@@ -190,7 +190,7 @@ mod tests {
         };
         assert!(title(50.0, &[along(70.0)]) < 0.1);
         assert!((title(50.0, &[along(20.0), along(60.0)]) - 55.0).abs() < 0.1);
-        // There is no room anywhere.
+        // There is no free space.
         assert!(title(150.0, &[along(100.0)]) < 0.1);
     }
 

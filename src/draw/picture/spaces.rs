@@ -13,8 +13,8 @@ pub(crate) struct Space {
     pub(crate) title: String,
     /// The indices of the equal namespaces drawn as this one; empty for a single one.
     pub(crate) replicas: Vec<String>,
-    /// Their number over time, if it changes: parts of the time from 0 to 1, each with the share of them that is there
-    /// from then on.
+    /// Their number over time, if it changes: fractions of the time from 0 to 1, each with the share of them
+    /// that exists from then on.
     pub(crate) course: Vec<(f64, f64)>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
         .collect()
 }
 
-/// The window in which each namespace first has something inside.
+/// The first window in which each namespace has content.
 pub(crate) fn first_seen(view: &View) -> Vec<usize> {
     let mut first = vec![usize::MAX; view.namespaces.len()];
     for (item, showing) in (0..).zip(&view.items_shown) {

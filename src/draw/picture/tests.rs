@@ -54,7 +54,7 @@ fn is_element(group: &Group) -> bool {
 fn positions_are_constant_across_windows() {
     let mut places: BTreeMap<String, Form> = BTreeMap::new();
     for scene in scenes(&MISSION) {
-        // Rates differ in length, and so do the pills under them.
+        // Rates differ in length, and so do their labels.
         let is_still = |g: &&Group| is_element(g) && !g.id.ends_with("..over");
         for group in scene.groups.iter().filter(is_still) {
             let Some(here) = body(group) else { continue };
@@ -188,10 +188,14 @@ fn a_tween_fades_without_movement() {
             let scene = p.between(2, phase);
             scene.groups.iter().find(|g| g.id == id).map(|g| g.fade.0)
         };
-        assert_eq!(fade(0.3, "n-teleop"), None, "what comes waits for its turn");
+        assert_eq!(fade(0.3, "n-teleop"), None, "new elements appear last");
         let half = fade(0.8, "n-teleop").unwrap();
         assert!((half - 0.5).abs() < 0.01, "{half}");
-        assert_eq!(fade(0.5, "n-base-driver"), Some(1.0), "what stays stays");
+        assert_eq!(
+            fade(0.5, "n-base-driver"),
+            Some(1.0),
+            "unchanged elements do not move"
+        );
         let went = |phase: f64| {
             p.between(3, phase)
                 .groups
@@ -262,7 +266,7 @@ fn an_empty_view_is_an_empty_page() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Any mission, with any names: no two boxes overlap, everything lies on the page, numbers are numbers.
+    /// Any mission, with any names: no two boxes overlap, everything is on the page, all numbers are finite.
     #[test]
     fn any_mission_stays_on_its_page(
         windows in prop::collection::vec(prop::collection::vec((0usize..6, 0usize..6, any::<bool>(), 0u32..90), 0..9), 1..5)
@@ -321,7 +325,7 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
     };
     let reported = lines(&[3, 4, 4]);
     assert!(reported.iter().all(|paths| paths.len() == 2));
-    // Up once, and on to the end; the same in every window, in which only the mark of the time moves.
+    // One step up, then constant to the end; equal in every window, where only the playhead moves.
     assert_eq!(reported[0][0].len(), 4);
     assert_eq!(reported[0][0], reported[2][0]);
     assert_ne!(reported[0][1], reported[2][1]);

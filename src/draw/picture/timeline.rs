@@ -1,5 +1,5 @@
-//! The strip at the bottom: phases and rows of those that come and go (or messages per second where none do), and the
-//! place of the window.
+//! The strip at the bottom: phases and rows of elements that start or stop (or messages per second if none
+//! do), and the playhead at the window.
 
 use super::PageOptions;
 use super::course::{CourseSizes, CourseStrip, names_width};
@@ -15,7 +15,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Frame, View};
 
-/// A bar represents one window, or several where there is not enough room.
+/// A bar represents one window, or several if there is not enough space.
 struct TimelineBar {
     /// Its time: from the start of its first window to the start of the next bar's, or to the end.
     span: Span,
@@ -23,7 +23,7 @@ struct TimelineBar {
     rate: f64,
 }
 
-/// The strip's fixed places.
+/// The strip's fixed positions.
 pub(crate) struct Timeline<'a> {
     style: &'a Style,
     page: PageFrame,
@@ -36,7 +36,7 @@ pub(crate) struct Timeline<'a> {
     /// The time that the axis covers.
     span: Span,
     busiest: f64,
-    /// The phases and rows; bars are drawn where there are no rows.
+    /// The phases and rows; bars are drawn if there are no rows.
     course: Course,
     sizes: CourseSizes,
 }
@@ -126,7 +126,7 @@ impl<'a> Timeline<'a> {
         !self.course.rows.is_empty()
     }
 
-    /// The groups that are the same in every frame: ground, phases, rows or bars, axis.
+    /// The groups that are equal in every frame: background, phases, rows or bars, axis.
     pub(crate) fn ground(&self) -> Vec<Group> {
         let style = &self.style.timeline;
         let mut bars = Group::named("timeline");
@@ -145,8 +145,8 @@ impl<'a> Timeline<'a> {
         groups
     }
 
-    /// The groups that change from frame to frame: what exists in the window at place `k` (or the bars up to it), and
-    /// the head over exactly its time.
+    /// The groups that change from frame to frame: the elements that exist in window `k` (or the bars up to
+    /// it), and the playhead over exactly its time.
     pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
         let shown = frame.shown();
@@ -177,7 +177,7 @@ impl<'a> Timeline<'a> {
         self.strip().x(at)
     }
 
-    /// The bars from one place to before another as one shape.
+    /// A range of bars as one shape.
     fn bars(&self, from: usize, to: usize) -> Form {
         let mut steps = Vec::new();
         for bar in self.bars.iter().take(to).skip(from) {
@@ -205,7 +205,7 @@ impl<'a> Timeline<'a> {
         Form::Path(steps)
     }
 
-    /// The axis with round times, as far as they do not come too near to the last, which is the end.
+    /// The axis with round times, except those too near to the end, which is always labelled.
     fn axis(&self) -> Group {
         let mut group = Group::named("axis");
         let size = self.sizes.text;
@@ -215,7 +215,7 @@ impl<'a> Timeline<'a> {
         let most = cast::to_i64((self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0));
         let step = round_length(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
-        // Counted, not added up: a span may be as long as the largest number.
+        // Multiplied instead of added repeatedly: a span may be as long as the largest number.
         for at in (0..=total / step).map(|tick| tick * step) {
             let text = words::moment(at);
             let wide = width(&text);
@@ -244,8 +244,8 @@ impl<'a> Timeline<'a> {
 }
 
 impl TimelineBar {
-    /// The bar of some windows, up to where the next begins. Messages per second of the windows' own time, so that
-    /// neither a short nor an overlapping window lies.
+    /// The bar of some windows, up to where the next begins. Messages per second of the windows' own time, so
+    /// that short and overlapping windows are not misleading.
     fn of(frames: &[Frame], end: Stamp) -> Option<Self> {
         let start = frames.first()?.span.start;
         let messages: u64 = frames.iter().fold(0, |n, f| n.saturating_add(f.messages));

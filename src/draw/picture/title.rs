@@ -1,4 +1,4 @@
-//! The bar on top: what changed in the window, in words, with its time.
+//! The bar on top: the changes of the window in words, with its time.
 
 use super::PageOptions;
 use super::page::PageFrame;
@@ -13,9 +13,9 @@ use crate::view::{Frame, View};
 const USUAL_WIDTH: f64 = 0.5;
 /// The space between the words on the left and those on the right.
 const GAP: f64 = 24.0;
-/// The part of the bar that the name of the bag and the date may take.
+/// The fraction of the bar that the name of the bag and the date may take.
 const MOST_RIGHT: f64 = 0.45;
-/// The lines of words, as parts of the bar's height.
+/// The lines of text, as fractions of the bar's height.
 const LINES: (f64, f64) = (0.46, 0.82);
 
 /// The bar on top of every frame.
@@ -72,7 +72,7 @@ impl<'a> Title<'a> {
         let fits = |text: &str, size: f64| {
             self.width(&self.fonts.shown(text), size, Weight::SemiBold) <= room.0
         };
-        // Rather all words a little smaller than some of them.
+        // All words at a slightly smaller size are better than some of them.
         let whole = |text: &str| {
             let mut sizes = SMALLER.map(|part| size * part).into_iter();
             sizes.find(|size| fits(text, *size)).unwrap_or(size)
@@ -105,8 +105,8 @@ impl<'a> Title<'a> {
         vec![headline, note, clock]
     }
 
-    /// The colour of what most of the headline is about: what went counts more than what came, and that more than what
-    /// changed.
+    /// The colour of the most important changes in the headline: ends before beginnings, and these before
+    /// other changes.
     fn color(&self, frame: &Frame) -> Color {
         let style = &self.style.title;
         let is_away = frame.lasting.iter().any(|l| l.ended.is_none());
@@ -148,7 +148,7 @@ impl<'a> Title<'a> {
         let (size, small) = (style.clock_size * unit, style.quiet_size * unit);
         let most = self.page.title.w * MOST_RIGHT;
         let wide = |parts: &[String]| self.width(&parts.join(" · "), small, Weight::Regular);
-        // On a narrow page the date goes first.
+        // On a narrow page the date is dropped first.
         while parts.len() > 1 && wide(&parts) > most {
             parts.pop();
         }
@@ -174,7 +174,7 @@ impl<'a> Title<'a> {
         self.style.page.margin * self.page.unit
     }
 
-    /// The width of a text; where an SVG is shown in another font, its words may be wider.
+    /// The width of a text, with a margin, as an SVG shown in another font may be wider.
     fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
         let elsewhere = text.chars().count() as f64 * size * USUAL_WIDTH;
         self.fonts.width(text, size, weight).max(elsewhere)
@@ -211,11 +211,11 @@ const SMALLER: [f64; 4] = [1.0, 0.9, 0.8, 0.7];
 /// The titles of the windows of a comparison.
 pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];
 
-/// The time without fractions of a second where it is a second or more, as on a clock.
+/// The time without fractions if it is a second or more, as on a clock.
 pub(crate) fn whole(nanos: i64) -> i64 {
     const MILLI: i64 = 1_000_000;
     let second = 1000 * MILLI;
-    // A window that ends 1 ns after the last message ends, to the eye, at it.
+    // A window that ends 1 ns after the last message is shown as ending at it.
     let rounded = nanos.saturating_add(MILLI / 2) / MILLI * MILLI;
     if rounded.abs() > 20 * second {
         (rounded.saturating_add(second / 2)) / second * second

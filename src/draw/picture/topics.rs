@@ -11,13 +11,14 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::view::{Arrow, Mark, Shown, TopicRow, View};
 
-/// The most topics that have a row each; of more, only those that changed have, or the one with the highest rate.
+/// The most topics that have a row each; if there are more, only those that changed, or the one with the
+/// highest rate.
 const MOST: usize = 3;
-/// The number of letters from which a rate is drawn below its name, so that lines need not be long.
+/// The number of letters above which a rate is drawn below its name, so that lines need not be long.
 const LONGEST: usize = 15;
-/// The largest width of a name in the height of its text.
+/// The largest width of a name, in text heights.
 const WIDEST: f64 = 13.0;
-/// The last parts of the names of a group of topics, and of the topics that carry an image in another form.
+/// The last parts of the names of a group of topics, and of image transports.
 const FAMILIES: [&str; 8] = [
     "/action_topics",
     "/image_topics",
@@ -29,21 +30,22 @@ const FAMILIES: [&str; 8] = [
     "/service_events",
 ];
 
-/// Last parts of names that are meaningless without the part before.
+/// Last parts of names that are meaningless without the previous part.
 const VAGUE: [&str; 6] = ["data", "raw", "state", "status", "info", "events"];
 
 /// A row of words.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
-    /// Whether the messages run along the line, and whether against it, where the line is used both ways.
+    /// Whether messages run along the line, and whether against it, if the line is used in both directions.
     pub(crate) ways: [bool; 2],
-    /// The words after the signs of the ways.
+    /// The words after the direction signs.
     pub(crate) text: String,
     pub(crate) mark: Option<Mark>,
 }
 
 impl Row {
-    /// The words with signs for the ways, for a line that runs rather upright or not, and down or to the right or not.
+    /// The words with direction signs, for a line that is closer to vertical or not, and runs down or to the
+    /// right or not.
     pub(crate) fn words(&self, is_upright: bool, is_forward: bool) -> String {
         let [on, back] = if is_forward {
             self.ways
@@ -63,8 +65,8 @@ impl Row {
     }
 }
 
-/// The names of the topics of an arrow as they are drawn: as short as is unambiguous, without the form that an image
-/// is carried in.
+/// The names of the topics of an arrow as drawn: as short as possible without ambiguity, without image
+/// transports.
 pub(crate) fn names(view: &View, arrow: &Arrow) -> Vec<String> {
     let plain = |name: &Arc<str>| {
         let family = FAMILIES.iter().find_map(|end| name.strip_suffix(end));
@@ -103,7 +105,7 @@ fn last(name: &str) -> &str {
     }
 }
 
-/// The name without the namespace in whose frame one of the arrow's ends lies.
+/// The name without the namespace whose frame contains one of the arrow's ends.
 fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     let inside = |item: u32| {
         let mut rests = view.around(item).filter_map(|at| {
@@ -116,8 +118,8 @@ fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
     shorter.min_by_key(|rest| rest.len()).unwrap_or(name)
 }
 
-/// The rows of a line in a window: of up to three topics one each, those that changed first, then by rate; of more,
-/// those that changed or the one with the highest rate, with the number of the others.
+/// The rows of a line in a window: up to three topics have one each, changed ones first, then by rate; of
+/// more, the changed ones or the one with the highest rate, with the number of the others.
 pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     let both = uses(shown) == [true, true];
     let changed = shown.topics.iter().filter(|row| row.mark.is_some()).count();
@@ -167,10 +169,10 @@ pub(crate) fn rows(shown: &Shown, names: &[String]) -> Vec<Row> {
     rows
 }
 
-/// The words in the place of the rate of a topic whose receiver gets nothing.
+/// The text instead of the rate of a topic whose subscriber receives nothing.
 const STARVED: &str = "(gets nothing)";
 
-/// The name of a service, as it is drawn.
+/// The name of a service as drawn.
 pub(crate) fn called(name: &str) -> String {
     format!("{name}()")
 }
@@ -181,7 +183,7 @@ pub(crate) fn uses(shown: &Shown) -> [bool; 2] {
     [any(0), any(1)]
 }
 
-/// The rate of a topic in words, or the reason for none; none for an action, whose topics have one each.
+/// The rate of a topic in words, or the reason for none; none for an action, whose topics each have one.
 fn rate(row: &TopicRow) -> Option<String> {
     if let Some((before, now)) = row.rates {
         return Some(words::rate_change(before, now));
@@ -193,7 +195,7 @@ fn rate(row: &TopicRow) -> Option<String> {
     rate.or_else(|| (row.state == State::Latched).then(|| "(latched)".to_owned()))
 }
 
-/// The room that these rows need beside each other.
+/// The space that these rows need side by side.
 pub(crate) fn room(rows: &[Row], fonts: &Fonts, style: &Edge) -> Option<Size> {
     let width = |row: &Row| fonts.width(&row.words(true, true), style.size, Weight::SemiBold);
     let widest = rows.iter().map(width).reduce(f64::max)?;

@@ -1,15 +1,16 @@
-//! The way from one window to the next in stages, by opacity alone: ending elements, changed ones, new ones.
+//! The transition from one window to the next in stages, by opacity alone: ending elements, changed ones, new
+//! ones.
 
 use std::collections::BTreeMap;
 
 use crate::draw::scene::{Fade, Group, Scene};
 
-/// The part of the way that each stage takes, from 0 to 1: ending elements, changed ones, new ones.
+/// The part of the transition that each stage takes, from 0 to 1: ending elements, changed ones, new ones.
 const GOING: (f64, f64) = (0.0, 0.4);
 const CHANGING: (f64, f64) = (0.3, 0.7);
 const COMING: (f64, f64) = (0.6, 1.0);
 
-/// The scene at `phase` (above 0 and below 1) of the way from `before` to `after`.
+/// The scene at `phase` (above 0 and below 1) of the transition from `before` to `after`.
 pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
     let mut old: BTreeMap<&str, &Group> =
         before.groups.iter().map(|g| (g.id.as_str(), g)).collect();
@@ -22,7 +23,7 @@ pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
             None => push(&mut groups, group, part(COMING, phase)),
         }
     }
-    // What goes lies below everything that stays, except the boxes of namespaces and the bars of the page.
+    // Ending elements are below all remaining ones, except the boxes of namespaces and the bars of the page.
     let ground = groups
         .iter()
         .take_while(|g| !g.class.starts_with("edge"))
@@ -39,8 +40,8 @@ pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
     Scene { groups, ..after }
 }
 
-/// Adds the old and the new look of a group: the new one appears over the old one, and then the old one vanishes, so
-/// that nothing ever shines through both.
+/// Adds the old and the new look of a group: the new one appears over the old one, and then the old one
+/// vanishes, so that nothing is visible through both.
 fn cross_fade(groups: &mut Vec<Group>, before: &Group, after: &Group, part: f64) {
     let mut old = before.clone();
     old.id.push_str("..before");
@@ -58,12 +59,12 @@ fn push(groups: &mut Vec<Group>, group: &Group, opacity: f64) {
     }
 }
 
-/// Whether it is a title, a chip, a caption or the play-head, which are at once those of the new window.
+/// Whether it is a title, a badge, a caption or the playhead, which immediately show the new window.
 fn is_furniture(group: &Group) -> bool {
     group.data.is_empty()
 }
 
-/// The part of a stage that is done, 0..=1.
+/// The completed fraction of a stage, 0..=1.
 fn part(stage: (f64, f64), phase: f64) -> f64 {
     ((phase - stage.0) / (stage.1 - stage.0)).clamp(0.0, 1.0)
 }

@@ -1,5 +1,5 @@
-//! The union of all windows, drawn once in the layout's own pixels, for pages on which classes set the look of each
-//! window.
+//! The union of all windows, drawn once in the layout's own pixels, for pages on which classes determine the
+//! look of each window.
 
 use std::collections::BTreeSet;
 
@@ -15,14 +15,14 @@ use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, ItemKind, Mark, Showing, Shown};
 
-/// The whole graph, every element once and as if it were active; a painter leaves out the colours.
+/// The whole graph, every element once, drawn as active; a painter omits the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Union {
-    /// The size of the whole.
+    /// The total size.
     pub size: Size,
     /// The boxes around namespaces, outer ones first.
     pub spaces: Vec<Group>,
-    /// The arrows in the order in which they are painted: places in the view.
+    /// The arrows in painting order: indices in the view.
     pub order: Vec<usize>,
     /// A part per arrow of the view. Its last text, if there is one, is its rate.
     pub arrows: Vec<UnionElement>,
@@ -35,24 +35,24 @@ pub struct Union {
 pub struct UnionElement {
     /// Its shapes and texts.
     pub group: Group,
-    /// Whether its last text is another in other windows: a rate or a lifecycle state.
+    /// Whether its last text differs between windows: a rate or a lifecycle state.
     pub is_live: bool,
     /// Whether that text is shown only in windows in which its rate changed.
     pub tells_changes: bool,
-    /// The place of an item; empty for an arrow.
+    /// The rectangle of an item; empty for an arrow.
     pub rect: Rect,
-    /// Its name where the font of the drawing lacks some of it, for readers that have more fonts.
+    /// Its name if the drawing's font lacks some characters, for viewers with more fonts.
     pub name: Option<String>,
     /// The bar at its left for a latched last message, if any.
     pub latch: Option<Form>,
     /// The middle of its badge.
     pub badge: Point,
-    /// The marks that it carries a badge for in some window.
+    /// The marks for which it has a badge in some window.
     pub marks: BTreeSet<Mark>,
 }
 
-/// The rate of an element in a window as it is drawn, after the topics that an arrow between nodes carries; empty for
-/// none.
+/// The rate of an element in a window as drawn, after the topics that an arrow between nodes carries; empty
+/// for none.
 pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
     let rate = chips::rate_in(shown).unwrap_or_default();
     match arrow.and_then(|arrow| arrow.carries(shown)) {
@@ -124,7 +124,7 @@ impl Picture<'_> {
                 let is_latched = item.kind != ItemKind::Node && latched.contains(&at);
                 let is_live = label.second;
                 let mut shown = plain(is_live.then_some(1.0));
-                // It is a line to be filled, whatever it shows.
+                // The line is filled in regardless of its content.
                 shown.lifecycle = is_live.then(|| "-".into());
                 let mut group = boxes.item(item, &card, &shown);
                 let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);

@@ -40,7 +40,7 @@ impl Choice {
         }
     }
 
-    /// The chosen windows as places in `view`, in order; at least one if there is any.
+    /// The chosen windows as indices in `view`, in order; at least one if there is any.
     ///
     /// # Errors
     /// [`Error::Usage`] for a window that does not exist.
@@ -73,7 +73,7 @@ fn place(view: &View, index: usize) -> Result<usize> {
         })
 }
 
-/// The first window and those that change most; where too few change, others evenly spread.
+/// The first window and those that change most; if too few change, others evenly spread.
 fn busiest(view: &View, most: usize) -> Vec<usize> {
     let changes = |t: Counts| {
         let nodes = t.nodes_added + t.nodes_removed + t.restarted;
@@ -100,7 +100,7 @@ mod tests {
     use crate::base::time::{Span, Stamp};
     use crate::view::{Frame, Headline};
 
-    /// A view of windows 10, 11, … in which so many nodes appear.
+    /// A view of windows 10, 11, … in which this many nodes appear.
     fn view(added: &[usize]) -> View {
         let frame = |(place, nodes_added): (usize, &usize)| Frame {
             headlines: vec![Headline::started(); *nodes_added],

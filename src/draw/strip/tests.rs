@@ -9,7 +9,7 @@ use crate::graph::{Element, Elements, State};
 use crate::layout;
 use crate::view::{Headline, Item, ItemKind, Mark, Phrase, Showing, Shown};
 
-/// Four minutes in which a node is there and another comes and goes.
+/// Four minutes in which one node exists and another appears and vanishes.
 fn two_nodes() -> (Mission, View) {
     let minute = |i: usize| Stamp(i64::try_from(i).unwrap() * 60_000_000_000);
     let period = Period::parse("1m").unwrap();

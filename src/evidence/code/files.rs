@@ -65,7 +65,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Adds a file if there is room.
+    /// Adds a file if the limits allow.
     pub(super) fn add(&mut self, path: String, bytes: &[u8]) {
         if self.list.len() >= MOST_FILES || self.bytes + bytes.len() > MOST_BYTES {
             self.is_cut = true;

@@ -1,9 +1,10 @@
 //! The code as of the recording, from git: the only place that runs a program.
 //!
-//! Code changes between a recording and its analysis; the code as of the recording yields two thirds more edges. The
-//! git program reads the objects, as it supports packs, alternates and all object formats. The commands for the commit,
-//! its files and their bytes run no hook, filter, pager or file-system monitor, prompt for nothing and fetch nothing.
-//! They inherit the environment, without variables that would point to another repository.
+//! Code changes between a recording and its analysis; the code as of the recording yields two thirds more
+//! edges. The git program reads the objects, since it supports packs, alternates and all object formats. The
+//! commands for the commit, its files and their bytes run no hook, filter, pager or file-system monitor,
+//! prompt for nothing and fetch nothing. They inherit the environment, without variables that would point to
+//! another repository.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -35,7 +36,9 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
         return Ok(Checkout::Lying { note: None });
     }
     let lying = |why: &str| {
-        let note = Some(format!("the code was read as it lies, for {why}"));
+        let note = Some(format!(
+            "the code was read from the working tree, since {why}"
+        ));
         Ok(Checkout::Lying { note })
     };
     if !git_link::is_plain(folder) {
@@ -46,7 +49,7 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
         (Err(reason), Version::Commit(name)) => return Err(unknown(folder, name, &reason)),
         (Err(reason), _) if reason.contains("not a git repository") => {
             return lying(&format!(
-                "it is in no git repository; it may have changed since {}",
+                "it is not in a git repository; it may have changed since {}",
                 day(end)
             ));
         }
@@ -98,7 +101,9 @@ fn prefix(folder: &Path) -> std::result::Result<String, String> {
         ask(folder, &["config", "--file", file, "--get", name]).ok()
     };
     if !git_link::is_own(folder, setting) {
-        return Err("its `.git` leads to a repository that does not know this folder".to_owned());
+        return Err(
+            "its `.git` refers to a repository that does not refer back to this folder".to_owned(),
+        );
     }
     ask(folder, &["rev-parse", "--show-prefix"])
 }
@@ -133,7 +138,7 @@ fn unknown(folder: &Path, name: &str, reason: &str) -> Error {
             "git has no commit `{name}` in `{}`: {reason}",
             folder.display()
         ),
-        "name a commit, branch or tag, or `worktree` for the files as they lie",
+        "give a commit, branch or tag, or `worktree` for the files in the working tree",
     )
 }
 

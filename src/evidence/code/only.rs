@@ -22,17 +22,18 @@ worded! {
     /// The reason why a declaration is not drawn.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub(super) enum NotDrawn {
-        SeveralPlaces = "several places match",
-        /// What its node publishes has another publisher or fits another declaration too, so it may not have run.
-        Disputed = "what its node publishes may come from elsewhere",
+        SeveralPlaces = "several declarations match",
+        /// The topics of its node have another publisher or match another declaration too, so the node may
+        /// not have run.
+        Disputed = "the topics of its node may have another publisher",
         KnownPublisher = "its publishers are known",
         /// Messages of this type are published by one well-known program.
-        OwnedType = "its type is another program's own",
+        OwnedType = "its type belongs to another program",
         OtherType = "a topic of its node has another type in the bag",
-        OtherRos = "its node is written for the other version of ROS",
-        OtherLaunchFile = "another launch file fits better",
+        OtherRos = "its node is for the other version of ROS",
+        OtherLaunchFile = "another launch file matches better",
         /// A launch file of the same system starts the recorded nodes without this one.
-        Alternative = "a launch file that fits too does without its node",
+        Alternative = "a matching launch file does not start its node",
         FewTopics = "most of its node's topics are not in the bag",
         WouldHaveLogged = "its node would have logged",
         /// Nothing contradicts it, but the bag does not name the node and `--infer source` is not given.
@@ -155,7 +156,7 @@ fn full_name(instance: &Instance) -> String {
     join(space, &instance.name)
 }
 
-/// The declarations of each edge, whether their node was found or not.
+/// The declarations of each edge, whether or not their node was found.
 fn places<'a>(
     code: &'a Code,
     recorded: &RecordedTopics,
@@ -207,7 +208,7 @@ impl LaunchFit<'_> {
 struct Launches<'a> {
     /// By path.
     fits: BTreeMap<&'a str, LaunchFit<'a>>,
-    /// Those that explain most edges, except those beaten by another.
+    /// Those that explain most edges, except those for which another is more likely.
     best: BTreeSet<&'a str>,
 }
 
@@ -340,7 +341,7 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
     let edge = candidate.found.role.edge(node, candidate.found.topic);
     let text = format!(
-        "the only place in {} that may do so: {}; the bag does not say that it ran",
+        "the only declaration in {} that may do so: {}; the bag does not show that it ran",
         count(code.packages, "package"),
         words(known, candidate)
     );

@@ -46,11 +46,11 @@ struct PythonReader<'a> {
     open: Vec<(usize, usize)>,
     /// Loops: the text that is repeated, the variables and the items.
     loops: Vec<(Range<usize>, Node<'a>, Node<'a>)>,
-    /// The values of the variables in the current turn of the enclosing loops.
+    /// The values of the variables in the current iteration of the enclosing loops.
     bound: BTreeMap<&'a str, Node<'a>>,
 }
 
-/// The most turns of the loops around a call that are followed.
+/// The most iterations of the loops around a call that are followed.
 const MOST_TURNS: usize = 64;
 
 impl<'a> PythonReader<'a> {
@@ -229,7 +229,8 @@ impl<'a> PythonReader<'a> {
         }
     }
 
-    /// The values of the variables of the loops around an element, for each turn; one without any outside loops.
+    /// The values of the variables of the loops around an element, for each iteration; a single empty entry
+    /// outside of loops.
     fn turns(&self, node: Node<'a>) -> Vec<BTreeMap<&'a str, Node<'a>>> {
         let mut turns = vec![BTreeMap::new()];
         let around = self.loops.iter();
@@ -259,7 +260,7 @@ impl<'a> PythonReader<'a> {
         turns
     }
 
-    /// The items of a literal that a loop goes over, or of one that a name refers to.
+    /// The items of the literal that a loop iterates over, or of the one that a name refers to.
     fn items(&self, node: Node<'a>, depth: usize) -> Vec<Node<'a>> {
         let again = |node: Option<Node<'a>>| match node {
             Some(node) if depth < DEEPEST => self.items(node, depth + 1),

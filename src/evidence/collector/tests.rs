@@ -302,7 +302,7 @@ fn every_layout_survives_any_cut() {
     }
 }
 
-/// A collector with a camera, a detector that passes its stamps on, and a lidar that does not.
+/// A collector with a camera, a detector that copies its stamps, and a lidar that does not.
 fn flow() -> Collector {
     let mut collector = Collector::new(CollectOptions {
         infer_stamps: true,

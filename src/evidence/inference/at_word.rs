@@ -23,7 +23,8 @@ impl Conclusions<'_> {
         facts.into_iter().map(times).collect()
     }
 
-    /// Adds the inferences that the observations state without any rule: nodes, topics, publications and subscriptions.
+    /// Adds the inferences that follow from single observations without a rule: nodes, topics, publications
+    /// and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let refusals = self.refusals();
@@ -143,7 +144,7 @@ impl Conclusions<'_> {
     }
 }
 
-/// Adds to the times of snapshots that show something the last moments before the next ones.
+/// Extends snapshots that show an element to the last moments before the next ones.
 fn hold(times: &mut Vec<Stamp>, snapshots: &[Stamp]) {
     let next = |time: &Stamp| snapshots.get(snapshots.partition_point(|t| t <= time));
     let last: Vec<Stamp> = times

@@ -1,4 +1,4 @@
-//! Edges known not to exist: a complete list of a node's edges would name them, and does not.
+//! Edges known not to exist: a complete list of a node's edges omits them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,10 +7,11 @@ use crate::base::time::Span;
 use crate::evidence::SOURCES;
 use crate::evidence::observation::{Name, Observation};
 
-/// Complete lists of the topics that nodes publish and subscribe, as far as there are any.
+/// Complete lists of the topics that nodes publish and subscribe to, if there are any.
 #[derive(Debug, Default)]
 pub(crate) struct Closed {
-    /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows of a node.
+    /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows for
+    /// a node.
     all: BTreeMap<Name, BTreeSet<Name>>,
     /// By node: all topics that a roscpp node publishes.
     published: BTreeMap<Name, BTreeSet<Name>>,
@@ -83,7 +84,7 @@ impl Closed {
         }
     }
 
-    /// Whether a complete list that was made long after its node's start leaves this edge out.
+    /// Whether a complete list that was made long after its node's start omits this edge.
     pub(crate) fn settled_lists_deny(&self, what: ElementKey) -> bool {
         let node = match what {
             ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => node,
@@ -92,7 +93,7 @@ impl Closed {
         self.settled.contains(&node) && self.lists_deny(what)
     }
 
-    /// Whether some complete list leaves this edge out; false for nodes and topics.
+    /// Whether a complete list omits this edge; false for nodes and topics.
     pub(crate) fn lists_deny(&self, what: ElementKey) -> bool {
         match what {
             ElementKey::Publish(node, topic) => {

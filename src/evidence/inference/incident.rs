@@ -1,5 +1,5 @@
-//! Statements about the graph other than about which elements exist: subscribers that get nothing, names used twice, messages
-//! that the recorder lost.
+//! Statements about the graph other than about which elements exist: subscribers that receive nothing, names
+//! used twice, messages that the recorder lost.
 
 use std::sync::Arc;
 
@@ -28,12 +28,12 @@ pub(crate) struct Incident {
     pub(crate) kind: IncidentKind,
     pub(crate) source: SourceId,
     pub(crate) time: Stamp,
-    /// The time of the last statement of a run of them.
+    /// The time of the last statement of a run of equal ones.
     pub(crate) until: Option<Stamp>,
 }
 
 impl Conclusions<'_> {
-    /// Adds an incident; one that follows another of its kind about the same element closely belongs to it.
+    /// Adds an incident; one shortly after another of its kind about the same element is merged with it.
     pub(crate) fn incident(
         &mut self,
         source: SourceId,

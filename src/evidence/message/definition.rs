@@ -85,7 +85,7 @@ impl MessageLayout {
         let definition = connection.definition.as_deref().unwrap_or_default();
         let hash = connection.type_hash.as_deref().unwrap_or_default();
         let same = if definition.trim().is_empty() {
-            // Nothing to compare with: a payload that is not used up exactly is still refused.
+            // There is nothing to compare; a payload that is not consumed exactly is still refused.
             self.md5.is_empty() || ["", "*", self.md5].contains(&hash)
         } else {
             self.matches(definition)

@@ -175,7 +175,7 @@ impl MessageSchema {
 
 #[expect(
     clippy::unnecessary_wraps,
-    reason = "an arm among others that may fail"
+    reason = "a match arm beside others that may fail"
 )]
 fn whole(number: impl Into<i128>) -> PayloadResult<MessageValue> {
     Ok(MessageValue::Number(Some(number.into())))

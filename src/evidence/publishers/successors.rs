@@ -1,9 +1,9 @@
-//! Nodes that ended while a topic of theirs went on, in bags that were rewritten: another node took the topic over, and
-//! its messages bear the name of the first.
+//! Nodes that ended while one of their topics continued, in rewritten bags: another node took over the topic,
+//! and its messages have the name of the first.
 //!
-//! A node that other evidence shows again and again counts as gone where all of it stops for good at the time at which
-//! its topic fell silent, for longer than ever before. Messages that come after that silence are not known to be its
-//! own: they are of the only node that names the topic and begins with them, if there is one.
+//! A node with regular other evidence counts as ended if all of it stops for good when its topic falls silent
+//! for longer than ever before. Messages after that silence may not be its own: they are attributed to the
+//! only node that names the topic and starts with them, if there is one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -16,8 +16,9 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, Statement};
 use crate::evidence::times::{SeriesId, Stamps};
 
-/// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` are the places of its streams. Each
-/// gets an observation of its end; what is left of a topic whose header names it becomes a stream of its own.
+/// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` contains the indices of
+/// its streams. Each gets an observation of its end; the rest of a topic whose header names it becomes a
+/// separate stream.
 pub(super) fn part(
     streams: &mut Vec<Stream>,
     of_bag: &[usize],
@@ -46,7 +47,7 @@ pub(super) fn part(
                 ..stream.clone()
             };
             if let Some(heir) = heir {
-                // What fell silent with its node was sent by it alone.
+                // A topic that fell silent with its node was sent by it alone.
                 stream.trust = Reliability::Likely;
                 rest.trust = Reliability::Likely;
                 rest.publisher = Some(heir);
@@ -88,11 +89,11 @@ struct RewrittenBag<'a> {
     messages: &'a Stamps,
     /// The observations about each node.
     stated: BTreeMap<Name, Vec<SeriesId>>,
-    /// The streams that each node published, as far as is known.
+    /// The streams that each node published, as far as known.
     own: BTreeMap<Name, Vec<usize>>,
     /// The last message.
     end: Stamp,
-    /// The times without any message, once they are asked for.
+    /// The times without any message, computed on demand.
     pauses: Option<Vec<(Stamp, Stamp)>>,
 }
 
@@ -153,7 +154,8 @@ impl<'a> RewrittenBag<'a> {
         Ok(ends)
     }
 
-    /// Whether the last sign of a node, other than the messages of this stream, comes long before the end of the bag.
+    /// Whether the last sign of a node, other than the messages of this stream, is long before the end of the
+    /// bag.
     fn may_have_ended(&self, node: Name, except: usize) -> bool {
         let stated = self.stated.get(&node).into_iter().flatten();
         let stated = stated.filter_map(|id| self.facts.times.bounds(*id));
@@ -185,7 +187,7 @@ impl<'a> RewrittenBag<'a> {
         }))
     }
 
-    /// The only node that names the topic of an end and was first seen when its messages came again.
+    /// The only node that names the topic of an end and was first seen when its messages resumed.
     fn heir(&self, named: &NamedTopics, end: &NodeEnd) -> Option<Name> {
         let next = end.next?;
         let begins = |node: &Name| {
@@ -239,7 +241,7 @@ impl<'a> RewrittenBag<'a> {
     }
 }
 
-/// The node that an observation shows to be there.
+/// The node whose existence an observation shows.
 pub(super) fn shown(observation: Observation) -> Option<Name> {
     match observation {
         Observation::Node(node)
@@ -259,7 +261,7 @@ fn is_own(streams: &[Stream], at: usize) -> bool {
     streams[at].trust == Reliability::Whole && streams[at].connection.topic.as_str() != "/rosout"
 }
 
-/// The habit of a node of showing itself.
+/// The usual interval between the signs of a node.
 #[derive(Clone, Copy, Debug)]
 struct Habit {
     last: Stamp,
@@ -268,7 +270,7 @@ struct Habit {
 }
 
 impl Habit {
-    /// The habit in sorted signs; `None` for too few.
+    /// The usual interval of sorted signs; `None` if there are too few.
     fn of(signs: &[Stamp]) -> Option<Self> {
         let pauses = signs.windows(2).map(|pair| pair[1].since(pair[0]));
         (signs.len() as u64 >= FEWEST).then_some(Self {
@@ -310,7 +312,7 @@ mod tests {
         let end = Stamp(90_000_000_000);
         let found = silence(&times, habit(21, 4), end);
         assert_eq!(found, Some((times[19], Some(times[20]))));
-        // Long before the silence, and in the middle of even sending.
+        // Long before the silence, and within even messages.
         assert_eq!(silence(&times, habit(8, 4), end), None);
         assert_eq!(silence(&times, habit(70, 4), end), None);
         let rare = seconds([0, 20, 40, 60, 80, 160, 180, 200]);

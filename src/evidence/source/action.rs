@@ -1,5 +1,5 @@
-//! Actions: the publisher of status, feedback or result is the server and subscribes goals; a publisher of goals is a
-//! client and subscribes the rest. The goals' ids name clients of ROS 1 (`/client-N-time`).
+//! Actions: the publisher of status, feedback or result is the server and subscribes to goals; a publisher of
+//! goals is a client and subscribes to the rest. Goal ids name clients of ROS 1 (`/client-N-time`).
 
 use super::SourceContext;
 use crate::bag::Encoding;

@@ -5,7 +5,8 @@ use crate::base::role::start;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, SourceId};
 
-/// The longest time from a start in a name to the recording, in nanoseconds; with a longer one the clock was not set.
+/// The longest time from a start in a name to the recording, in nanoseconds; if it is longer, the clock was
+/// not set.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {

@@ -1,4 +1,4 @@
-//! Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes it.
+//! Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes to it.
 
 use crate::evidence::inference::Conclusions;
 use crate::evidence::observation::SourceId;

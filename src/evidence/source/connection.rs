@@ -3,7 +3,7 @@
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::{Confidence, SourceId};
 
-/// Every stream proves its topic, and its publisher as far as its name is reliable.
+/// Every stream is evidence for its topic, and for its publisher if that name is reliable.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
@@ -34,7 +34,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                 ..inference(edge, Validity::Messages(at))
             }),
             Reliability::First => known.add(Inference {
-                // The tool that wrote this header knows the publisher of no other message.
+                // The tool that wrote this header does not know the publishers of the other messages.
                 confidence: Confidence::Stated,
                 ..inference(edge, Validity::First(at))
             }),

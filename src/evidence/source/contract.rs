@@ -1,8 +1,10 @@
-//! Contracts of well-known nodes: the topics that a node of a known package publishes and subscribes under its default
-//! names, as `contracts.csv` lists it. It counts where the bag names the node and has the topic with that type.
+//! Contracts of well-known nodes: the topics that a node of a known package publishes and subscribes under
+//! its default names, as `contracts.csv` lists it. It applies if the bag names the node and has the topic
+//! with that type.
 //!
-//! Each row names the source files that its program logs from: a node of that name that logs from other files only is
-//! another program. A row without a node's name is for every node that logs from one of its files.
+//! Each row names the source files that its program logs from: a node of that name that only logs from other
+//! files is another program. A row without a node's name applies to every node that logs from one of its
+//! files.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,7 +21,7 @@ use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 const TABLE: &str = include_str!("contracts.csv");
 
-/// Folders of the client libraries, which log in the name of every node.
+/// Folders of the client libraries, which log under the name of every node.
 const LIBRARIES: [&str; 4] = [
     "/libros/",
     "/src/rclcpp/",
@@ -27,7 +29,8 @@ const LIBRARIES: [&str; 4] = [
     "-packages/rclpy/",
 ];
 
-/// Whether a file is part of many programs, so that it does not tell them apart: a header, or a client library's.
+/// Whether a file is part of many programs, so that it does not distinguish them: a header, or a client
+/// library's.
 fn is_shared(path: &str) -> bool {
     matches!(path.rsplit_once('.'), Some((_, "h" | "hpp")))
         || LIBRARIES.iter().any(|folder| path.contains(folder))
@@ -153,7 +156,7 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
         "subscribes to"
     };
     format!(
-        "{} is taken for the one of package {}, which {verb} {} (contracts.csv line {}: {})",
+        "{} is assumed to be the one of package {}, which {verb} {} (contracts.csv line {}: {})",
         known.text(node),
         contract.package,
         contract.topic,
@@ -189,7 +192,7 @@ impl Owners {
         Some(format!("{space}/{}", row.node))
     }
 
-    /// The recorded topics that the owner of a type, with this name, publishes (true) and subscribes as well.
+    /// The recorded topics that the owner of a type, with this name, also publishes (true) and subscribes to.
     pub(crate) fn others(
         &self,
         known: &Conclusions<'_>,

@@ -1,5 +1,5 @@
-//! Log texts that repeat a recorded message (`Publishing: 'Hello 3'`, `I heard: [Hello 3]`): the node that logs
-//! publishes or subscribes that topic, by its own words and by the order of text and message.
+//! Log texts that repeat a recorded message (`Publishing: 'Hello 3'`, `I heard: [Hello 3]`): the logging node
+//! publishes or subscribes to that topic, according to its own words and the order of text and message.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, SourceId};
 use crate::evidence::texts::{LoggedText, ShownValue};
 
-/// The fewest different values that are not chance; numbers are more often equal than words.
+/// The fewest different values that are significant; numbers are more often equal than words.
 const FEWEST: usize = 3;
 const FEWEST_NUMBERS: usize = 5;
 /// The longest time between a text and the message that it repeats, in nanoseconds.
@@ -24,9 +24,9 @@ const NEAR_NUMBERS_NS: i64 = 200_000_000;
 const SHARE: usize = 80;
 /// The shortest word that counts, in bytes; shorter ones are in too many texts.
 const SHORTEST: usize = 3;
-/// The longest payload that is searched, in bytes; longer ones hold no text that nodes log.
+/// The longest payload that is searched, in bytes; longer ones contain no text that nodes log.
 const LONGEST: usize = 1024;
-/// The most values that are kept of one message.
+/// The most values of one message that are kept.
 const MOST_VALUES: usize = 4;
 /// The most forms of texts that are examined closely.
 const MOST_FORMS: usize = 4096;
@@ -70,7 +70,7 @@ pub(crate) fn keep(context: &mut SourceContext<'_>, schema: &MessageSchema, payl
     }
 }
 
-/// The schema for taking the messages of a connection apart; `None` for those that hold no words or numbers of their
+/// The schema for parsing the messages of a connection; `None` for those without words or numbers of their
 /// own.
 pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<MessageSchema> {
     let plain = type_name.replacen("/msg/", "/", 1);
@@ -201,7 +201,7 @@ fn echoes(
     echoes
 }
 
-/// The place of a value in a text as a word of its own, not inside a longer word or number.
+/// The position of a value in a text as a whole word, not inside a longer word or number.
 fn place(text: &str, value: &str) -> Option<Range<usize>> {
     let start = text.find(value)?;
     let end = start + value.len();
@@ -238,7 +238,7 @@ fn is_strong(echo: &Echo, before: &str, after: &str, by_node: &[&str]) -> bool {
     echo.texts.len() * 100 >= form.count() * SHARE
 }
 
-/// Whether the words of a text speak of a message sent (`true`) or received (`false`); `None` if of neither or both.
+/// Whether the words of a text mean a message sent (`true`) or received (`false`); `None` if neither or both.
 fn verb(before: &str, after: &str) -> Option<bool> {
     let text = format!("{before} {after}").to_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
@@ -247,7 +247,7 @@ fn verb(before: &str, after: &str) -> Option<bool> {
     (sent != received).then_some(sent)
 }
 
-/// The edge that an echo shows: by the publishers known, else by the verb, else by the order.
+/// The edge that an echo shows: by the known publishers, else by the verb, else by the order.
 fn end(
     known: &Conclusions<'_>,
     node: Name,

@@ -1,9 +1,9 @@
-//! Data flow, when asked for: a node that publishes messages whose header stamps equal those of an input just before,
-//! again and again, subscribes to that input.
+//! Data flow, on request: a node whose messages repeatedly have the header stamps of messages received just
+//! before subscribes to that input.
 //!
-//! Fails if nodes restamp their output, and if sources are triggered together. Where two inputs are possible
-//! and nothing distinguishes them, no observation is made, and none about a simulation, in which all that is sent in one step
-//! has one stamp.
+//! It fails if nodes restamp their output, or if sources are triggered together. If two inputs are possible
+//! and cannot be distinguished, no observation is made; nor in simulations, in which all messages of one step
+//! have the same stamp.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,19 +22,19 @@ use crate::evidence::times::Timed;
 /// behind the length of a list.
 pub(crate) const HEAD: usize = 16;
 
-/// The fewest equal stamps that are not chance.
+/// The fewest equal stamps that are significant.
 const FEWEST: u64 = 10;
 /// The share, in per cent, of messages that must carry the input's stamp.
 const SHARE: u64 = 60;
 /// The share, in per cent, of pairs with equal stamps that must have the input first.
 const ORDERED: u64 = 95;
-/// The share, in per cent, of the best input's matches from which on an input is as good as it.
+/// The share, in per cent, of the best input's matches above which another input is equally good.
 const AS_GOOD: u64 = 97;
 /// The most streams with one stamp; more are a clock, not a flow.
 const MOST_AT_ONCE: usize = 32;
 /// The unit in which log times are kept, in nanoseconds, modulo 2^32.
 const UNIT_NS: i64 = 10_000;
-/// The longest time of a node to answer, in units (1 s).
+/// The longest time in which a node responds, in units (1 s).
 const ANSWER: i32 = 100_000;
 /// Log topics, which are left out: log records carry the stamps of the messages they are about.
 const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
@@ -99,7 +99,7 @@ pub(crate) fn collect(context: &mut SourceContext<'_>, first_bytes: &[u8]) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "modulo 2^32 is meant"
+            reason = "the value modulo 2^32 is intended"
         )]
         let units = time.0.div_euclid(UNIT_NS) as u32;
         context.facts.header(context.place, stamp, units);
@@ -179,7 +179,7 @@ fn is_simulated(known: &Conclusions<'_>) -> bool {
     has_clock || known.facts.list.iter().any(|fact| is_set(&fact))
 }
 
-/// The topic that an output answers, if only one is possible, and the number of messages that carry its stamp.
+/// The input topic of an output, if only one is possible, and the number of messages with its stamp.
 fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name, u64)> {
     let flow = &flows.all[output];
     let own = flows.pairs.range((output, 0)..=(output, usize::MAX));
@@ -225,8 +225,8 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<(Name,
     best.iter().find(clear).map(found)
 }
 
-/// Measurements of sensors, and what is computed only from messages of its own row: no camera image is computed
-/// from a laser scan.
+/// Sensor measurements, and types that are only computed from messages of their own row: no camera image is
+/// computed from a laser scan.
 const SENSED: [&[&str]; 4] = [
     &[
         "sensor_msgs/Image",
@@ -243,11 +243,11 @@ const CLOUDS: [&str; 3] = [
     "sensor_msgs/PointCloud",
     "sensor_msgs/PointCloud2",
 ];
-/// Packages whose messages describe a robot's surroundings or its state, not what a program of its own defines.
+/// Packages whose messages describe a robot's surroundings or its state, not types that one program defines.
 const COMMON: [&str; 4] = ["sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/"];
 
-/// Whether messages of one type may be computed from those of another. The calibration of a camera alone is the basis
-/// of nothing else.
+/// Whether messages of one type may be computed from those of another. Nothing else is computed from a
+/// camera's calibration alone.
 fn can_feed(input: &str, output: &str) -> bool {
     const CALIBRATION: &str = "sensor_msgs/CameraInfo";
     let is_common = COMMON.iter().any(|package| input.starts_with(package));
@@ -261,7 +261,7 @@ fn can_feed(input: &str, output: &str) -> bool {
     if CLOUDS.contains(&output) {
         return CLOUDS.contains(&input) || SENSED[0].contains(&input);
     }
-    // A depth image may be one of a cloud.
+    // A depth image may be computed from a cloud.
     let is_depth = |row: &[&str]| row == SENSED[0] && input == "sensor_msgs/PointCloud2";
     row.is_none_or(|row| row.contains(&input) || is_depth(row))
 }
@@ -345,7 +345,7 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
     Flows { all, pairs }
 }
 
-/// The node that publishes a stream, as far as it is known to be one.
+/// The node that publishes a stream, if it is known to be a single one.
 fn publisher(known: &Conclusions<'_>, at: usize) -> Option<Name> {
     let stream = &known.streams[at];
     stream.publisher.or_else(|| {
@@ -354,7 +354,7 @@ fn publisher(known: &Conclusions<'_>, at: usize) -> Option<Name> {
     })
 }
 
-/// A node's name without the numbers that are new in every run.
+/// A node's name without the numbers that differ from run to run.
 fn role(node: &str) -> String {
     node.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
         .to_owned()
@@ -389,7 +389,7 @@ fn compare(
     }
 }
 
-/// Whether two flows come from different senders, as far as is known.
+/// Whether two flows come from different senders, as far as known.
 fn is_other(one: &StampFlow, other: &StampFlow) -> bool {
     one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
 }

@@ -1,4 +1,4 @@
-//! `<node>/transition_event` of ROS 2: a node is alive, with its lifecycle state.
+//! `<node>/transition_event` of ROS 2: a node is running, with its lifecycle state.
 
 use super::SourceContext;
 use crate::bag::Encoding;

@@ -1,5 +1,6 @@
-//! Log texts of roscpp about its connections: begin and end of subscribers (DEBUG), clients of another type, its own
-//! subscriptions; and the recorder's `Subscribing to`, which dates the moment a topic appeared.
+//! Log texts of roscpp about its connections: start and end of subscribers (DEBUG), clients with another
+//! type, its own subscriptions; and the recorder's `Subscribing to`, which gives the time at which a topic
+//! appeared.
 
 use super::SourceContext;
 use crate::evidence::message::cursor::{self, PayloadCursor};
@@ -32,7 +33,7 @@ pub(crate) fn read(
             How::Lasts => Observation::Subscribe(node, topic),
             How::Refused => Observation::Refused(node, topic),
             How::Ends => {
-                // It was there until now.
+                // It existed until now.
                 context.observation(Observation::Node(node), Confidence::Stated, words);
                 Observation::Unsubscribe(node, topic)
             }
@@ -45,7 +46,7 @@ pub(crate) fn read(
 /// A subscription in a log text.
 #[derive(Debug, PartialEq, Eq)]
 struct ToldSubscription<'a> {
-    /// The subscriber; `None`: the node that logs.
+    /// The subscriber; `None` for the logging node.
     node: Option<&'a str>,
     topic: &'a str,
     how: How,

@@ -1,5 +1,5 @@
-//! Log texts in which a node names a topic that it publishes or subscribes: of rclcpp and rclpy about incompatible
-//! quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
+//! Log texts in which a node names a topic that it publishes or subscribes to: of rclcpp and rclpy about
+//! incompatible quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
 
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
@@ -50,9 +50,9 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The text before a topic, the text behind it, and whether the speaker publishes it.
+/// The text before a topic, the text after it, and whether the logging node publishes it.
 const FORMS: &[(&str, &str, bool)] = &[
-    // rclcpp and rclpy: the other end is new, so the speaker has this one.
+    // rclcpp and rclpy: the other end is new, so the logging node has this one.
     (
         "New subscription discovered on topic '",
         "', requesting incompatible QoS",
@@ -89,7 +89,7 @@ const FORMS: &[(&str, &str, bool)] = &[
     ("Setup subscriber on ", " [", false),
 ];
 
-/// The topic that a text names, and whether its speaker publishes it.
+/// The topic that a text names, and whether the logging node publishes it.
 fn named(text: &str) -> Option<(bool, &str)> {
     let (before, after, publishes) = FORMS.iter().find(|(before, ..)| text.starts_with(before))?;
     let rest = &text[before.len()..];
@@ -103,7 +103,8 @@ fn named(text: &str) -> Option<(bool, &str)> {
     (!topic.is_empty() && topic.chars().all(is_name)).then_some((*publishes, topic))
 }
 
-/// The topic that a client of rosbridge makes it subscribe to, or no longer: `[Client 0] Subscribed to /odom`.
+/// The topic to which rosbridge subscribes for a client, or unsubscribes from: `[Client 0] Subscribed to
+/// /odom`.
 fn bridged(text: &str) -> Option<(bool, &str)> {
     let (client, text) = text.strip_prefix("[Client ")?.split_once("] ")?;
     let topic = |lead: &str| text.strip_prefix(lead).filter(|t| t.starts_with('/'));

@@ -1,4 +1,5 @@
-//! `/events/rosbag2_messages_lost`: messages that the recorder itself lost, so that a gap is not taken for the robot's.
+//! `/events/rosbag2_messages_lost`: messages that the recorder itself lost, so that a gap is not attributed
+//! to the robot.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +48,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// Adds the losses, those of a run of reports as one.
+/// Adds the losses; consecutive reports are combined.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let mut lost: BTreeMap<Name, Vec<(Stamp, u64)>> = BTreeMap::new();
     for fact in known.facts.list.clone() {

@@ -1,4 +1,5 @@
-//! `/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`): a subscriber's node is alive and publishes them.
+//! `/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`): a subscriber's node is running and
+//! publishes them.
 
 use super::SourceContext;
 use crate::bag::Encoding;

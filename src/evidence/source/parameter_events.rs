@@ -1,4 +1,4 @@
-//! Parameter events of ROS 2: a node is alive.
+//! Parameter events of ROS 2: a node is running.
 
 use super::SourceContext;
 use crate::evidence::message::cursor::{self, PayloadCursor};

@@ -1,8 +1,8 @@
-//! Messages passed on byte by byte (relay, throttle, mux, drop, republish): the node that publishes the copies
-//! subscribes the topic that had them first.
+//! Messages forwarded byte by byte (relay, throttle, mux, drop, republish): the node that publishes the
+//! copies subscribes to the topic that had them first.
 //!
-//! The length and the first bytes are compared, by a hash; a content that is repeated in its own topic (an empty
-//! message, a constant) shows nothing and is counted once. The budget is that of
+//! The length and the first bytes are compared, by a hash; content that is repeated in its own topic (an
+//! empty message, a constant) is not significant and is counted once. The budget is that of
 //! [`crate::evidence::collector::PAYLOAD_BYTES`].
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -18,25 +18,25 @@ use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::observation::{Name, SourceId};
 use crate::evidence::spread::Spread;
 
-/// The fewest equal messages that are not chance.
+/// The fewest equal messages that are significant.
 const FEWEST: u64 = 10;
 /// The share, in per cent, of an output's different messages that must be copies.
 const SHARE: u64 = 90;
-/// The ratio of how often the input comes first to how often the output does, at least.
+/// The least ratio of the number of times that the input comes first to that of the output.
 const FIRST: u64 = 3;
 /// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
-/// The most runs that are kept of a flow: a mux that switches more often forwards several inputs at once.
+/// The most runs of a flow that are kept: a mux that switches more often forwards several inputs at once.
 const MOST_RUNS: usize = 4096;
-/// The longest time that a message takes to be passed on, in nanoseconds.
+/// The longest time in which a message is forwarded, in nanoseconds.
 const RECENT_NS: i64 = 2_000_000_000;
-/// Log topics, which are left out: log records are passed on by a known node.
+/// Log topics, which are left out: log records are forwarded by a known node.
 const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
 
-/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one is no evidence.
+/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one is not evidence.
 pub(crate) fn collect(context: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     if beginning.is_empty() {
         return;
@@ -56,7 +56,7 @@ type PayloadFlow = (Name, Option<Name>);
 /// The equal messages of two flows.
 #[derive(Clone, Copy, Debug, Default)]
 struct PayloadPair {
-    /// The number of messages that the one had before the other.
+    /// The number of messages that the input had before the output.
     before: u64,
     lag: Spread,
 }
@@ -69,14 +69,15 @@ struct Run {
     count: u64,
 }
 
-/// The result of going through all messages once.
+/// The result of one pass over all messages.
 #[derive(Debug, Default)]
 struct Matches {
     pairs: BTreeMap<(usize, usize), PayloadPair>,
     /// By flow: the number of its different messages that were seen before in exactly these other flows.
     origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
     distinct: BTreeMap<usize, u64>,
-    /// By flow: the number of its messages that another one had just after it: the recorder may get a copy first.
+    /// By flow: the number of its messages that another one had just after it, as the recorder may receive a
+    /// copy first.
     later: BTreeMap<usize, BTreeMap<usize, u64>>,
     /// By flow, in order.
     runs: BTreeMap<usize, Vec<Run>>,
@@ -111,7 +112,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Adds the times at which a mux begins to pass on another of its inputs.
+/// Adds the times at which a mux switches to another of its inputs.
 fn turns(
     source: SourceId,
     known: &mut Conclusions<'_>,
@@ -136,7 +137,7 @@ fn turns(
     }
 }
 
-/// The node that publishes a flow, as far as it is known to be one.
+/// The node that publishes a flow, if it is known to be a single one.
 fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option<Name> {
     publisher.or_else(|| {
         let mut all = known.publishers(topic);
@@ -144,7 +145,7 @@ fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option
     })
 }
 
-/// Goes through all messages in order of time.
+/// Processes all messages in order of time.
 fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let mut topics: BTreeMap<String, BTreeSet<Name>> = BTreeMap::new();
     for at in known.facts.payloads.keys() {
@@ -191,7 +192,7 @@ struct PayloadWalk {
     found: Matches,
     /// The contents that each flow had so far.
     seen: HashSet<(usize, u32)>,
-    /// The flows that had a content lately, with the times.
+    /// The flows that had a content recently, with the times.
     recent: HashMap<u32, Vec<(Stamp, usize)>>,
     queue: VecDeque<(Stamp, u32)>,
 }
@@ -256,8 +257,8 @@ impl PayloadWalk {
     }
 }
 
-/// The flows of the same type by others that had enough of an output's messages first. Where neither clearly was the
-/// first, a complete list of the other's topics decides.
+/// The flows of the same type by other nodes that had enough of an output's messages first. If neither was
+/// clearly first, a complete list of the other's topics decides.
 fn inputs(
     known: &mut Conclusions<'_>,
     flows: &[PayloadFlow],
@@ -299,8 +300,8 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
     all.sum::<u64>().min(matches.distinct[&output])
 }
 
-/// The nearer of two inputs that have the same messages, which lie on one path: the one with clearly less spread of
-/// lag; neither if that is not clear.
+/// The nearer of two inputs with the same messages, which are on one path: the one whose lag clearly varies
+/// less; neither if that is not clear.
 fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let pair = |input: usize| matches.pairs[&(input, output)];
     let together = |a: usize, b: usize| -> u64 {
@@ -365,7 +366,7 @@ mod tests {
 
     #[test]
     fn in_a_chain_the_last_link_but_one_is_the_input() {
-        // 0 → 1 with a wild lag, 1 → 2 with a steady one.
+        // 0 → 1 with a variable lag, 1 → 2 with a steady one.
         let messages: Vec<_> = (0..40_u32)
             .flat_map(|n| {
                 let (at, wild) = (i64::from(n) * 100, i64::from(n * 7 % 40));

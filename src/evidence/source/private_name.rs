@@ -1,5 +1,5 @@
-//! Private names: a topic below a node's own full name belongs to the node, so it publishes it where no other publisher
-//! is known.
+//! Private names: a topic below a node's own full name belongs to the node, so it publishes it if no other
+//! publisher is known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -40,7 +40,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if let Some(node) = owner(&name, &nodes, &spaces) {
             known.infer_publisher(source, node, topic, |known| {
                 format!(
-                    "{} lies below the name of {}",
+                    "{} is below the name of {}",
                     known.text(topic),
                     known.text(node)
                 )
@@ -70,7 +70,7 @@ fn above(name: &str) -> impl Iterator<Item = &str> {
         .filter(|space| !space.is_empty())
 }
 
-/// The node with the longest name that a topic lies below, unless that name is a namespace of other nodes too.
+/// The node with the longest name above a topic, unless that name is also a namespace of other nodes.
 fn owner(topic: &str, nodes: &NodesByName, spaces: &BTreeSet<&str>) -> Option<Name> {
     let name = above(topic).find(|name| nodes.contains_key(*name))?;
     nodes.get(name).copied().filter(|_| !spaces.contains(name))

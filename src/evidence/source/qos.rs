@@ -16,7 +16,7 @@ struct Offer {
     history: String,
 }
 
-/// The place among `known` of the first of these words in a quality of service.
+/// The index in `known` of the first of these words in a quality of service.
 pub(crate) fn policy(quality: Option<&str>, known: [&str; 2]) -> Option<usize> {
     let mut words = quality.unwrap_or_default().split([' ', ',']);
     words.find_map(|word| known.iter().position(|k| *k == word))
@@ -93,7 +93,7 @@ fn offers(text: &str) -> Vec<Offer> {
     }
 }
 
-/// One offer; values are words since rosbag2 version 9, numbers of rmw before.
+/// One offer; values are words since rosbag2 version 9, before that numbers of rmw.
 fn offer(value: &Value) -> Option<Offer> {
     let value = value.as_object()?;
     let word = |key, words: [&'static str; 5]| match value.get(key) {

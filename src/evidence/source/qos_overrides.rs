@@ -1,5 +1,5 @@
-//! `qos_overrides.<topic>.publisher|subscription.<policy>` in parameter events of ROS 2: rclcpp declares these
-//! parameters when it makes that publisher or subscription.
+//! `qos_overrides.<topic>.publisher|subscription.<policy>` in parameter events of ROS 2: rclcpp declares
+//! these parameters when it creates that publisher or subscription.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The topic in the name of a parameter, and whether a publisher is meant. An entity may carry an id of its own
+/// The topic in the name of a parameter, and whether a publisher is meant. An entity may have its own id
 /// (`publisher_front`).
 fn end(parameter: &str) -> Option<(&str, bool)> {
     let rest = parameter.strip_prefix("qos_overrides.")?;

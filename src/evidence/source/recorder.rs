@@ -1,4 +1,4 @@
-//! The recorder subscribes every recorded topic; views hide it unless asked.
+//! The recorder subscribes to every recorded topic; views hide it unless requested.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 /// The ends of the recorder's source paths: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
 
-/// Recognises a recorder by the file of its log records, whatever its name.
+/// Recognises a recorder by the source file in its log records, regardless of its name.
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,

@@ -1,8 +1,8 @@
 //! Snapshots of the graph of ROS 2: `/rosgraph` of graph-monitor, each message a whole graph, and `/nodl/observed_node`
 //! of nodl, each message one node.
 //!
-//! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message is parsed
-//! by the definition in the bag, or by the built-in one that it fits exactly.
+//! The definitions have moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`, twice), so a message
+//! is parsed by the definition in the bag, or by the built-in one that it matches exactly.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -36,8 +36,8 @@ pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout {
     ..SHAPE
 };
 
-/// The types that no form has changed, and those of the two forms of 2026, whose messages are in the order in which
-/// nodl and the core interfaces have them: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
+/// The types that are equal in all forms, and those of the two forms of 2026, in the order of nodl and of the
+/// core interfaces: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
 const COMMON: &[(&str, &str)] = &[
     ("InterfaceType", "string name;TypeHash hash"),
     ("TypeHash", "byte version;byte[32] value"),
@@ -141,7 +141,8 @@ pub(crate) fn read_node(
     Ok(())
 }
 
-/// A message of this type, by the definition in the bag or the first form that uses the payload up, best exactly.
+/// A message of this type, by the definition in the bag or the first form that consumes the payload,
+/// preferably exactly.
 fn parsed(
     context: &SourceContext<'_>,
     payload: &PayloadCursor<'_>,
@@ -163,8 +164,8 @@ fn parsed(
     let whole = all
         .iter()
         .find_map(|schema| schema.read(&mut payload.clone()).ok());
-    // Some serializers leave room for more than they wrote, such as that of `rmw_fastrtps` for messages that programs
-    // write to a bag themselves.
+    // Some serializers reserve more bytes than they write, such as that of `rmw_fastrtps` for messages that
+    // programs write to a bag themselves.
     let begun = || {
         let mut begun = all
             .iter()
@@ -174,7 +175,7 @@ fn parsed(
     whole.or_else(begun).ok_or(payload.wrong("a graph"))
 }
 
-/// Whether every node has a name as ROS has them, which random bytes do not have.
+/// Whether every node has a valid ROS name, unlike random bytes.
 fn is_sound(value: &MessageValue) -> bool {
     let nodes = match value.list("nodes") {
         [] => std::slice::from_ref(value),
@@ -222,7 +223,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             format!("{name} is in the graph{}", parameters(node))
         });
         if !seen.insert(name) {
-            let twice = || format!("{name} is twice in the graph");
+            let twice = || format!("{name} occurs twice in the graph");
             context.observation(Observation::Duplicate(id), Confidence::Stated, twice);
         }
         for (is_sent, topic, kind, qos) in ends(node) {
@@ -265,7 +266,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             let (topic, policy) = (context.name(&end.topic), context.name(policy));
             let observation = Observation::Starved(end.node, topic, policy);
             context.observation(observation, Confidence::Stated, || {
-                "no publisher offers what it asks for".to_owned()
+                "no publisher offers the requested quality of service".to_owned()
             });
         }
     }
@@ -276,11 +277,11 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
     );
 }
 
-/// An end in a message: whether it is sent, the topic, its type and its quality of service.
+/// An endpoint in a message: whether it publishes, the topic, its type and its quality of service.
 type MessageEnd<'a> = (bool, Cow<'a, str>, &'a str, Option<&'a MessageValue>);
 
-/// The ends of a node in the order of the message. A service is a topic that its clients write to and its server reads;
-/// of an action feedback and status are topics.
+/// The endpoints of a node in the order of the message. A service is a topic that its clients write to and
+/// its server reads; feedback and status of an action are topics.
 fn ends(node: &MessageValue) -> Vec<MessageEnd<'_>> {
     let mut all: Vec<MessageEnd<'_>> = Vec::new();
     for (field, is_sent) in [("publishers", true), ("subscriptions", false)] {
@@ -291,7 +292,7 @@ fn ends(node: &MessageValue) -> Vec<MessageEnd<'_>> {
         for service in node.list(field) {
             let kind = kind(service, "request_type");
             let kind = kind.strip_suffix("_Request").unwrap_or(kind);
-            // Every node has services of its parameters, which are no evidence about this one.
+            // Every node has parameter services, which are not evidence about this one.
             let package = kind.split('/').next().unwrap_or_default();
             if !["rcl_interfaces", "type_description_interfaces"].contains(&package) {
                 all.push((is_sent, service.text("name").into(), kind, None));
@@ -336,7 +337,7 @@ fn kind<'a>(end: &'a MessageValue, field: &str) -> &'a str {
     }
 }
 
-/// A quality of service in the words of recordings: `reliable volatile depth 10`; `None` where it is not known.
+/// A quality of service in the words of recordings: `reliable volatile depth 10`; `None` if unknown.
 fn quality(qos: &MessageValue) -> Option<String> {
     let word = |policy, words: [&'static str; 2]| match qos.field(policy) {
         Some(MessageValue::Byte(value @ 1..=2)) => Some(words[usize::from(*value) - 1]),
@@ -355,7 +356,7 @@ fn quality(qos: &MessageValue) -> Option<String> {
     Some(format!("{reliability} {durability}{history}"))
 }
 
-/// The parameters of a node in words, with the values that are not numbers with a fraction or lists.
+/// The parameters of a node as text, with their values except floating-point numbers and lists.
 fn parameters(node: &MessageValue) -> String {
     let values = node.list("parameter_values").iter().map(Some);
     let values = values.chain(std::iter::repeat(None));
@@ -387,8 +388,8 @@ fn parameters(node: &MessageValue) -> String {
     }
 }
 
-/// The policy because of which a subscriber receives nothing: it requests more than is offered (DDS 1.4, section 2.2.3). Policies
-/// that are not known fit.
+/// The policy because of which a subscriber receives nothing: it requests more than is offered (DDS 1.4,
+/// section 2.2.3). Unknown policies are compatible.
 fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static str> {
     let is =
         |qos: &MessageValue, policy, value| qos.field(policy) == Some(&MessageValue::Byte(value));

@@ -1,7 +1,7 @@
-//! Log records of ROS 1: a node is alive, and the topics it names as its own.
+//! Log records of ROS 1: a node is running, and the topics it names as its own.
 //!
-//! roscpp lists the topics that the node publishes, rospy also those it subscribes; a node is of rospy if any of its
-//! records comes from a file of Python.
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes to; a node uses rospy if
+//! any of its records comes from a Python file.
 
 use std::collections::BTreeSet;
 
@@ -87,8 +87,8 @@ fn is_rospy(file: &str) -> bool {
     }
 }
 
-/// Takes the list of topics in a log record of a node, with its text. It is whole: what is in an earlier one and not in
-/// this one is no longer the node's.
+/// Takes the list of topics in a log record of a node, with its text. The list is complete: topics in an
+/// earlier list and not in this one no longer belong to the node.
 fn list(context: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[&str]) {
     let node = context.name(name);
     let list = format!("topics of {}", context.facts.text(node));
@@ -161,8 +161,8 @@ fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
         && publishers.any(|p| role(&known.text(p)) == base)
 }
 
-/// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too.
-/// Used only where headers do not name all publishers.
+/// Whether a node that names `/tf` as its own publishes it rather than subscribes to it: a tf2 listener also
+/// names `/tf_static`. Used only if headers do not name all publishers.
 fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool {
     let stated = is_reported(known, topic);
     let text = known.text(topic);
@@ -181,8 +181,8 @@ fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool 
     !stated && !twin.is_some_and(names)
 }
 
-/// Every topic that a recorder of all topics has seen advertised; `None` without such a recorder. It goes on to
-/// subscribe long after its start; one that was given names does not.
+/// Every topic that a recorder of all topics has seen advertised; `None` without such a recorder. It
+/// continues to subscribe long after its start, unlike one that was given topic names.
 fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
     let mut seen: Option<(Stamp, Stamp)> = None;
@@ -199,7 +199,7 @@ fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     all.then_some(topics)
 }
 
-/// The time within which a recorder subscribes the topics that it was given by name, in nanoseconds.
+/// The time within which a recorder subscribes to the topics given by name, in nanoseconds.
 const LATE_NS: i64 = 5_000_000_000;
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Log records of ROS 2: a node is alive. Dots represent slashes; the loggers of a node's parts count as the node.
+//! Log records of ROS 2: a node is running. Dots represent slashes; the loggers of a node's parts count as
+//! the node.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes it and publishes
-//! `/rosout_agg`.
+//! Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes to it and
+//! publishes `/rosout_agg`.
 
 use crate::bag::Encoding;
 use crate::base::name::in_space;
@@ -14,7 +14,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     if !ros1 || known.nodes().is_empty() {
         return;
     }
-    // Recordings in namespaces have a master each.
+    // Each recording in a namespace has its own master.
     for space in known.facts.spaces.clone() {
         add(source, known, &space);
     }

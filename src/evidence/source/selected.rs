@@ -33,7 +33,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// What a node publishes besides its reports and its log.
+/// The topics that a node publishes besides its reports and its log.
 fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
     let own = known.publications().filter(|(of, _)| *of == node);
     let topics = own.map(|(_, topic)| topic);
@@ -41,7 +41,8 @@ fn outputs(known: &Conclusions<'_>, node: Name) -> Vec<Name> {
     topics.filter(is_recorded).collect()
 }
 
-/// Adds the inputs of a mux that have the type of its output, and the times at which it turns from one to another.
+/// Adds the inputs of a mux that have the type of its output, and the times at which it switches from one to
+/// another.
 fn select(
     source: SourceId,
     known: &mut Conclusions<'_>,
@@ -60,7 +61,7 @@ fn select(
         let what = ElementKey::Subscribe(*input, node);
         known.infer(source, what, ElementKey::Publish(node, output), |known| {
             format!(
-                "{} reports that it passes on {}",
+                "{} reports that it forwards {}",
                 known.text(node),
                 known.text(*input)
             )

@@ -1,5 +1,5 @@
-//! Service introspection (`<service>/_service_event`): requests and replies of a service, and its client and its server
-//! where the recorder names publishers.
+//! Service introspection (`<service>/_service_event`): requests and replies of a service, and its client and
+//! its server if the recorder names publishers.
 
 use super::SourceContext;
 use crate::bag::Encoding;

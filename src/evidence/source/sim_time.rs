@@ -24,7 +24,7 @@ pub(crate) fn read(
         let then = if simulated {
             ""
         } else {
-            ", so it does not subscribe /clock"
+            ", so it does not subscribe to /clock"
         };
         format!("{} sets use_sim_time to {simulated}{then}", event.node)
     });

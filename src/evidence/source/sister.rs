@@ -1,5 +1,5 @@
-//! Sister namespaces: if a node's twin in another namespace publishes the same topics there and is known to subscribe
-//! one, the node subscribes it too.
+//! Sister namespaces: if a node's twin in another namespace publishes the same topics there and is known to
+//! subscribe to one, the node subscribes to it too.
 
 use std::collections::{BTreeMap, BTreeSet};
 

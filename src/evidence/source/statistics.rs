@@ -50,7 +50,7 @@ pub(crate) fn read(
         drops: count(dropped),
         bytes: count(traffic),
         jitter_ns: Some(jitter).filter(|_| period > 0),
-        // Of messages without a header there is no age.
+        // Messages without a header have no age.
         age_ns: Some(age).filter(|_| oldest != 0),
     });
     if !publisher.is_empty() {

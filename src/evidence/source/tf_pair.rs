@@ -1,4 +1,4 @@
-//! A listener of `/tf` is a listener of `/tf_static`, and the other way round: tf2 always subscribes both.
+//! A subscriber of `/tf` also subscribes to `/tf_static`, and vice versa: tf2 always subscribes to both.
 
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::observation::{Name, SourceId};

@@ -27,7 +27,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 
 /// The kind of statistic that a publisher measures; all others are a subscriber's.
 const PUBLISHED_PERIOD: u8 = 0;
-/// The kind that is the time from publishing to taking.
+/// The kind for the time from publishing to receiving.
 const AGE: u8 = 2;
 
 pub(crate) fn read(
@@ -65,7 +65,7 @@ pub(crate) fn read(
                 age_ns: Some(mean),
             });
         }
-        // A statistic over no messages only proves that the endpoint exists.
+        // A statistic over no messages only shows that the endpoint exists.
         let confidence = if count > 0 {
             Confidence::Measured
         } else {

@@ -19,7 +19,7 @@ pub(super) fn encode(run: &[(Stamp, u32)]) -> Vec<u8> {
     bytes
 }
 
-/// Reads `count` stamps back; sizes are 0 where none were written.
+/// Reads `count` stamps back; sizes are 0 if none were written.
 pub(super) fn decode(bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
     let mut at = 0;
     let mut before = 0_i64;

@@ -8,28 +8,29 @@ use std::io;
 use super::{SeriesId, StampBlock, Stamps};
 use crate::base::time::Stamp;
 
-/// One time out of several sequences.
+/// One time from one of several sequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Timed {
     /// The time.
     pub time: Stamp,
-    /// The place of the sequence among those asked for.
+    /// The index of the sequence among the requested ones.
     pub series: usize,
-    /// The payload's bytes; 0 where not known ([`Stamps::sized`]).
+    /// The payload's bytes; 0 if unknown ([`Stamps::sized`]).
     pub size: u32,
 }
 
-/// The next stamp of a block being read, in the order in which they are passed on. Small, since each step moves some.
+/// The next stamp of a block being read, in the order in which they are passed on. Small, since each step
+/// moves several.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Next {
     time: Stamp,
     series: usize,
     size: u32,
-    /// The place of its block among those being read.
+    /// The index of its block among those being read.
     block: u32,
 }
 
-/// The blocks being read, and the places of those that were read to their ends.
+/// The blocks being read, and the free slots of those that were read completely.
 #[derive(Default)]
 struct OpenBlocks {
     runs: Vec<std::vec::IntoIter<(Stamp, u32)>>,
@@ -38,7 +39,7 @@ struct OpenBlocks {
 }
 
 impl Stamps {
-    /// Passes all times of some sequences to `each`, sorted by (time, place of the sequence, size).
+    /// Passes all times of some sequences to `each`, sorted by (time, index of the sequence, size).
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
@@ -60,7 +61,7 @@ impl Stamps {
         }
     }
 
-    /// The blocks of these sequences with the places of the sequences, the earliest last.
+    /// The blocks of these sequences with the indices of the sequences, the earliest last.
     fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, StampBlock)> {
         let of = |id: &SeriesId| self.get(*id).map_or(&[][..], |s| &s.blocks);
         let mut all: Vec<_> = ids
@@ -93,7 +94,7 @@ impl OpenBlocks {
         }));
     }
 
-    /// Passes on stamps as long as no block that waits comes before them.
+    /// Passes on stamps until a waiting block begins before them.
     fn drain(&mut self, waiting: Option<Stamp>, each: &mut impl FnMut(Timed)) {
         while let Some(mut top) = self.heap.peek_mut() {
             let next = &mut top.0;

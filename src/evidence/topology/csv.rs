@@ -30,7 +30,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         let (line, row) = row?;
         if topology.entries.len() > TOPOLOGY_ENTRIES {
             let reason = format!("more than {TOPOLOGY_ENTRIES} nodes and edges");
-            return Err(bad(path, line, reason, "leave out what is not in the bag"));
+            return Err(bad(
+                path,
+                line,
+                reason,
+                "leave out elements that are not in the bag",
+            ));
         }
         let [name, publish, subscribe, start, end] =
             columns.map(|at| at.and_then(|at| row.get(at)).map_or("", |cell| cell.trim()));
@@ -48,7 +53,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         {
             return Err(wrong(
                 line,
-                format!("the end {end} lies before the start {start}"),
+                format!("the end {end} is before the start {start}"),
             ));
         }
         let mut add = |element| {
@@ -73,7 +78,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
 }
 
 /// Seconds as nanoseconds; `Some(None)` for an empty cell.
-#[expect(clippy::option_option, reason = "an empty cell is no error")]
+#[expect(clippy::option_option, reason = "an empty cell is not an error")]
 fn seconds(cell: &str) -> Option<Option<i64>> {
     if ["", "nan", "None"].contains(&cell) {
         return Some(None);

@@ -30,10 +30,10 @@ enum Thing {
 type Attributes = BTreeMap<String, String>;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
-    let tokens =
-        tokens(text).map_err(|line| bad(path, line, "a string has no end".to_owned(), HINT))?;
+    let tokens = tokens(text)
+        .map_err(|line| bad(path, line, "a string is not terminated".to_owned(), HINT))?;
     if !tokens.iter().any(|t| t.text == "{") {
-        return Err(bad(path, 1, "it holds no graph".to_owned(), HINT));
+        return Err(bad(path, 1, "it contains no graph".to_owned(), HINT));
     }
     let (things, edges) = statements(&tokens);
     let mut topology = Topology::default();

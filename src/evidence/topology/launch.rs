@@ -59,7 +59,7 @@ impl LaunchedNode {
         }
     }
 
-    /// The full name of a topic of its program after its remaps; of `in/compressed`, `in` may be remapped.
+    /// The full name of a topic of its program after its remaps; for `in/compressed`, `in` may be remapped.
     fn resolved(&self, node: &str, topic: &str) -> String {
         let remapped = self.remaps.iter().rev().find_map(|(from, to)| {
             let rest = topic.strip_prefix(from.as_str())?;
@@ -95,7 +95,7 @@ pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     reader.stack.extend(path.canonicalize().ok());
     reader.inside(path, tree, &mut Scope::default())?;
     if reader.budget.is_spent {
-        let what = "it repeats or includes itself too often; what goes beyond is left out";
+        let what = "it repeats or includes itself too often; the excess is left out";
         reader.topology.notices.push(unused(path, 0, what));
     }
     Ok(reader.topology)
@@ -112,7 +112,7 @@ pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
 struct Launch {
     undecided: Undecided,
     budget: LaunchWork,
-    /// The files that are being read, each included by the one before.
+    /// The files that are being read, each included by the previous one.
     stack: Vec<PathBuf>,
     nested: usize,
     topology: Topology,
@@ -139,7 +139,7 @@ impl Launch {
     /// Reads the children of an element in order; their changes apply to those after them.
     fn inside(&mut self, path: &Path, tree: &Tree, scope: &mut Scope) -> Result<()> {
         if self.nested > NESTED {
-            self.left_out(path, tree, "it nests too deep");
+            self.left_out(path, tree, "it is nested too deeply");
             return Ok(());
         }
         self.nested += 1;
@@ -212,7 +212,7 @@ impl Launch {
                 Some(text) if is_true(&text) == wanted => {}
                 Some(_) => return false,
                 None => {
-                    self.left_out(path, tree, "its condition is only decided when it runs");
+                    self.left_out(path, tree, "its condition is only known at run time");
                     return false;
                 }
             }
@@ -335,7 +335,7 @@ impl Launch {
         }
         let space = self.value(path, tree, scope, "ns").unwrap_or_default();
         let Some(file) = self.value(path, tree, scope, "file") else {
-            self.left_out(path, tree, "the included file is only known when it runs");
+            self.left_out(path, tree, "the included file is only known at run time");
             return Ok(());
         };
         let Some(found) = located(path, &file) else {

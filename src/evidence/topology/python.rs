@@ -28,7 +28,7 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
         return Err(bad(
             path,
             0,
-            "it is too tangled to be read".to_owned(),
+            "it is too complex to be read".to_owned(),
             HINT,
         ));
     };

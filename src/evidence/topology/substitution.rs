@@ -9,7 +9,7 @@ use crate::base::budget::LaunchWork;
 /// The longest text after substitution, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
 
-/// Replaces the part of an anonymous name that is new in every run; it occurs in no name.
+/// Replaces the part of an anonymous name that differs from run to run; it occurs in no name.
 pub(crate) const ANONYMOUS: char = '*';
 
 /// The deepest nesting of substitutions; deeper ones are hostile.
@@ -91,7 +91,7 @@ impl SubstitutionContext<'_> {
     }
 }
 
-/// Whether the text of a condition is true, as ROS 1 and ROS 2 read it.
+/// Whether the text of a condition is true, as in ROS 1 and ROS 2.
 pub(super) fn is_true(text: &str) -> bool {
     ["true", "1", "yes", "on"].contains(&&*text.trim().to_lowercase())
 }

@@ -72,7 +72,7 @@ impl XmlLaunch<'_> {
 
     fn element(&self, node: Node<'_, '_>, depth: usize) -> Result<Tree> {
         if depth >= DEEPEST {
-            return Err(self.wrong(node, format!("elements nest deeper than {DEEPEST}")));
+            return Err(self.wrong(node, format!("elements are nested deeper than {DEEPEST}")));
         }
         let inside = node.children().filter(Node::is_element);
         Ok(Tree {

@@ -28,7 +28,7 @@ enum EndKind {
     Asks,
 }
 
-/// The keys of lists of ends, in our format and in those of other tools.
+/// The keys of lists of endpoints, in our format and in those of other tools.
 const ENDS: [(&str, EndKind); 11] = [
     ("publishes", EndKind::Publishes),
     ("publishers", EndKind::Publishes),
@@ -132,7 +132,7 @@ impl<'a> TopologyYaml<'a> {
         if let (Some(from), Some(to)) = (from_ns, to_ns)
             && to < from
         {
-            let reason = format!("the end of `{name}` lies before its start");
+            let reason = format!("the end of `{name}` is before its start");
             return Err(self.wrong(name, &reason));
         }
         let mut entries = self.node_of_others(name, value)?;
@@ -142,7 +142,7 @@ impl<'a> TopologyYaml<'a> {
         Ok(entries)
     }
 
-    /// A node with its ends; other keys are ignored.
+    /// A node with its endpoints; other keys are ignored.
     fn node_of_others(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
         let node = resolved(name);
         let entry = |element| TopologyEntry {

@@ -50,7 +50,7 @@ struct PageData<'a> {
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
     rows: Vec<RowData>,
-    /// Hand-overs: the time, the old row, the new row, and the event's index in the log.
+    /// Takeovers: the time, the old row, the new row, and the event's index in the log.
     hands: Vec<(f64, usize, usize, EventId)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
@@ -87,9 +87,10 @@ struct GraphData<'a> {
     holds: Vec<Vec<u32>>,
 }
 
-/// The headlines of a window, and what is back in it: its place, the number of headlines, the words of the three chips,
-/// and for each of the first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1
-/// for one that is not drawn), its words, its place in the log.
+/// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the
+/// texts of the three badges, and for each of the first [`MOST_TOLD`] headlines its time, its sign (0
+/// appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn), its text, its index in the
+/// log.
 #[derive(Serialize)]
 struct ToldData(
     usize,
@@ -98,9 +99,9 @@ struct ToldData(
     Vec<(f64, u8, i64, String, EventId)>,
 );
 
-/// A lifeline: its element (-1 for a namespace's title), its name, 1 below such a title, its lifetimes as `[start, end,
-/// 1 by inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as
-/// their times, signs and places in the log.
+/// A lifeline: its element (-1 for a namespace's title), its name, 1 below such a title, its lifetimes as
+/// `[start, end, 1 by inference only, …]`, its times of publishing as `[start, end, ninths of its highest
+/// rate, …]`, and its events as their times, signs and indices in the log.
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 

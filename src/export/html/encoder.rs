@@ -22,15 +22,15 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
     if drawn > MOST_DRAWN {
         return Err(Error::usage(
-            format!("a page of {drawn} boxes and arrows is too large; {MOST_DRAWN} are possible"),
-            "leave some out with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
+            format!("a page of {drawn} boxes and arrows is too large; the limit is {MOST_DRAWN}"),
+            "omit some with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
         ));
     }
     let style = Style::builtin(BUILTIN[0].0)?;
     one_text(target, move || page(sequence, graphs, &style))
 }
 
-/// A graph of the page: what it shows, and where that is drawn.
+/// A graph of the page: its view, and the drawing of that view.
 type DrawnGraph<'a> = (&'a View, UnionDrawings<'a>);
 
 /// The graph with all elements separately, and the picture's if it groups elements; none for a timeline of topics.

@@ -85,7 +85,7 @@ pub(super) fn timeline(lives: Option<&LifeLines>) -> String {
             !lives.handovers.is_empty(),
             "hand",
             "M18 3V17m-3 -4l3 4l3 -4",
-            "changes hands",
+            "handed over",
         ),
     ];
     let mut out = String::new();

@@ -20,7 +20,7 @@ fn has_headlines(frame: &Frame) -> bool {
 pub(super) fn summary(view: &View) -> String {
     let all = view.frames.len();
     if view.compares {
-        return "What is not the same:".to_owned();
+        return "Differences:".to_owned();
     }
     match view.frames.iter().filter(|f| has_headlines(f)).count() {
         0 => format!("None in {all} windows."),

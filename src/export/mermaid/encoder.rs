@@ -29,7 +29,7 @@ fn too_large(target: &Target, seen: &SeenWindow, text: &str) -> Option<String> {
     let (edges, bytes) = (seen.arrows.len(), text.len());
     (edges > MOST.0 || bytes > MOST.1).then(|| {
         format!(
-            "`{}` has {edges} edges in {bytes} characters: Mermaid draws at most {} in {}; hide or collapse something",
+            "`{}` has {edges} edges in {bytes} characters: Mermaid draws at most {} in {}; hide or collapse some elements",
             target.path().display(),
             MOST.0,
             MOST.1

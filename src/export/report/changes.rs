@@ -25,7 +25,7 @@ pub(super) fn phases(mission: &Mission, times: &ReportTimes<'_>) -> String {
         let long = words::duration(phase.span.nanos());
         format!("| {n} | {from} | {long} | {} |\n", plain(&phase.name))
     });
-    let table = tables::table(&["Phase", "From", "For", "What it is"], rows, MOST_CHANGES);
+    let table = tables::table(&["Phase", "From", "For", "Name"], rows, MOST_CHANGES);
     let summary = words::count(phases.len(), "phase");
     table.map_or(String::new(), |table| tables::folded(&summary, &table))
 }
@@ -40,7 +40,7 @@ pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> 
     let rows: Vec<String> = rows.collect();
     let (open, rest) = rows.split_at(rows.len().min(MOST_OPEN));
     let table = |rows: &[String]| {
-        let heads = ["Window", "What changed in it"];
+        let heads = ["Window", "Changes"];
         tables::table(&heads, rows.iter().cloned(), MOST_CHANGES / 2)
     };
     let mut out = table(open).map_or(String::new(), |table| table + "\n");

@@ -9,9 +9,9 @@ const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
 
-/// Every element that changed during the mission with its neighbours, as one window, and the number of edges left out;
-/// `None` without changes. An element is marked as added or removed if it exists only at the end or only at the start,
-/// else as changed if it ever was.
+/// Every element that changed during the mission with its neighbours, as one window, and the number of edges
+/// left out; `None` without changes. An element is marked as added or removed if it exists only at the end or
+/// only at the start, else as changed if it ever changed.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
     let items = ends(&view.items_shown, last);

@@ -47,7 +47,7 @@ pub(super) fn folded(summary: &str, inside: &str) -> String {
     )
 }
 
-/// The number of windows in which each element was, and the sum of its rates there.
+/// The number of windows that contain each element, and the sum of its rates in them.
 #[derive(Clone, Copy, Default)]
 struct WindowsOf {
     windows: usize,
@@ -196,5 +196,5 @@ pub(super) fn evidence(mission: &Mission) -> String {
             plain(&bag.format)
         );
     }
-    folded("How well it is known", &out)
+    folded("Strength of the evidence", &out)
 }

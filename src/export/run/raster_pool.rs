@@ -55,7 +55,7 @@ pub(crate) struct RasterPool<'a> {
 }
 
 impl<'a> RasterPool<'a> {
-    /// The cores for these frames, with their palette.
+    /// The drawing threads for these frames, with their palette.
     pub(crate) fn new(
         sequence: &'a Sequence<'a>,
         frame_times: &'a [FrameTime],

@@ -36,9 +36,8 @@ pub(crate) fn fit(
     let most = sequence.options.max_bytes.unwrap_or(0);
     Err(Error::Output {
         path: output.target.path().to_owned(),
-        reason: format!("it does not fit into {most} bytes, even small and with changes only"),
-        hint: "allow more with `--max-bytes`, or show less: a longer `--period`, `--ns-filter`"
-            .to_owned(),
+        reason: format!("it does not fit in {most} bytes, even small and with changes only"),
+        hint: "raise `--max-bytes`, or show less: a longer `--period`, `--ns-filter`".to_owned(),
     })
 }
 
@@ -85,7 +84,7 @@ fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
         words.push("showed only the windows with a change".to_owned());
     } else if now.every > asked.every {
         words.push(format!(
-            "showed every {} windows one, and all with a change",
+            "showed one of every {} windows, and all with a change",
             now.every
         ));
     }

@@ -46,7 +46,7 @@ impl Folder {
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let mut missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         missing.reverse();
-        fs::create_dir_all(path).map_err(Error::io("make the folder", path))?;
+        fs::create_dir_all(path).map_err(Error::io("create the folder", path))?;
         let mut builder = tempfile::Builder::new();
         let hidden = builder
             .prefix(".bagreel-")

@@ -112,10 +112,7 @@ impl<W: Write + Send> Writer<W> {
     /// Writes the rows in memory.
     #[cfg_attr(
         not(feature = "parquet"),
-        expect(
-            clippy::unnecessary_wraps,
-            reason = "a CSV table holds nothing that could fail"
-        )
+        expect(clippy::unnecessary_wraps, reason = "nothing in a CSV table can fail")
     )]
     pub(crate) fn unload(&mut self) -> io::Result<()> {
         match self {

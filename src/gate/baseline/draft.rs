@@ -21,9 +21,9 @@ const MEAN_SHARE: f64 = 0.15;
 const FEWEST_OF_MEAN: u64 = 40;
 /// The allowed silence, as a multiple of the longest in the runs.
 const GAPS: i64 = 2;
-/// In addition, this many usual intervals: one or two messages are lost now and then.
+/// This many usual intervals are added, since one or two messages are lost now and then.
 const INTERVALS: i64 = 4;
-/// In addition, a rate may differ by this multiple of the spread between windows.
+/// A rate may also differ by this multiple of the spread between windows.
 const SPREADS: f64 = 3.0;
 
 const SECOND: i64 = 1_000_000_000;
@@ -65,7 +65,7 @@ impl Line {
     }
 }
 
-/// The value of a key that is there or not.
+/// The value of an optional key.
 fn flag(is_set: bool, word: &str) -> Option<String> {
     is_set.then(|| word.to_owned())
 }
@@ -287,7 +287,7 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
         ("optional", flag(is_optional, "true")),
     ]);
     if hz.is_none() && mean_hz.is_none() && !is_latched {
-        line.comment = format!("  # {}: not judged", unjudged(seen, &rates.concat()));
+        line.comment = format!("  # {}: not checked", unjudged(seen, &rates.concat()));
     }
     line
 }

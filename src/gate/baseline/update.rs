@@ -1,4 +1,4 @@
-//! Updates an expectation: rewrites facts that no longer hold and keeps every other character.
+//! Updates an expectation: rewrites facts that are no longer true and keeps every other character.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,7 +15,8 @@ use crate::gate::pattern::Pattern;
 use crate::gate::{Expectation, judge, read};
 use crate::mission::Mission;
 
-/// The most facts that are rewritten: each requires parsing the whole file, and with more little of it would be left.
+/// The most facts that are rewritten: each requires parsing the whole file, and beyond that, little of the
+/// file would remain.
 const MOST: usize = 1000;
 
 /// An updated expectation.
@@ -68,7 +69,7 @@ pub(crate) fn update(
                 words::count(wanted.len(), "fact"),
                 path.display()
             ),
-            "write a new one: `bagreel baseline BAG -o graph.yaml`; or bring it up to date by `--only NAME`",
+            "generate a new one with `bagreel baseline BAG -o graph.yaml`, or update single names with `--only NAME`",
         ));
     }
     for (name, finding) in &wanted {

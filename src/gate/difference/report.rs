@@ -71,7 +71,7 @@ fn how(subject: &DiffSubject, difference: &Difference) -> String {
     let doubt = if difference.is_known {
         String::new()
     } else {
-        format!("; {other} cannot tell")
+        format!("; unknown in {other}")
     };
     format!("only in {in_one}{}{doubt}", value(what))
 }
@@ -168,7 +168,7 @@ fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
         let many = words::count(unknown.len(), "row");
         let _ = writeln!(
             out,
-            "<details><summary>{many} that one of them cannot tell</summary>\n"
+            "<details><summary>{many} unknown in one of them</summary>\n"
         );
         table(subject, &unknown, &mut out);
         out.push_str("</details>\n");

@@ -46,7 +46,7 @@ impl<'a> Document<'a> {
         self.bad(
             at,
             format!("unknown {what} `{word}`{near}"),
-            format!("it is one of {}", all.join(", ")),
+            format!("expected one of {}", all.join(", ")),
         )
     }
 
@@ -84,7 +84,11 @@ impl<'a> Document<'a> {
     pub(super) fn text(self, part: &'a YamlPart, what: &str) -> Result<&'a str> {
         match &part.data {
             YamlData::Scalar(text) if !text.is_empty() => Ok(text),
-            _ => Err(self.bad(part.at, format!("{what} is not a text"), "write one value")),
+            _ => Err(self.bad(
+                part.at,
+                format!("{what} is not a string"),
+                "write one value",
+            )),
         }
     }
 
@@ -152,7 +156,7 @@ impl<'a> Fields<'a> {
         let text = self.document.text(part, &format!("`{key}`"))?;
         let wrong = || {
             self.document
-                .bad(part.at, format!("`{key}: {text}` makes no sense"), hint)
+                .bad(part.at, format!("`{key}: {text}` is not valid"), hint)
         };
         let value = parse(text).ok_or_else(wrong)?;
         Ok(Some(At { at: part.at, value }))
@@ -194,7 +198,7 @@ impl<'a> Fields<'a> {
             "false" => Some(None),
             text => During::parse(text).map(Some),
         };
-        let hint = "write `true`, or from when on: `1:30..`, `-20s..`";
+        let hint = "write `true`, or the time from which it may end: `1:30..`, `-20s..`";
         let found = self.read("may_end", hint, parse)?;
         Ok(found.and_then(|At { at, value }| Some(At { at, value: value? })))
     }
@@ -203,7 +207,7 @@ impl<'a> Fields<'a> {
     pub(super) fn within(&self) -> Result<Option<At<During>>> {
         if let Some(length) = self.length("present_within")? {
             if self.get("within").is_some() {
-                let reason = "`present_within` does not go with `within`";
+                let reason = "`present_within` cannot be combined with `within`";
                 let hint = "`present_within: 20s` means `within: ..20s`";
                 return Err(self.document.bad(length.at, reason, hint));
             }

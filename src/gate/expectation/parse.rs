@@ -47,7 +47,11 @@ pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
             line: bad.line,
             column: bad.column,
         };
-        document.bad(at, bad.reason, "it is YAML: `name: {key: value}`")
+        document.bad(
+            at,
+            bad.reason,
+            "the file must be YAML: `name: {key: value}`",
+        )
     })?;
     let fields = document.fields(&whole, "the file", FILE)?;
     let hint = format!("the first line must be `schema: {SCHEMA}`");
@@ -186,7 +190,7 @@ fn rules(file: &Fields<'_>) -> Result<Vec<Rule>> {
     let rules = each(file, "rules", rule)?;
     for (at, rule) in rules.iter().enumerate() {
         if rules[..at].iter().any(|other| other.id == rule.id) {
-            let reason = format!("a second rule is called `{}`", rule.id);
+            let reason = format!("two rules have the id `{}`", rule.id);
             return Err(file.document.bad(rule.at, reason, "give it another `id`"));
         }
     }
@@ -204,8 +208,8 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
     };
     let together = with.replace(' ', ", ");
     if let Some((key, at)) = fields.other(&format!("id {form} {with}")) {
-        let reason = format!("`{key}` does not go with `{form}`");
-        let hint = format!("with it go {together}");
+        let reason = format!("`{key}` cannot be combined with `{form}`");
+        let hint = format!("it can be combined with {together}");
         return Err(document.bad(at, reason, hint));
     }
     let demand = demand(&fields, form)?;
@@ -223,7 +227,7 @@ fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
         Demand::Reaction { .. } | Demand::Changes { .. } => false,
     };
     if is_empty {
-        let hint = format!("with `{form}` go {together}");
+        let hint = format!("`{form}` can be combined with {together}");
         return Err(document.bad(part.at, format!("the rule `{id}` has no condition"), hint));
     }
     Ok(Rule {
@@ -314,7 +318,11 @@ fn event(rule: &Fields<'_>, key: &str) -> Result<ExpectedEvent> {
     let has_ends = matches!(kind, EventKind::HandedOver | EventKind::Lifecycle);
     if !has_ends && let Some(end) = ends.0.as_ref().or(ends.1.as_ref()) {
         let reason = format!("`{}` has no `from` and no `to`", kind.word());
-        return Err(document.bad(end.at, reason, "only `handed_over` and `lifecycle` have"));
+        return Err(document.bad(
+            end.at,
+            reason,
+            "only `handed_over` and `lifecycle` have one",
+        ));
     }
     Ok(ExpectedEvent {
         kind: *kind,
@@ -408,7 +416,7 @@ mod tests {
             ),
             (
                 "topics:\n  /s: {hz: 5}",
-                "line 3, column 12: `hz: 5` makes no sense",
+                "line 3, column 12: `hz: 5` is not valid",
             ),
             ("nodes: [/a]", "line 2, column 8: `nodes` is not a mapping"),
             ("nodes:\n  /a: {}\n  /a: {}", "line 4"),
@@ -417,11 +425,11 @@ mod tests {
             ("rules:\n  - {id: x, node: /a}", "has no condition"),
             (
                 "rules:\n  - {id: x, node: /a, hz: 5..}",
-                "`hz` does not go with `node`",
+                "`hz` cannot be combined with `node`",
             ),
             (
                 "rules:\n  - {id: x, changes: ..0}\n  - {id: x, changes: ..0}",
-                "a second rule is called `x`",
+                "two rules have the id `x`",
             ),
             (
                 "rules:\n  - {id: x, when: {removed: /a, to: /b}, expect: {added: /b}, within: 1}",
@@ -437,7 +445,7 @@ mod tests {
             ),
             (
                 "policy: {unexpected_nodes: deny}",
-                "`unexpected_nodes: deny` makes no sense",
+                "`unexpected_nodes: deny` is not valid",
             ),
         ];
         for (text, says) in table {

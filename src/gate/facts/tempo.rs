@@ -39,7 +39,7 @@ impl Rate {
         self.count.saturating_sub(1) as f64 / self.seconds()
     }
 
-    /// Whether messages are evenly spaced, by the median in each of these windows.
+    /// Whether messages are evenly spaced, judged by the median interval in each of these windows.
     pub(crate) fn are_even(rates: &[Self]) -> bool {
         let share = |rate: &Self| Some(rate.median_s? * rate.hz());
         let mut shares = rates.iter().filter_map(share).peekable();
@@ -124,7 +124,7 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The part of a window in which a topic with messages in `heard` counts; `None` if it is too short.
+    /// The part of a window in which a topic with messages in `received` counts; `None` if it is too short.
     fn counted(&self, window: Span, heard: Span, may_end: bool) -> Option<Span> {
         let whole = self.mission.span;
         let mut span = window;
@@ -166,7 +166,7 @@ impl<'a> Facts<'a> {
         let whole = self.mission.span;
         if let (Some(heard), false) = (self.heard(topic), may_end) {
             let span = Span::new(heard.end.plus(-1), whole.end);
-            // Unless it ends with the robot's shutdown.
+            // An end at the robot's shutdown is not a silence.
             if span.nanos() > CLOSING_NS {
                 all.extend(clipped(span, during));
             }

@@ -45,7 +45,7 @@ fn forgive(checks: &mut [Checked], allowance: &AllowedFinding, start: Stamp) -> 
         if let Some(until) = over {
             let at = allowance.at.line;
             let day = words::date_and_clock(until.value.0);
-            let text = format!("the allowance in line {at} held for bags before {day}");
+            let text = format!("the allowance in line {at} applied to bags before {day}");
             finding.details.push(text);
             continue;
         }

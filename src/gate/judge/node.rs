@@ -15,7 +15,7 @@ use crate::mission::event_log;
 /// The roles that a name matches.
 type Roles<'a> = [(&'a str, &'a [NodeId])];
 
-/// The times in which something may end, unless it may at any time.
+/// The times in which an element may end; `None` for any time.
 pub(super) fn limited(may_end: Option<&At<During>>) -> Option<&At<During>> {
     may_end.filter(|may_end| may_end.value != During::WHOLE)
 }
@@ -91,8 +91,9 @@ impl Judge<'_> {
             return match (facts.optional, self.names_nodes) {
                 (true, _) => Vec::new(),
                 (false, _) if facts.is_logged => {
-                    let says =
-                        format!("cannot tell whether {name} is there: only its log would show it");
+                    let says = format!(
+                        "cannot tell whether {name} is present: only its log would show it"
+                    );
                     vec![Finding::unknown(FindingKind::NodeMissing, name, at, says)]
                 }
                 (false, true) => vec![self.missing(pattern, at)],
@@ -129,7 +130,7 @@ impl Judge<'_> {
             .any(|(_, nodes)| self.facts.is_sure(nodes))
         {
             (
-                "this bag names few nodes, as if its recorder had started late",
+                "this bag names few nodes, probably because its recorder started late",
                 "record /parameter_events from before the nodes start, or /rosgraph",
             )
         } else {
@@ -138,7 +139,7 @@ impl Judge<'_> {
                 "record /rosout and /parameter_events, or /rosgraph; see `bagreel info`",
             )
         };
-        let says = format!("cannot tell whether {name} is there: {why}");
+        let says = format!("cannot tell whether {name} is present: {why}");
         Finding::unknown(kind, name, at, says).hint(hint)
     }
 

@@ -143,9 +143,9 @@ impl Judge<'_> {
             return Vec::new();
         }
         let name = self.facts.topic(topic);
-        let says = format!("cannot tell the rate of {name}: no whole window of it can be judged");
+        let says = format!("cannot tell the rate of {name}: it has no whole window to check");
         let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, says);
-        vec![finding.hint("take a shorter period: `period: 5s`, or `--period 5`")]
+        vec![finding.hint("use a shorter period: `period: 5s`, or `--period 5`")]
     }
 
     /// The windows in which a topic is checked.
@@ -188,7 +188,7 @@ impl Judge<'_> {
         holds
     }
 
-    /// The finding for the windows in which a rate was off.
+    /// The finding for the windows in which a rate was out of range.
     fn off(
         &self,
         topic: TopicId,

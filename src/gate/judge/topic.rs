@@ -149,7 +149,7 @@ impl Judge<'_> {
         }]
     }
 
-    /// Whether a topic must have messages: facts require them, and their time is checked.
+    /// Whether a topic must have messages, because its facts require them and times are checked.
     pub(super) fn is_owed(&self, facts: &TopicFacts) -> bool {
         facts.wants_messages() && !facts.optional && !self.is_part
     }
@@ -222,7 +222,7 @@ impl Judge<'_> {
                 continue;
             }
             let role = self.facts.role(*node);
-            let says = format!("{name} also from {role}, expected only {expected}");
+            let says = format!("{name} is also published by {role}, expected only {expected}");
             let mut finding = Finding::new(FindingKind::PublisherUnexpected, name, by.at, says)
                 .saw(role, &expected);
             finding.severity = severity;
@@ -260,7 +260,7 @@ impl Judge<'_> {
         } else {
             words::some_of(&roles, NAMED)
         };
-        let says = format!("{who} does not publish {name}, which comes from {seen}");
+        let says = format!("{who} does not publish {name}, which is published by {seen}");
         let mut finding = Finding::new(kind, name, wanted.at, says).saw(seen, who);
         if self.facts.nodes(&wanted.value).is_empty() {
             finding.cause = Some(absence(who));
@@ -296,7 +296,7 @@ impl Judge<'_> {
         let is_absent = roles.is_empty() && self.names_nodes;
         if !is_absent && !self.facts.tells_subscribers(&nodes) {
             let says = format!(
-                "cannot tell whether {who} reads {name}: this bag has no evidence of subscribers"
+                "cannot tell whether {who} subscribes to {name}: this bag has no evidence of subscribers"
             );
             let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
             return Some(Finding::unknown(kind, name, wanted.at, says).hint(hint));

@@ -61,7 +61,7 @@ fn case(xml: &mut Xml, subject: &Subject<'_>, check: &Checked) {
             .attribute("message", &first.says)
             .close_empty();
     } else if check.judgement() == Judgement::Moot {
-        let message = "what it is about is not in the bag";
+        let message = "its subject is not in the bag";
         xml.open("skipped")
             .attribute("message", message)
             .close_empty();

@@ -30,7 +30,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     };
     let broken = of_severity(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
-    // The worst first, then those with most consequences.
+    // The most severe first, then those with the most consequences.
     let mut groups = grouped(&broken);
     groups.sort_by_key(|(_, group)| (group.first().map(|f| f.severity), Reverse(group.len())));
     causes(&groups, &mut out);
@@ -77,7 +77,7 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         0 => String::new(),
         unknown => format!("{unknown} unknown"),
     };
-    let mut parts = vec![verdict.broken(), unknown, format!("{kept} kept")];
+    let mut parts = vec![verdict.broken(), unknown, format!("{kept} passed")];
     parts.retain(|words| !words.is_empty());
     format!(
         "### {sign} Graph check: {} · {} against {} · {} in windows of {}",

@@ -20,7 +20,7 @@ const LONGEST: usize = 80;
 /// A box: whether it is a topic, and its name.
 type MermaidBox<'a> = (bool, &'a str);
 
-/// The fate of a box.
+/// What happened to a box.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum BoxFate {
     Gone,

@@ -27,11 +27,11 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     out.replace("##[", "#\\#[")
 }
 
-/// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules kept`.
+/// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules passed`.
 fn last_line(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let kept = verdict.facts(Judgement::Kept);
     format!(
-        "{} against {}: {}, {} kept\n",
+        "{} against {}: {}, {} passed\n",
         subject.name(),
         subject.file,
         verdict.summary(),

@@ -1,4 +1,5 @@
-//! The elements of the mission with everything that does not depend on windows: their lives, sending and silences.
+//! The elements of the mission with everything that does not depend on windows: their lifetimes, publishing
+//! and silences.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -22,12 +23,13 @@ use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
 use crate::graph::{Edge, Element, Elements, Node, NodeId, PerElement, State, Topic, TopicId};
 
-/// The history of a mission: its elements, each with its lives, and all sending, in continuous time.
+/// The history of a mission: its elements with their lifetimes, and the messages of all senders, in
+/// continuous time.
 #[derive(Debug, Default)]
 pub(crate) struct History {
     /// All nodes, topics and edges of the mission.
     pub(crate) elements: Elements,
-    /// What is known of each of them.
+    /// The record of each of them.
     pub(crate) records: PerElement<Record>,
     /// The messages of every sender.
     pub(crate) sending: Sending,
@@ -37,11 +39,11 @@ pub(crate) struct History {
     pub(crate) doubled: Vec<NodeId>,
     /// Transitions of lifecycle states, sorted by time.
     pub(crate) transitions: Vec<Transition>,
-    /// Statements other than about which elements exist, by element.
+    /// Statements about elements other than that they exist, by element.
     pub(crate) incidents: Vec<Incident>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
-    /// The places of each topic's streams.
+    /// The indices of each topic's streams.
     pub(crate) streams: BTreeMap<Name, Vec<usize>>,
 }
 
@@ -60,7 +62,7 @@ pub(crate) struct Incident {
 pub(crate) struct Record {
     /// The strongest confidence of evidence for it.
     pub(crate) confidence: Confidence,
-    /// Its lives, in order, none overlapping.
+    /// Its lifetimes, in order, without overlaps.
     pub(crate) lives: Vec<Life>,
     /// The state that it always has while it exists: declared or latched.
     fixed: Option<State>,
@@ -119,7 +121,8 @@ impl Record {
     }
 }
 
-/// Makes the history from everything recorded and concluded, and from the sending of all senders (`traffic`).
+/// Makes the history from everything recorded and concluded, and from the messages of all senders
+/// (`traffic`).
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -143,7 +146,7 @@ fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> i
     Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
 }
 
-/// Lists every element. Tracks come in the order of the elements' names.
+/// Lists every element. Tracks are sorted by the elements' names.
 fn assembled(
     tracks: Tracks,
     traffic: &Traffic,
@@ -187,7 +190,7 @@ fn assembled(
     all.history
 }
 
-/// A history with room for exactly these elements, of which there may be very many.
+/// A history with capacity for exactly these elements, since there may be very many.
 fn roomy(tracks: &Tracks) -> History {
     let mut many = [0; 4];
     for what in tracks.keys() {
@@ -264,7 +267,7 @@ impl Assembly<'_> {
         self.history.transitions.sort_by_key(order);
     }
 
-    /// Adds the statements about elements that exist.
+    /// Adds the statements about existing elements.
     fn incidents(&mut self) {
         let all = &mut self.history;
         for incident in &self.findings.incidents {
@@ -414,7 +417,7 @@ fn spans(track: &Liveness) -> Vec<Span> {
     track.lives.iter().map(span).collect()
 }
 
-/// The known lives of an element, inside the mission.
+/// The known lifetimes of an element, inside the mission.
 fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
     let within = |bound: Bound| Bound {
         earliest: bound.earliest.max(mission.0),

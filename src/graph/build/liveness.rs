@@ -1,4 +1,5 @@
-//! The lives of elements: from the first sign to the last, extended by latched messages, ended by proofs of an end.
+//! The lifetimes of elements: from the first sign to the last, extended by latched messages, ended by
+//! evidence of an end.
 
 use super::restarts::Restart;
 use crate::base::rhythm::{
@@ -9,18 +10,18 @@ use crate::base::time::Stamp;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Stretch};
 
-/// The extent of a life.
+/// The extent of a lifetime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Extent {
-    /// As far as its signs.
+    /// From its first sign to its last.
     Signs,
     /// The whole mission, unless there are signs: a header or a file declares it.
     Whole,
-    /// The whole mission, whatever its signs say.
+    /// The whole mission, regardless of signs.
     Always,
 }
 
-/// A period of being alive, both ends included.
+/// A period of existence, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lifetime {
     pub(crate) from: Stamp,
@@ -31,14 +32,14 @@ pub(crate) struct Lifetime {
     pub(crate) ended: Option<Bound>,
 }
 
-/// The rhythm in the messages of an element: of the last stretch of sending.
+/// The rhythm of an element's messages in the last stretch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pulse {
     first: Stamp,
     last: Stamp,
     /// The time between two messages, in nanoseconds.
     period: i64,
-    /// The longest pause between two stretches of sending, in nanoseconds; 0 for none.
+    /// The longest pause between two stretches, in nanoseconds; 0 for none.
     pause: i64,
     is_even: bool,
 }
@@ -82,23 +83,23 @@ impl Pulse {
     }
 }
 
-/// The known signs and lives of one element.
+/// The known signs and lifetimes of one element.
 #[derive(Clone, Debug)]
 pub(crate) struct Liveness {
     pub(crate) evidence: Evidence,
     /// The strongest confidence of evidence for it.
     pub(crate) confidence: Confidence,
-    /// Signs that bound lives: sorted later.
+    /// Signs that bound lifetimes: sorted later.
     pub(crate) signs: Vec<Stamp>,
-    /// Signs that bound nothing: of a topic those of its edges, which have their own lives.
+    /// Signs that bound nothing: for a topic, those of its edges, which have their own lifetimes.
     pub(crate) seen: Vec<Stamp>,
-    /// The signs that state a fact that may have begun before.
+    /// The signs that state a fact that may have been true before.
     pub(crate) stated: Vec<Stamp>,
-    /// The signs among these that come as soon as the fact is true: statistics of a connection.
+    /// The signs among these that appear as soon as the fact is true: statistics of a connection.
     pub(crate) counted: Vec<Stamp>,
-    /// Proofs of an end.
+    /// Evidence of an end.
     pub(crate) ends: Vec<Stamp>,
-    /// The times at which something that is proved by it began, such as a rhythm.
+    /// The times at which something that shows it began, such as a rhythm.
     pub(crate) begins: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) last_sign: Option<Stamp>,
@@ -106,11 +107,11 @@ pub(crate) struct Liveness {
     pub(crate) pulses: Vec<Pulse>,
     /// The first and the last moment of the recordings of its messages; `None` for the whole mission.
     pub(crate) recording: Option<(Stamp, Stamp)>,
-    /// The number of senders whose messages prove it, and the number of those that are latched.
+    /// The number of senders whose messages show it, and the number of those that are latched.
     pub(crate) senders: (u32, u32),
-    /// Whether there are more proofs than latched messages.
+    /// Whether there is more evidence than latched messages.
     pub(crate) speaks: bool,
-    /// Whether there are more proofs than moments.
+    /// Whether there is more evidence than single moments.
     pub(crate) lasts: bool,
     /// Whether it exists to the end, regardless of its signs.
     pub(crate) unending: bool,
@@ -162,7 +163,8 @@ impl Liveness {
         self.ends.extend(ends);
     }
 
-    /// Adds the proofs of another element that prove this one too: an edge proves its node and its topic.
+    /// Adds the evidence for another element that also supports this one: an edge supports its node and its
+    /// topic.
     pub(crate) fn learn(&mut self, other: &Self) {
         self.evidence = self.evidence.and(other.evidence);
         self.confidence = self.confidence.min(other.confidence);
@@ -186,9 +188,9 @@ impl Liveness {
         }
     }
 
-    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence.
-    /// For the same reason a node without a proof of its beginning is there from the start; a topic with an uneven
-    /// rhythm does not end.
+    /// Computes the lifetimes from the signs alone. A lifetime without a known end continues: missing
+    /// evidence is not absence. For the same reason a node without evidence of its beginning exists from the
+    /// start; a topic with an uneven rhythm does not end.
     pub(crate) fn live(&mut self, mission: (Stamp, Stamp), is_node: bool) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
@@ -236,7 +238,7 @@ impl Liveness {
         }
     }
 
-    /// Adds the proofs of an edge to its topic. The senders are counted on the topic itself.
+    /// Adds the evidence for an edge to its topic. The senders are counted on the topic itself.
     pub(crate) fn know(&mut self, edge: &Self) {
         self.evidence = self.evidence.and(edge.evidence);
         self.confidence = self.confidence.min(edge.confidence);
@@ -246,7 +248,7 @@ impl Liveness {
         self.seen.extend(edge.signs.iter().chain(&edge.seen));
     }
 
-    /// Joins the lives of a topic with those of its edges, which may overlap.
+    /// Joins the lifetimes of a topic with those of its edges, which may overlap.
     pub(crate) fn live_with(&mut self, edges: Vec<Lifetime>) {
         let mut all = std::mem::take(&mut self.lives);
         all.extend(edges);
@@ -265,7 +267,8 @@ impl Liveness {
         }
     }
 
-    /// The time at which a rhythm broke off for good, if one did; of an element known by moments only, the last moment.
+    /// The time at which a rhythm stopped for good, if one did; for an element known only at single moments,
+    /// the last moment.
     fn end(&self, mission: Stamp, is_node: bool) -> Option<Bound> {
         if !self.lasts && !self.unending {
             return self.signs.last().map(|last| Bound {
@@ -290,9 +293,9 @@ impl Liveness {
         })
     }
 
-    /// Computes the lives of an edge inside those of its node: a node that has advertised or subscribed a topic does so
-    /// until it ends, unless something else is known. A stated fact was true before the statement, unless its absence
-    /// is known; a first message, in contrast, is a beginning.
+    /// Computes the lifetimes of an edge inside those of its node: a node that has advertised or subscribed
+    /// to a topic does so until it ends, unless the contrary is known. A stated fact was true before the
+    /// statement, unless its absence is known; a first message, in contrast, is a beginning.
     pub(crate) fn live_within(&mut self, node: &[Lifetime]) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
@@ -328,8 +331,8 @@ impl Liveness {
         }
     }
 
-    /// The end of the last of some edges, of which this is one and the others ended at `last`; `None` if nothing shows
-    /// that it ended.
+    /// The end of the last of several edges: this one, and others that ended at `last`; `None` if nothing
+    /// shows that it ended.
     pub(crate) fn closed(&self, last: Stamp) -> Option<Stamp> {
         if self.signs.is_empty() {
             return (!self.is_whole()).then_some(last);
@@ -339,7 +342,7 @@ impl Liveness {
         (!open).then_some(last.max(*end))
     }
 
-    /// Whether it is proved by messages, all of them latched.
+    /// Whether it is shown by messages that are all latched.
     pub(crate) fn is_latched(&self) -> bool {
         self.senders.0 > 0 && self.senders.0 == self.senders.1
     }
@@ -365,7 +368,7 @@ impl Liveness {
     }
 }
 
-/// A life for the whole mission.
+/// A lifetime of the whole mission.
 pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {
     Lifetime {
         from: mission.0,
@@ -391,7 +394,7 @@ impl Lifetime {
         }
     }
 
-    /// Ends the life because of a proof.
+    /// Ends the lifetime because of evidence.
     fn close(&mut self, end: Stamp) {
         let last = self.to;
         self.to = end.max(last);
@@ -402,8 +405,8 @@ impl Lifetime {
         });
     }
 
-    /// Sets the beginning of a first life, after nothing: with a rhythm it began shortly before its first sign.
-    /// `recording` is the start of its own recording, one of several; without a proof it began before.
+    /// Sets the beginning of a first lifetime: with a rhythm it began shortly before its first sign.
+    /// `recording` is the start of its own recording, one of several; without evidence it began before.
     fn begin(&mut self, mission: Stamp, recording: Stamp, period: Option<i64>, is_proved: bool) {
         let late = period.unwrap_or(0);
         if !is_proved || self.from.since(recording) <= FOUND_NS.saturating_add(late) {
@@ -414,8 +417,8 @@ impl Lifetime {
         }
     }
 
-    /// Sets the beginning of an edge's first life inside its node's; `absent` is the first moment at which it may
-    /// exist, if that is known.
+    /// Sets the beginning of an edge's first lifetime inside its node's; `absent` is the first moment at
+    /// which it may exist, if known.
     fn begin_within(&mut self, around: &Self, absent: Option<Stamp>, stated: bool) {
         let registered = around.from.plus(REGISTRATION_NS);
         match absent {
@@ -439,8 +442,9 @@ impl Lifetime {
     }
 }
 
-/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it. The true end
-/// lies between the proof and the sign before, the true beginning between the sign and the end before.
+/// Lifetimes between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it.
+/// The true end lies between the evidence and the sign before, the true beginning between the sign and the
+/// end before.
 fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
     let mut lives: Vec<Lifetime> = Vec::new();
     let mut ends = ends.iter().copied().peekable();

@@ -1,4 +1,5 @@
-//! Further numbers of windows: counts and measurements from statistics, and the ages of messages by their header stamps.
+//! Further measurements of windows: counts and measurements from statistics, and the ages of messages by
+//! their header stamps.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -23,7 +24,7 @@ struct MeasureSum {
     jitter: (f64, f64),
     /// Ages by messages, and the messages.
     age: (f64, f64),
-    /// As `age`, by header stamps, which go before statistics.
+    /// As `age`, by header stamps, which take precedence over statistics.
     header_age: (f64, f64),
 }
 

@@ -1,6 +1,6 @@
-//! Ends of the publishers of merged streams. A tool that rewrites bags keeps one connection per topic, so that no
-//! message names its sender; but where only one node is known to publish a topic, the end of the topic's rhythm is the
-//! end of its own.
+//! Ends of the publishers of merged streams. A tool that rewrites bags keeps one connection per topic, so
+//! that no message names its sender; but if only one node is known to publish a topic, the end of the topic's
+//! rhythm is that of the node's.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ use crate::evidence::inference::{ElementKey, Reliability};
 use crate::evidence::observation::Name;
 use crate::graph::history::{Stretch, begins_steadily};
 
-/// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on proves
-/// nothing: another node may have taken the topic over.
+/// Adds the rhythms that stopped for good to the tracks of their only publishers. A rhythm that continues
+/// shows nothing: another node may have taken over the topic.
 pub(crate) fn fall_silent(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     traffic: &Traffic,

@@ -31,7 +31,7 @@ pub(crate) struct Sums {
 pub(crate) struct TopicCount {
     /// The topic's name.
     pub topic: Arc<str>,
-    /// The place of the window.
+    /// The index of the window.
     pub window: usize,
     /// The number of messages, ≥ 1.
     pub count: u64,
@@ -60,7 +60,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
     Ok(all)
 }
 
-/// A window that may still get messages.
+/// A window that may still receive messages.
 #[derive(Default)]
 struct OpenWindow {
     window: usize,

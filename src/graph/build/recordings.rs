@@ -13,11 +13,11 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::history::Stretch;
 
-/// The first and the last moment of the recording that each bag is a part of, by bag. A bag is a part of another's
-/// recording if it lies before or behind it and has most topics with it in common.
+/// The first and the last moment of the recording that each bag is a part of, by bag. A bag is a part of
+/// another's recording if it precedes or follows it and has most topics in common with it.
 #[expect(
     clippy::type_complexity,
-    reason = "a span and names, of each bag, for a moment"
+    reason = "a short-lived list of each bag's time span and names"
 )]
 pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp, Stamp)> {
     let mut bags: Vec<(Option<(Stamp, Stamp)>, BTreeSet<Name>)> = Vec::new();
@@ -62,11 +62,11 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp,
     (0..bags.len()).map(whole).collect()
 }
 
-/// The nodes that several recordings show at the same time as publishers of one topic: of several robots, or recorded
-/// twice.
+/// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,
+/// or recorded twice.
 #[expect(
     clippy::type_complexity,
-    reason = "when each bag shows a node and topic, for a moment"
+    reason = "a short-lived list of when each bag contains a node and topic"
 )]
 pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name> {
     let mut seen: BTreeMap<(Name, Name), Vec<(usize, (Stamp, Stamp))>> = BTreeMap::new();
@@ -99,7 +99,7 @@ struct SendingNode<'a> {
 }
 
 impl SendingNode<'_> {
-    /// The messages that are being sent at a moment, if one should come long before `length` is over.
+    /// The messages around a moment, if the next one is due long before `length` is over.
     fn sending(&self, at: Stamp, length: i64) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|s| s.first <= at);
         let stretch = self.stretches.get(next.checked_sub(1)?)?;
@@ -109,7 +109,7 @@ impl SendingNode<'_> {
             .then_some(stretch)
     }
 
-    /// Whether it begins to send well inside a gap.
+    /// Whether it begins to publish well inside a gap.
     fn begins_in(&self, gap: Span) -> bool {
         let edge = gap.nanos() / 8;
         let inside = gap.start.plus(edge)..gap.end.plus(-edge);
@@ -126,11 +126,12 @@ impl SendingNode<'_> {
     }
 }
 
-/// The most gaps of a sender of which any may be a pause of the recorder: one with more sends only when needed.
+/// The most gaps of a sender of which any may be a pause of the recorder: one with more only publishes when
+/// needed.
 const MOST_GAPS: usize = 64;
 
-/// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and begin again
-/// together without having restarted.
+/// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and
+/// resume together without having restarted.
 pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream]) -> Vec<Span> {
     let mut senders = Vec::new();
     for of_topic in traffic.values() {
@@ -178,7 +179,7 @@ pub(crate) fn unseen(recorded: &Recorded, streams: &[Stream]) -> io::Result<Vec<
     Ok(found)
 }
 
-/// The gaps of senders that seldom have any, sorted.
+/// The gaps of senders that rarely have any, sorted.
 fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
     let steady = senders
         .iter()
@@ -234,7 +235,7 @@ pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool 
 }
 
 impl Sender {
-    /// The lives of an element as far as the recordings of some senders reach.
+    /// The lifetimes of an element within the recordings of some senders.
     pub(crate) fn within<'a>(senders: impl Iterator<Item = &'a Self>, lives: &[Span]) -> Vec<Span> {
         let end = senders.map(|sender| sender.recording.1).max();
         let end = end.map_or(Stamp::MAX, |end| end.plus(1));

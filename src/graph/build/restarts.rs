@@ -1,5 +1,5 @@
-//! Restarts of nodes under the same name: after a gap the numbers in the headers of a stream begin again, or latched
-//! messages come again.
+//! Restarts of nodes under the same name: after a gap the sequence numbers of a stream start over, or latched
+//! messages are sent again.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -27,14 +27,15 @@ pub(crate) type Restarts = BTreeMap<Name, Vec<Restart>>;
 
 /// The most messages of a latched topic: one with more is sent again all the time.
 const LATCHED: u64 = 20;
-/// The most gaps of all nodes together around which numbers are asked for: each costs a look into two chunks.
+/// The most gaps, of all nodes together, around which numbers are requested: each requires reading two
+/// chunks.
 const MOST_ASKED: usize = 256;
 
-/// A stream of a node, and what is sent on its topic.
+/// A stream of a node, and the messages on its topic.
 struct Own<'a> {
     topic: Name,
     sender: &'a Sender,
-    /// The places of the streams of this sender.
+    /// The indices of the streams of this sender.
     streams: Vec<usize>,
 }
 
@@ -60,7 +61,7 @@ fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, 
     of
 }
 
-/// The gaps in the messages of any of a node's streams in which no other of them went on.
+/// The gaps in any of a node's streams during which none of its other streams continued.
 fn gaps(own: &[Own<'_>]) -> BTreeSet<(Stamp, Stamp)> {
     let went_on = |(from, to): (Stamp, Stamp)| {
         let middle = middle((from, to));
@@ -130,7 +131,7 @@ pub(crate) fn restarts(
     doubled: &BTreeSet<Name>,
 ) -> io::Result<Restarts> {
     let mut nodes = own_streams(findings, traffic);
-    // The messages of two robots under one name lie over each other.
+    // The messages of two robots under one name overlap in time.
     nodes.retain(|node, _| !doubled.contains(node));
     let mut falls: BTreeMap<Name, Vec<Fall>> = BTreeMap::new();
     for (node, own) in &nodes {
@@ -182,7 +183,8 @@ pub(crate) fn restarts(
     Ok(all)
 }
 
-/// Whether the log of a process goes on to count its records over a gap in its other messages: it did not end.
+/// Whether a process continues to number its log records across a gap in its other messages, so that it did
+/// not end.
 fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
     log.streams.iter().any(|at| {
         let times = recorded.messages.times(recorded.streams[*at].times);
@@ -194,31 +196,32 @@ fn counts_on(recorded: &Recorded, log: &Own<'_>, gap: (Stamp, Stamp)) -> bool {
     })
 }
 
-/// A gap after which the numbers of a stream began again.
+/// A gap after which the sequence numbers of a stream started over.
 struct Fall {
     from: Stamp,
     to: Stamp,
-    /// The type of the messages, the last number before, and the header with which they begin again.
+    /// The type of the messages, the last number before, and the first header after the gap.
     kind: std::sync::Arc<str>,
     before: u32,
     first: Number,
 }
 
 impl Fall {
-    /// What it has in common with those of copies: messages of another stream that are forwarded with their headers, whose
-    /// numbers prove nothing of the node that passes them on.
+    /// The key that it shares with copies: messages of another stream that are forwarded with their headers,
+    /// whose numbers say nothing about the forwarding node.
     fn header(&self) -> (u64, u32, &str) {
         (self.first.stamp, self.first.number, &self.kind)
     }
 
-    /// Whether it is the copy of two with one header. A throttle leaves out messages, and the recorder may get the copy
-    /// first.
+    /// Whether it is the copy, of two with one header. A throttle drops messages, and the recorder may
+    /// receive the copy first.
     fn is_later_than(&self, other: &Self) -> bool {
         (other.before, self.to) > (self.before, other.to)
     }
 }
 
-/// The gaps after which numbers of a node's streams began again; not of streams that pass on another's messages.
+/// The gaps after which the numbers of a node's streams started over; without streams that forward another's
+/// messages.
 fn falls_of(
     recorded: &Recorded,
     findings: &Findings,
@@ -234,7 +237,7 @@ fn falls_of(
             let Some(numbers) = numbers else { continue };
             let mut breaks = BTreeSet::new();
             if stream.connection.topic.as_str() == "/rosout" {
-                // These count all records of a process, which come without any rhythm.
+                // These number all log records of a process, which have no rhythm.
                 breaks.extend(numbers.falls.iter().map(|fall| (*fall, *fall)));
             }
             if !gaps.is_empty() {
@@ -281,7 +284,7 @@ fn signs_of(inference: &Inference) -> &[Stamp] {
     }
 }
 
-/// Stretches of time that end with a latched message sent again, and in which no stream with a rhythm had messages.
+/// Intervals that end with a latched message sent again, and in which no stream with a rhythm had messages.
 fn sent_again(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<Vec<(Stamp, Stamp)>> {
     let rhythms = || {
         let all = own.iter().filter(|own| !own.sender.latched);
@@ -317,7 +320,7 @@ fn silent_since(stretches: &[Stretch], at: Stamp) -> Option<Stamp> {
     (!after.is_joined && before.last < at && at.since(before.last) >= GAP_NS).then_some(before.last)
 }
 
-/// Joins stretches that overlap, which show the same restart, to the part that they share.
+/// Intersects intervals that overlap, which show the same restart.
 fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
     breaks.sort_unstable();
     let mut narrow: Vec<(Stamp, Stamp)> = Vec::new();
@@ -330,7 +333,7 @@ fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
     narrow
 }
 
-/// The longest time between two signs inside a stretch, during which the node was away.
+/// The longest time between two signs inside an interval, during which the node was away.
 fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<Restart> {
     let inside = &signs[signs.partition_point(|t| *t < from)..signs.partition_point(|t| *t <= to)];
     let gaps = inside.windows(2).map(|pair| (pair[1].since(pair[0]), pair));

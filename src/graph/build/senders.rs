@@ -1,4 +1,5 @@
-//! The sending of every sender on every topic over the whole mission: even stretches, pauses, first and last messages.
+//! The messages of every sender on every topic over the whole mission: even stretches, pauses, first and last
+//! messages.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -19,13 +20,13 @@ pub(crate) type Traffic = BTreeMap<Name, Senders>;
 /// The senders of one topic.
 #[derive(Debug)]
 pub(crate) struct Senders {
-    /// The places of the topic's streams.
+    /// The indices of the topic's streams.
     pub(crate) streams: Vec<usize>,
     /// The first and the last message of each stream; `None` without messages.
     pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
     /// The messages of each sender: first the unknown ones together, then the known ones, sorted.
     pub(crate) list: Vec<Sender>,
-    /// The place of each stream's sender in `list`.
+    /// The index of each stream's sender in `list`.
     pub(crate) of: Vec<usize>,
     /// The longest pauses of all senders together.
     pub(crate) pauses: Vec<Span>,
@@ -99,7 +100,7 @@ struct SenderTimes {
     latched: bool,
     times: Vec<Stamp>,
     recording: (Stamp, Stamp),
-    /// The number of messages of which one is kept, unless it comes late.
+    /// One of this many messages is kept, and every late one.
     every: usize,
     passed: usize,
 }
@@ -146,7 +147,7 @@ impl SenderTimes {
     }
 }
 
-/// The place of each stream's sender, and the senders without times yet.
+/// The index of each stream's sender, and the senders without times yet.
 fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Vec<SenderTimes>) {
     let mut latched: BTreeMap<Option<Name>, (bool, (Stamp, Stamp))> = BTreeMap::new();
     for stream in streams {

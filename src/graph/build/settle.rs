@@ -1,4 +1,5 @@
-//! The lives of nodes from those of their edges, of edges within those of their nodes, of topics from both together.
+//! The lifetimes of nodes from those of their edges, of edges within those of their nodes, of topics from
+//! both.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +13,7 @@ use crate::evidence::observation::Name;
 /// No edge has a smaller key: nodes and topics come before.
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 
-/// Computes all lives; `mission` is its first and its last moment.
+/// Computes all lifetimes; `mission` contains the first and last moments.
 pub(crate) fn settle(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     inferences: &[Inference],
@@ -20,7 +21,7 @@ pub(crate) fn settle(
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
-    // An element that exists as long as its node is evidence of its topic, but not of the node.
+    // An edge that exists as long as its node is evidence for its topic, but not for the node.
     let followers: BTreeSet<ElementKey> = inferences
         .iter()
         .filter(|inference| matches!(inference.when, Validity::Like(ElementKey::Node(_))))
@@ -47,7 +48,7 @@ pub(crate) fn settle(
             .or_default()
             .know(track);
     }
-    // A node is gone if its last connection was closed and it gave no later sign.
+    // A node ended if its last connection was closed and it has no later sign.
     for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
         if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
@@ -91,7 +92,7 @@ pub(crate) fn settle(
     live_like(tracks, inferences, true);
 }
 
-/// Gives elements the lives of others, which are topics or not; returns those that got them.
+/// Adds to elements the lifetimes of others, either topics or not; returns the changed ones.
 fn live_like(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     inferences: &[Inference],

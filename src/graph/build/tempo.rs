@@ -1,4 +1,4 @@
-//! Stretches of even sending, from the times of one sender's messages: gaps end them, and so do changes of rate.
+//! Stretches of even messages, from the times of one sender: gaps and rate changes end them.
 
 use crate::base::rhythm::{EVEN, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
 use crate::base::time::Stamp;
@@ -6,17 +6,17 @@ use crate::graph::history::Stretch;
 
 /// The number of intervals on each side of a gap from which the usual one is taken.
 const AROUND: usize = 9;
-/// The most pieces of a run that are searched for changes of rate; intervals of longer ones are summed up first.
+/// The most pieces of a run that are searched for rate changes; intervals of longer runs are summed first.
 const PIECES: usize = 2048;
 /// The depth of splitting one sender's messages by rate; each level may double the number of rates.
 const DEPTH: usize = 8;
-/// The least gain in log likelihood of a change of rate over chance: 3 standard deviations of a normal distribution are
-/// half a squared 3 in log likelihood; positions that could be chosen double that.
+/// The least gain in log likelihood of a rate change over chance: 3 standard deviations of a normal
+/// distribution are 3²/2 in log likelihood, doubled because of the many possible positions.
 const GAIN: f64 = 9.0;
 /// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch.
 const MOST: usize = 4096;
 
-/// Divides sorted times into stretches of even sending.
+/// Divides sorted times into stretches of even messages.
 pub(crate) fn stretches(times: &[Stamp]) -> Vec<Stretch> {
     let mut all = Vec::new();
     let mut from = 0;
@@ -30,7 +30,7 @@ pub(crate) fn stretches(times: &[Stamp]) -> Vec<Stretch> {
     merged(all, times)
 }
 
-/// The places of the first messages after gaps.
+/// The indices of the first messages after gaps.
 fn gaps(times: &[Stamp]) -> Vec<usize> {
     let mut found = Vec::new();
     for at in 1..times.len() {
@@ -58,7 +58,7 @@ fn usual(times: &[Stamp]) -> Option<i64> {
     intervals.get(intervals.len().checked_sub(1)? / 2).copied()
 }
 
-/// Splits a run without gaps where its rate changes most, as long as that is not chance.
+/// Splits a run without gaps where its rate changes most, as long as the change is significant.
 fn split(times: &[Stamp], depth: usize, is_joined: bool, all: &mut Vec<Stretch>) {
     let Some(cut) = (depth > 0).then(|| cut(times)).flatten() else {
         all.extend(stretch(times, is_joined));
@@ -87,12 +87,12 @@ fn cut(times: &[Stamp]) -> Option<usize> {
         coarse.saturating_sub(step),
         (coarse + step).min(intervals - FEWEST_INTERVALS),
     );
-    // Around the coarse place the exact one: where the sum of both sides' deviations turns.
+    // The exact position near the coarse one: where the sum of both sides' deviations is smallest.
     best(times, 1, from.max(FEWEST_INTERVALS)..=to).or(Some(coarse))
 }
 
-/// The best of the places in `range`, every `step` messages, by the likelihood of intervals that have one mean each
-/// side, in units of how much the intervals scatter.
+/// The best position in `range`, every `step` messages, by the likelihood of intervals with one mean on each
+/// side, in units of the intervals' scatter.
 fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) -> Option<usize> {
     let n = times.len() - 1;
     let whole = times[n].since(times[0]) as f64;
@@ -131,7 +131,7 @@ fn scatter(times: &[Stamp], step: usize) -> f64 {
     // The upper quartile: where one message in three is lost, half of the neighbours are still equal.
     let place = ratios.len() * 3 / 4;
     let (_, upper, _) = ratios.select_nth_unstable_by(place, f64::total_cmp);
-    // Of random arrivals it is 3/4, and what sums of `step` lose in scatter is what they sum up.
+    // For random arrivals it is 3/4; sums of `step` intervals scatter less in the same proportion.
     let relative = *upper * 4.0 / 3.0;
     (relative * relative * step as f64).clamp(0.01, 4.0)
 }

@@ -1,4 +1,4 @@
-//! The proofs of each element as a track: signs, ends and rhythms, from which its lives follow.
+//! The evidence for each element as a track: signs, ends and rhythms, from which its lifetimes are computed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -18,7 +18,7 @@ use crate::graph::history::begins_steadily;
 /// The track of every element.
 pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
 
-/// Puts the signs of every proof on the track of its element.
+/// Adds the signs of all evidence to the track of its element.
 pub(crate) fn tracks(
     recorded: &Recorded,
     findings: &Findings,
@@ -103,8 +103,8 @@ pub(crate) fn tracks(
     Ok(tracks)
 }
 
-/// The publications, as node and topic, that forward the messages of others and end with these: their end shows
-/// nothing of the node.
+/// The publications, as node and topic, that forward the messages of others and end with these: their end
+/// says nothing about the node.
 fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
     let last = |topic: &Name, node: Option<Name>| {
         let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
@@ -137,7 +137,7 @@ fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
     findings.copies.iter().filter(is_starved).copied().collect()
 }
 
-/// The confidence of a proof: a connection without a message, or with none in the time that is read, is only declared by
+/// The confidence of an inference: a connection without messages in the time that is read is only declared by
 /// its header.
 fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> Confidence {
     let Validity::Messages(at) = inference.when else {
@@ -154,7 +154,7 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
     }
 }
 
-/// The streams with a known publisher, whose messages prove a publication.
+/// The streams with a known publisher, whose messages show a publication.
 fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
     let sent = inferences.iter().filter_map(|inference| match inference {
         Inference {
@@ -167,7 +167,7 @@ fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
     sent.collect()
 }
 
-/// Whether a proof is still valid after its last sign.
+/// Whether an inference is still valid after its last sign.
 fn lasts(when: &Validity) -> bool {
     !matches!(when, Validity::Moments(_) | Validity::Like(_))
 }
@@ -191,7 +191,7 @@ struct Followed<'a> {
     restarts: &'a [Restart],
 }
 
-/// Puts the messages of one stream on a track: of a publication, or of a topic.
+/// Adds the messages of one stream to the track of a publication or topic.
 fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
     let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
     let spoke = senders.traces.get(place).copied().flatten();
@@ -208,7 +208,7 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
         return;
     }
     track.signs.extend([first, last]);
-    // A recorder gets the last message of a latched topic as soon as it has found it, so it was sent just then.
+    // A recorder receives a latched message as soon as it finds the topic, so the sender began about then.
     if what.beats && (latched || begins_steadily(&sender.stretches)) {
         track.begins.push(first);
     }

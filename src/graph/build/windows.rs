@@ -21,15 +21,15 @@ impl SortedWindows<'_> {
         self.0.get(window).map_or(Stamp::MAX, |w| w.end)
     }
 
-    /// The windows that share a moment with `[from, to]`.
+    /// The windows that overlap `[from, to]`.
     pub(crate) fn over(&self, from: Stamp, to: Stamp) -> Range<usize> {
         let first = self.0.partition_point(|w| w.end <= from);
         let end = self.0.partition_point(|w| w.start <= to);
         first..end.max(first)
     }
 
-    /// The last moment at which an element whose last sign was at `time` counts as alive, after `more` windows of
-    /// silence.
+    /// The last moment at which an element whose last sign was at `time` counts as present, after `more`
+    /// windows of silence.
     pub(crate) fn last_moment(&self, time: Stamp, more: usize) -> Stamp {
         let last = self.over(time, time).end.saturating_sub(1);
         match self

@@ -24,7 +24,7 @@ pub struct Changes<'a> {
 }
 
 impl<'a> Changes<'a> {
-    /// A finder that has seen no window yet.
+    /// A finder before the first window.
     pub fn new(elements: &'a Elements, threshold: f64) -> Self {
         Self {
             elements,
@@ -35,8 +35,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// The changes from the window before to this one; none in the first, which is the base. `restarts` are nodes that
-    /// restarted in it under the same name, and when.
+    /// The changes from the previous window to this one; none in the first, which is the base. `restarts` are
+    /// nodes that restarted in it under the same name, and when.
     ///
     /// Order: added, removed, rates, hand-overs, restarts, values; each by kind of element and name.
     pub fn next(&mut self, span: Span, graph: &Graph, restarts: &[(NodeId, Stamp)]) -> Vec<Change> {
@@ -105,8 +105,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// The change of a rate, if it is one. The rate of an element that came or went within a window is measured over
-    /// the part in which it existed, so that coming and going are not reported twice.
+    /// The change of a rate, if it is one. The rate of an element that appeared or vanished within a window
+    /// is measured over the part in which it existed, so that one change is not reported twice.
     fn rate(
         &self,
         what: Element,
@@ -128,7 +128,7 @@ impl<'a> Changes<'a> {
         })
     }
 
-    /// The number of seconds of a window between an element's first and last sign of life.
+    /// The number of seconds of a window between an element's first and last sign.
     fn present(&self, what: Element, span: Span) -> f64 {
         let (first, last) = match what {
             Element::Topic(id) => self.sent[id as usize],
@@ -149,7 +149,8 @@ impl<'a> Changes<'a> {
         topics.filter(|topic| !seen.insert(*topic)).collect()
     }
 
-    /// Adds hand-overs: another node takes over a topic when none of the nodes that send on it now sent on it last.
+    /// Adds hand-overs: a topic is taken over if none of the nodes that publish it now were the last to
+    /// publish it.
     fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
         let there = |graph: &Graph, topic| {
             graph
@@ -182,7 +183,7 @@ impl<'a> Changes<'a> {
     }
 }
 
-/// The fewest messages in the busier of two windows with which a rate means something.
+/// The fewest messages in the busier of two windows for a meaningful rate.
 const FEW: f64 = 3.5;
 
 /// The ratio of the longest gap to the median period from which on a topic counts as irregular.
@@ -191,15 +192,16 @@ const UNSTEADY: f64 = 4.0;
 /// The share of the time that the median period must cover, message by message, for a topic to be regular.
 const COVERED: f64 = 0.6;
 
-/// Whether a rate changed: by more than the share `threshold` of what it was, by more than the two messages that two
-/// windows of the same jittering topic may differ by, and not on a topic too slow for windows of `secs` seconds.
+/// Whether a rate changed: by more than the share `threshold` of its earlier value, by more than the two
+/// messages that two windows of the same jittering topic may differ by, and not on a topic too slow for
+/// windows of `secs` seconds.
 fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
     let by = (to - from).abs();
     by > threshold * from && by * secs > 2.2 && from.max(to) * secs > FEW
 }
 
-/// Whether a topic has a steady rate in a window of which it existed for `secs` seconds: not latched, and in even steps
-/// all the time, as far as is known.
+/// Whether a topic has a steady rate in a window of which it existed for `secs` seconds: not latched, and in
+/// even steps all the time, as far as known.
 fn is_steady(topic: &TopicState, secs: f64) -> bool {
     let even = match (topic.median_period_s, topic.max_gap_s) {
         (Some(median), Some(gap)) => {
@@ -210,8 +212,8 @@ fn is_steady(topic: &TopicState, secs: f64) -> bool {
     even && topic.state != State::Latched
 }
 
-/// The interval from the first to the last sign of each topic's publishers together; of the topic itself where none is
-/// known.
+/// The interval from the first to the last sign of each topic's publishers together; of the topic itself if
+/// none is known.
 fn sent(elements: &Elements) -> Vec<(Option<Stamp>, Option<Stamp>)> {
     let mut sent = vec![(None, None); elements.topics.len()];
     for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {

@@ -1,5 +1,5 @@
-//! The rows of one element over all windows, as bytes: the lengths of its absences, the lengths without changes, and
-//! the differences from the window before.
+//! The rows of one element over all windows, as bytes: the lengths of its absences, the lengths without
+//! changes, and the differences from the previous window.
 
 use super::row::{Number, Row};
 use crate::evidence::Confidence;
@@ -21,7 +21,7 @@ const BYTES: u8 = 4;
 const MEDIAN: u8 = 8;
 const GAP: u8 = 16;
 const RATE: u8 = 32;
-/// Always with [`LOOK`], so that it is not taken for [`SAME`].
+/// Always with [`LOOK`], so that it is not confused with [`SAME`].
 const MEASURES: u8 = 64;
 
 /// The state that writer and reader share: the rows so far.
@@ -54,7 +54,7 @@ pub(crate) struct ColumnWriter {
 }
 
 impl ColumnWriter {
-    /// Adds the row of the window at a place; ignored if the place lies before `next`.
+    /// Adds the row of a window; ignored if the window is before `next`.
     pub(crate) fn push(&mut self, window: usize, row: Row) {
         let Some(away) = window.checked_sub(self.next) else {
             return;
@@ -129,7 +129,7 @@ impl ColumnWriter {
         self.memory.row = *row;
     }
 
-    /// Ends the writing.
+    /// The finished column.
     pub(crate) fn finish(mut self) -> Column {
         self.end_run();
         Column {
@@ -166,7 +166,7 @@ pub(crate) struct ColumnCursor<'a> {
 }
 
 impl ColumnCursor<'_> {
-    /// The row of the next window; `None` where the element does not exist, and after the last.
+    /// The row of the next window; `None` if the element does not exist, and after the last.
     pub(crate) fn next(&mut self) -> Option<Row> {
         if self.same > 0 {
             self.same -= 1;
@@ -190,7 +190,8 @@ impl ColumnCursor<'_> {
         Some(self.memory.row)
     }
 
-    /// The row of the next window as [`Self::next`], and the number of windows for which it stays, ≥ 1.
+    /// The row of the next window as [`Self::next`], and the number of windows for which it is unchanged, ≥
+    /// 1.
     pub(crate) fn next_run(&mut self) -> (Option<Row>, u64) {
         let row = self.next();
         let more = match row {
@@ -276,10 +277,7 @@ fn folded(value: i64) -> u128 {
     u128::from((value.wrapping_shl(1) ^ (value >> 63)).cast_unsigned())
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "what was folded has 64 bits"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "the value has 64 bits")]
 fn unfolded(value: u128) -> i64 {
     let value = value as u64;
     (value >> 1).cast_signed() ^ -(value & 1).cast_signed()

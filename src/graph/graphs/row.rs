@@ -51,9 +51,9 @@ const EXACT: f64 = 9e15;
 pub(crate) struct Row {
     pub(crate) state: State,
     pub(crate) confidence: Confidence,
-    /// The place of its lifecycle state, counted from 1; 0 for none.
+    /// The number of its lifecycle state, counted from 1; 0 for none.
     pub(crate) lifecycle: u32,
-    /// The number of messages; of a node those that its rate is computed from.
+    /// The number of messages; for a node, those from which its rate is computed.
     pub(crate) count: Option<u64>,
     pub(crate) bytes: Option<u64>,
     pub(crate) median: Number,
@@ -61,7 +61,7 @@ pub(crate) struct Row {
     pub(crate) drops: Option<u64>,
     pub(crate) jitter: Number,
     pub(crate) age: Number,
-    /// The rate, where it does not follow from the count and the window's length.
+    /// The rate, if it differs from the count divided by the window's length.
     pub(crate) rate: Option<Number>,
 }
 
@@ -83,7 +83,7 @@ impl Row {
         }
     }
 
-    /// The further numbers of the window.
+    /// Further measurements of the window.
     pub(crate) fn measures(&self) -> Measures {
         Measures {
             drops: self.drops,

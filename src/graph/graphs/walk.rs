@@ -1,5 +1,5 @@
-//! A walk through all elements at once, window by window, that stops only where one of them differs from the window
-//! before.
+//! A walk through all elements at once, window by window, that stops only where one of them differs from the
+//! previous window.
 
 use super::{Column, ColumnCursor, Row};
 use crate::graph::Element;

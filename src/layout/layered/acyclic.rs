@@ -1,4 +1,4 @@
-//! The choice of edges to turn around so that no cycle is left.
+//! The choice of edges to reverse so that no cycle remains.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,7 +21,7 @@ pub(crate) fn in_order(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     reversed
 }
 
-/// Whether a path leads from `start` to `goal`; `seen` contains the round in which an item was last met.
+/// Whether a path leads from `start` to `goal`; `seen` contains the round in which an item was last visited.
 fn reaches(
     after: &[Vec<usize>],
     start: usize,
@@ -67,8 +67,8 @@ pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usi
         .collect()
 }
 
-/// The two things that an edge leaves and enters inside the innermost cluster around both of its ends: each a vertex
-/// `v`, or a cluster `c` given as `home.len() + c`.
+/// The two units that an edge leaves and enters inside the innermost cluster around both of its ends: each a
+/// vertex `v`, or a cluster `c` given as `home.len() + c`.
 fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usize, usize) {
     let (mut a, mut b) = ((from, home[from]), (to, home[to]));
     while a.1 != b.1 {
@@ -79,8 +79,8 @@ fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usi
     (a.0, b.0)
 }
 
-/// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then the vertex
-/// with the most outgoing edges to spare.
+/// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then
+/// the vertex with the largest surplus of outgoing edges.
 pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let place = greedy_order(n, edges);
     edges
@@ -127,8 +127,8 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     place
 }
 
-/// The rank of a vertex among those that are left, the next one to take first; of equals, the vertex with the smaller
-/// number.
+/// The rank of a vertex among the remaining ones, the next one to choose first; of equal ones, the vertex
+/// with the smaller number.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
     /// No edge leaves it.
@@ -171,7 +171,7 @@ mod tests {
         in_order(n, &turned).iter().all(|turn| !turn)
     }
 
-    /// The order as it is reported, in time that grows with the square of the vertices.
+    /// The order as published, in time quadratic in the number of vertices.
     fn reported(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
         let mut left: BTreeSet<usize> = (0..n).collect();
         let (mut first, mut last) = (Vec::new(), Vec::new());

@@ -1,8 +1,8 @@
 //! Rows while they are being sorted: sweeps, swaps of neighbours, and the number of crossings.
 //!
-//! Members of a cluster stay side by side between its borders, like words in brackets, and two clusters keep their
-//! order in all layers that they share, so that their boxes can be drawn apart. A sweep changes few rows once the order
-//! settles, so that whatever follows from a row is kept until that row or one beside it changes.
+//! Members of a cluster stay side by side between its borders, like words in brackets, and two clusters keep
+//! their order in all layers that they share, so that their boxes do not overlap. A sweep changes few rows
+//! once the order is stable, so values derived from a row are cached until that row or one beside it changes.
 
 mod brackets;
 
@@ -24,12 +24,12 @@ struct Unit {
     tie: usize,
 }
 
-/// The neighbours of all items on one side, item by item, and their sorted places.
+/// The neighbours of all items on one side, item by item, and their sorted positions.
 struct Side {
     /// Where the neighbours of each item begin; one more than there are items.
     first: Vec<usize>,
     places: Vec<usize>,
-    /// Whether the places of a row's neighbours are those of now.
+    /// Whether the positions of a row's neighbours are up to date.
     is_fresh: Vec<bool>,
 }
 
@@ -54,27 +54,27 @@ impl Side {
 /// The rows while they are being sorted.
 pub(crate) struct CrossingReducer<'a> {
     layers: &'a Layers,
-    /// The items of all rows, row by row; and those that every search begins with.
+    /// The items of all rows, row by row; and those with which every search begins.
     items: Vec<usize>,
     begin: Vec<usize>,
     /// Where each row begins in them; one more than there are rows.
     start: Vec<usize>,
     /// The number of items from a top border to its bottom border; 1 for any other item.
     extent: Vec<usize>,
-    /// The place of each item in its row.
+    /// The position of each item in its row.
     place: Vec<usize>,
-    /// The wanted place of each item; NaN for one without a wish.
+    /// The preferred position of each item; NaN for one without a preference.
     key: Vec<f64>,
     /// The neighbours before and after.
     sides: [Side; 2],
-    /// The crossings before each row, as far as they are known.
+    /// The crossings before each row, if known.
     before: Vec<Option<u64>>,
     /// Whether no swap in a row saves crossings.
     is_settled: Vec<bool>,
-    /// The clusters met in this sweep, in their order; and the place of each in it.
+    /// The clusters visited in this sweep, in order; and the position of each.
     clusters: Vec<usize>,
     turn: Vec<Option<usize>>,
-    /// Room for the units and the items that are being sorted, and for counting.
+    /// Buffers for the units and items that are being sorted, and for counting.
     units: Vec<Unit>,
     known: Vec<usize>,
     old: Vec<usize>,
@@ -146,7 +146,7 @@ impl<'a> CrossingReducer<'a> {
         self.turn.fill(None);
     }
 
-    /// Notes that a row changed.
+    /// Records that a row changed.
     fn changed(&mut self, rank: usize) {
         let row = self.row(rank);
         for (i, &v) in self.items[row].iter().enumerate() {
@@ -186,7 +186,7 @@ impl<'a> CrossingReducer<'a> {
         }
     }
 
-    /// Fills in the places of the neighbours of a row on one side, in the order of that side's row.
+    /// Computes the positions of the neighbours of a row on one side, in the order of that side's row.
     fn look(&mut self, rank: usize, side: usize) {
         if std::mem::replace(&mut self.sides[side].is_fresh[rank], true) {
             return;
@@ -203,7 +203,7 @@ impl<'a> CrossingReducer<'a> {
             return;
         };
         let Side { first, places, .. } = &mut self.sides[side];
-        // The start of each item's places runs to their end and back again.
+        // The start of each item's positions advances to their end and is then reset.
         for (place, &u) in self.items[self.start[beside]..self.start[beside + 1]]
             .iter()
             .enumerate()
@@ -237,7 +237,7 @@ impl<'a> CrossingReducer<'a> {
             if extent > 1 {
                 has_moved |= self.sort(start + 1..end - 1);
             }
-            // Without a wish, a unit stays behind the one before it.
+            // Without a preference, a unit stays behind the one before it.
             let wishes = self.items[start..end].iter().map(|&v| self.key[v]);
             last = mean(wishes.filter(|key| !key.is_nan())).unwrap_or(last);
             self.units.push(Unit {
@@ -268,7 +268,7 @@ impl<'a> CrossingReducer<'a> {
         has_moved
     }
 
-    /// Sorts units by key, after the keys of clusters met before have been made to grow in their order.
+    /// Sorts units by key, after making the keys of known clusters ascend in their order.
     fn arrange(&mut self, units: &mut [Unit]) {
         if units.iter().any(|unit| unit.cluster.is_some()) {
             let turn = |unit: &Unit| unit.cluster.and_then(|c| self.turn[c]);
@@ -292,7 +292,7 @@ impl<'a> CrossingReducer<'a> {
         self.learn(units);
     }
 
-    /// Enters clusters that are new into the order, each behind the one before it.
+    /// Adds new clusters to the order, each behind the one before it.
     fn learn(&mut self, row: &[Unit]) {
         let row = || row.iter().filter_map(|unit| unit.cluster);
         if row().all(|c| self.turn[c].is_some()) {
@@ -336,7 +336,8 @@ impl<'a> CrossingReducer<'a> {
         }
     }
 
-    /// Swaps neighbours that stand directly in one cluster, and inside clusters; two clusters are never swapped.
+    /// Swaps neighbours that are directly in one cluster, and inside clusters; two clusters are never
+    /// swapped.
     fn transpose_in(&mut self, range: Range<usize>) -> bool {
         let mut better = false;
         let mut before: Option<Range<usize>> = None;
@@ -426,7 +427,7 @@ impl<'a> CrossingReducer<'a> {
 
 /// The number of pairs of which the first is greater than the second; both lists are sorted.
 fn inversions(first: &[usize], second: &[usize]) -> u64 {
-    // Most are in order.
+    // The common case: all are in order.
     if first.last() <= second.first() {
         return 0;
     }
@@ -445,7 +446,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// The barycentre or the weighted median (Gansner and others 1993) of sorted places; NaN for none.
+/// The barycentre or the weighted median (Gansner and others 1993) of sorted positions; NaN for none.
 fn centre(places: &[usize], median: bool) -> f64 {
     let n = places.len();
     let at = |i: usize| places[i] as f64;

@@ -1,13 +1,14 @@
-//! Folds crowded layers: where few subscribers are known, most nodes would be in one layer and most topics in the
-//! next; sources move to later layers, more of them if that suits the page.
+//! Folds crowded layers: where few subscribers are known, most nodes would be in one layer and most topics in
+//! the next; sources move to later layers, more of them if the page has the space.
 
 use super::rank::neighbours;
 use crate::base::cast;
 
 /// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
 ///
-/// A source is a vertex without predecessors; it may move as far back as its longest path allows. `home` is the cluster
-/// of each vertex: sources of one cluster move together where that costs nothing. The edges must not form a cycle.
+/// A source is a vertex without predecessors; it may move as far back as its longest path allows. `home` is
+/// the cluster of each vertex: sources of one cluster move together if that has no cost. The edges must not
+/// form a cycle.
 pub(crate) fn fold(
     rank: &[usize],
     edges: &[(usize, usize)],
@@ -46,9 +47,9 @@ pub(crate) fn fold(
     Some(squeezed(&folded))
 }
 
-/// The numbers of layers that suit `n` boxes on a page of this aspect (width by height), with edges from left to right
-/// and from top to bottom. A box with the gap behind it is about five times as long as it is high, and one and a half
-/// times as wide as the distance between layers below each other.
+/// The suitable numbers of layers for `n` boxes on a page of this aspect ratio (width by height), with edges
+/// from left to right and from top to bottom. A box with the gap behind it is about five times as long as it
+/// is high, and one and a half times as wide as the distance between layers below each other.
 pub(crate) fn suitable(n: usize, aspect: f64) -> [usize; 2] {
     let n = n as f64;
     let layers = |square: f64| cast::to_usize(square.clamp(1.0, 1e6).sqrt().round());
@@ -60,7 +61,7 @@ struct Adjacency {
     before: Vec<Vec<usize>>,
     after: Vec<Vec<usize>>,
     depth: Vec<usize>,
-    /// The vertices by rank: along the edges.
+    /// The vertices by rank, along the edges.
     order: Vec<usize>,
 }
 
@@ -90,7 +91,7 @@ impl Adjacency {
         self.before[v].is_empty()
     }
 
-    /// Whether a vertex hangs on one source only and leads nowhere.
+    /// Whether a vertex has a single source and no outgoing edge.
     fn is_leaf(&self, v: usize) -> bool {
         self.after[v].is_empty()
             && self.before[v].split_first().is_some_and(|(first, rest)| {
@@ -120,7 +121,7 @@ fn squeezed(rank: &[usize]) -> Vec<usize> {
 mod tests {
     use super::*;
 
-    /// `n` sources with a leaf each, all of them writing to one more topic.
+    /// `n` sources with a leaf each, all of them with an edge to one more topic.
     fn stars(n: usize) -> (Vec<usize>, Vec<(usize, usize)>) {
         let hub = 2 * n;
         let edges = (0..n).flat_map(|k| [(k, n + k), (k, hub)]).collect();

@@ -1,4 +1,4 @@
-//! A part that lies in one namespace: its inside is laid out like a page of its own, and framed.
+//! A part inside one namespace: its contents are laid out like a separate page, and framed.
 
 use super::subplan::Subplan;
 use super::{Draft, PlacedPart, parts};
@@ -6,8 +6,8 @@ use crate::base::geometry::{Point, Rect};
 use crate::layout::spacing::PADDING;
 use crate::layout::{Component, LayoutOptions, Orientation, Plan};
 
-/// The part with its pieces packed inside the frames of the namespaces around all of it; `None` if there is no such
-/// namespace, or nothing to gain: a single piece that is not `long`.
+/// The part with its pieces packed inside the frames of the namespaces around all of it; `None` if there is
+/// no such namespace, or no benefit: a single piece that is not `long`.
 pub(crate) fn inside(
     plan: &Plan,
     options: &LayoutOptions,

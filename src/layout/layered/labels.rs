@@ -1,4 +1,5 @@
-//! The place of each edge's label: on the edge or beside it, on no box, no title, no other edge and no other label.
+//! The position of each edge's label: on the edge or beside it, without covering a box, a title, another edge
+//! or another label.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -7,22 +8,24 @@ use crate::base::cast;
 use crate::base::geometry::{Point, Rect, Size, on_cubic};
 use crate::layout::{Layout, Plan, Route};
 
-/// The places at which a label is tried, as parts of the edge's length, best first.
+/// The positions that are tried for a label, as fractions of the edge's length, best first.
 const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
-/// A straight piece longer than this many cells is looked up in parts: the rectangle around all of it is mostly empty.
+/// A straight piece longer than this many cells is looked up in parts: its bounding rectangle is mostly
+/// empty.
 const LONG: f64 = 4.0;
-/// The number of rectangles that may be looked at over all labels; the labels of the longest edges are then left out.
-/// The largest graph that is laid out in layers needs a tenth of it.
+/// The number of rectangles that may be checked for all labels together; beyond it, the labels of the longest
+/// edges are left out. The largest graph that is laid out in layers needs a tenth of it.
 const EFFORT: u64 = 20_000_000;
-/// The number of cells in which edges may be noted, over all edges; the longest are then not avoided. Long edges of a
-/// drawing with tens of thousands of boxes in a column pass through thousands each.
+/// The number of cells in which edges may be registered, for all edges together; beyond it, the longest are
+/// not avoided. Long edges of a drawing with tens of thousands of boxes in a column pass through thousands
+/// each.
 const CELLS: usize = 2_000_000;
-/// The room between an edge and a label beside it.
+/// The space between an edge and a label beside it.
 const ASIDE: f64 = 2.0;
 /// The cost of a label that hides most of its own edge.
 const HIDING: f64 = 4.0;
 
-/// Places the labels of all routes; one that has no room anywhere gets none. Short edges choose first.
+/// Places the labels of all routes, those of short edges first; a label without any free position is omitted.
 pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
     let lines: Vec<Segments> = layout.routes.iter().map(Segments::new).collect();
     if plan.links.iter().all(|link| link.label.is_none()) {
@@ -80,7 +83,7 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
     }
 }
 
-/// Moves and enlarges the whole where a label is outside of it.
+/// Moves and enlarges the layout if a label is outside of it.
 pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
     let before = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
     let whole = layout
@@ -122,7 +125,7 @@ impl Segments {
         self.at.last().copied().unwrap_or(0.0)
     }
 
-    /// The point at a part of the length, and whether the line runs rather sideways there.
+    /// The point at a fraction of the length, and whether the line is closer to horizontal there.
     fn station(&self, part: f64) -> Option<(Point, bool)> {
         let goal = self.length() * part;
         let i = self
@@ -134,7 +137,7 @@ impl Segments {
         Some((a.towards(b, t), (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
-    /// The best middle for a label of this size, if any is free; a strict one is on no other edge.
+    /// The best middle for a label of this size, if any is free; with `strict`, one that is on no other edge.
     fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
@@ -148,7 +151,7 @@ impl Segments {
                 {
                     continue;
                 }
-                // On another edge it would be read as that one's.
+                // A label on another edge would be taken for that edge's label.
                 let is_free = !edges
                     .hits(&Rect::around(spot, size))
                     .any(|edge| edge != own);
@@ -180,14 +183,14 @@ impl Segments {
     }
 }
 
-/// Rectangles with a number each, found by place.
+/// Rectangles, each with a number, that can be searched by position.
 struct Obstacles {
     cell: f64,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
     rects: Vec<(Rect, usize)>,
-    /// The number of notes of rectangles in cells; a rectangle counts once per cell.
+    /// The number of registered rectangles; each counts once per cell.
     noted: usize,
-    /// The number of rectangles that were looked at.
+    /// The number of rectangles that were checked.
     looks: Cell<u64>,
 }
 
@@ -223,7 +226,7 @@ impl Obstacles {
         self.rects.push((rect, number));
     }
 
-    /// The numbers of the rectangles that share a point with this one; a number may come more than once.
+    /// The numbers of the rectangles that share a point with this one; a number may occur more than once.
     fn hits<'a>(&'a self, rect: &'a Rect) -> impl Iterator<Item = usize> + 'a {
         let near = self
             .cells_of(rect)
@@ -321,7 +324,7 @@ mod tests {
         let mut layout = layout(Orientation::TopBottom, Point::new(0.0, 160.0), routes);
         place(&crowded, &mut layout);
         assert_eq!(layout.routes[0].label, None);
-        // Without its neighbours it is beside the line, and the whole is enlarged where that needs room.
+        // Without its neighbours it is beside the line, and the layout is enlarged if necessary.
         let alone = plan(vec![labelled(70.0, 50.0)]);
         layout.routes.truncate(1);
         place(&alone, &mut layout);

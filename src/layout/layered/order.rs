@@ -1,14 +1,15 @@
 //! The order of the items in each layer: barycentre and median sweeps with transposition, fewest crossings kept.
 //!
-//! It uses its sibling that sorts; the two are one step, in two files for their length.
+//! It uses its sibling `crossings`; the two are one step, split because of their length.
 
 use super::crossings::CrossingReducer;
 use crate::layout::{LayerRows, Layers};
 
-/// The largest number of sweeps of one order, and the number of sweeps without gain after which it is given up.
+/// The largest number of sweeps of one order, and the number of sweeps without improvement after which it is
+/// abandoned.
 const SWEEPS: usize = 24;
 const PATIENCE: usize = 6;
-/// The largest number of times that the best order is shaken.
+/// The largest number of times that the best order is perturbed.
 const SHAKES: usize = 8;
 
 /// The best order found and its number of crossings, borders of clusters included; see [`Search`].
@@ -16,8 +17,8 @@ pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
     Search::new(layers, effort).finished()
 }
 
-/// A search for an order with few crossings. Its effort counts edges swept: the search starts over, then shakes the
-/// best order, until that is spent.
+/// A search for an order with few crossings. Its effort counts swept edges: the search restarts, then
+/// perturbs the best order, until the effort is spent.
 pub(crate) struct Search<'a> {
     pub(crate) layers: &'a Layers,
     sorter: CrossingReducer<'a>,
@@ -48,7 +49,7 @@ impl<'a> Search<'a> {
         (self.sorter.rows(&self.best.0), self.best.1)
     }
 
-    /// The best order that the effort finds.
+    /// The best order found within the effort.
     pub(crate) fn finished(mut self) -> (LayerRows, u64) {
         if self.effort > 0 {
             self.improve_flat();
@@ -67,7 +68,7 @@ impl<'a> Search<'a> {
         self.found()
     }
 
-    /// Sorts by these keys and sweeps while that gains something.
+    /// Sorts by these keys and sweeps while that is an improvement.
     fn improve(&mut self, key: &[f64], downwards: bool) {
         let edges = self.layers.rank.len();
         let sorter = &mut self.sorter;
@@ -112,7 +113,7 @@ impl<'a> Search<'a> {
         self.improve(&key, true);
     }
 
-    /// Keys near the places of the best rows, with some clusters and a few items thrown elsewhere.
+    /// Keys near the positions of the best rows, with some clusters and a few items moved elsewhere.
     fn shaken(&self, dice: &mut Dice) -> Vec<f64> {
         let rows = self.sorter.rows(&self.best.0);
         let widest = rows.iter().map(Vec::len).max().unwrap_or(0) as f64;
@@ -139,7 +140,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Pseudo-random numbers, the same on every machine: Knuth's linear congruence.
+/// Pseudo-random numbers, identical on every machine: Knuth's linear congruential generator.
 struct Dice(u64);
 
 impl Dice {
@@ -153,7 +154,7 @@ impl Dice {
     }
 }
 
-/// The turn at which a walk through the graph meets each item; it begins at the sources, or at the sinks.
+/// The position of each item in a walk through the graph, which begins at the sources or at the sinks.
 fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
     let n = layers.rank.len();
     let ends = if sources { &layers.up } else { &layers.down };

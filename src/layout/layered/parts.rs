@@ -39,7 +39,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
         .collect()
 }
 
-/// The part with its ends, homes and pieces given by places in it.
+/// The part with its ends, clusters and pieces as indices within it.
 fn localised(plan: &Plan, mut part: Component) -> Component {
     let at = |v: usize| part.vertices.binary_search(&v).unwrap_or(0);
     part.ends = part

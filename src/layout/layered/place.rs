@@ -1,4 +1,4 @@
-//! The places of the items of each layer across: as near to their neighbours as order and gaps allow.
+//! The positions of the items across each layer: as near to their neighbours as order and gaps allow.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ const SWEEPS: usize = 40;
 const BOTH: usize = 6;
 const LAST: usize = 100;
 
-/// The middle of each item across, for rows whose neighbours must be at least so far apart.
+/// The middle of each item across, for rows whose neighbours have these minimum distances.
 pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
     let mut table = Table::new(layers, rows, apart);
     table.pack();
@@ -33,11 +33,11 @@ struct Table<'a> {
     start: Vec<usize>,
     /// The distance of each item from the next in its row; 0 for the last.
     gap: Vec<f64>,
-    /// The place of each item in `items`.
+    /// The index of each item in `items`.
     place: Vec<usize>,
     /// Where the neighbours of each item begin in `pulls`, and those of them that are in the row after it.
     first: Vec<(usize, usize)>,
-    /// The neighbours of all items by their places in `items`, with the weight with which they pull.
+    /// The neighbours of all items by their indices in `items`, with the weight with which they pull.
     pulls: Vec<(usize, f64)>,
     /// The distance of each item from the first of those that it is placed with, if they are as close as allowed.
     offset: Vec<f64>,
@@ -89,13 +89,13 @@ impl<'a> Table<'a> {
         self.start[rank]..self.start[rank + 1]
     }
 
-    /// The place before this one in its row.
+    /// The index before this one in its row.
     fn before(&self, at: usize) -> Option<usize> {
         let start = self.start[self.layers.rank[self.items[at]]];
         at.checked_sub(1).filter(|at| *at >= start)
     }
 
-    /// The place after this one in its row.
+    /// The index after this one in its row.
     fn after(&self, at: usize) -> Option<usize> {
         let end = self.start[self.layers.rank[self.items[at]] + 1];
         Some(at + 1).filter(|at| *at < end)
@@ -113,7 +113,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Takes the offsets of items that are placed together from the gaps between them.
+    /// Computes the offsets of items that are placed together from the gaps between them.
     fn measure(&mut self, together: Range<usize>) {
         let mut offset = 0.0;
         for at in together {
@@ -177,7 +177,7 @@ impl<'a> Table<'a> {
         matches!(self.layers.kind[v], LayerItem::Top | LayerItem::Bottom)
     }
 
-    /// The places of a border in all its layers; of another item its own.
+    /// The indices of a border in all its layers; of another item its own.
     fn column(&self, at: usize) -> impl Iterator<Item = usize> {
         let v = self.items[at];
         let (first, steps) = if self.is_border(v) {
@@ -192,7 +192,8 @@ impl<'a> Table<'a> {
         (0..=steps).map(move |step| self.place[first + 2 * step])
     }
 
-    /// Gives each border one place in all its layers: the middle of the highest and the lowest places that keep every gap.
+    /// Gives each border one position in all its layers: the middle between the highest and the lowest one
+    /// that keep every gap.
     fn straighten_borders(&mut self) {
         let all = 0..self.items.len();
         let head: Vec<usize> = all
@@ -205,7 +206,7 @@ impl<'a> Table<'a> {
         };
         let mut low: Vec<f64> = all.clone().map(goal).collect();
         let mut high: Vec<f64> = low.iter().map(|goal| -goal).collect();
-        // Each column comes after those before it in any row.
+        // Each column follows those before it in any row.
         let mut waiting = vec![0; head.len()];
         for at in all.clone().filter(|at| self.before(*at).is_some()) {
             waiting[head[at]] += 1;
@@ -236,7 +237,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Places the items again between the borders, which stay.
+    /// Places the items again between the borders, which do not move.
     fn inside_borders(&mut self) {
         let mut stretches = Vec::new();
         for rank in 0..self.start.len() - 1 {
@@ -278,7 +279,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The weight with which two linked items are pulled into line: bends most, so that long edges come out straight.
+/// The weight with which two linked items are aligned: highest for bends, so that long edges are straight.
 fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
     match (a, b) {
         (LayerItem::Vertex, LayerItem::Vertex) => 1.0,

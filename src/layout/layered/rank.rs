@@ -1,9 +1,10 @@
-//! The layer of each vertex: longest paths, then a slide inside the slack towards the side with more edges.
+//! The layer of each vertex: longest paths, then a move within the slack towards the side with more edges.
 
-/// The largest number of passes in which vertices slide.
+/// The largest number of passes in which vertices move.
 const PASSES: usize = 30;
 
-/// A rank for each of `n` vertices, counted from 0 and growing along every edge. The edges must not form a cycle.
+/// A rank for each of `n` vertices, counted from 0 and ascending along every edge. The edges must not form a
+/// cycle.
 pub(crate) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     let (before, after) = neighbours(n, edges);
     let (mut rank, order) = longest_paths(&after, &before);

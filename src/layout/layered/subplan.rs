@@ -1,4 +1,4 @@
-//! Some vertices of a part as a plan of their own, and the way back.
+//! Some vertices of a part as a separate plan, and the conversion back.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use crate::layout::{Cluster, Component, Layout, Link, Plan, Route};
 
 use super::PlacedPart;
 
-/// A plan made of some vertices of a part, the links among them, and the clusters around them below a common one.
-/// Everything is given by its place in the part.
+/// A plan made of some vertices of a part, the links among them, and the clusters around them below a common
+/// one. All indices refer to the part.
 pub(crate) struct Subplan {
     pub(crate) plan: Plan,
     vertices: Vec<usize>,
@@ -68,7 +68,7 @@ impl Subplan {
         }
     }
 
-    /// Puts a layout of this plan into the part, moved by `by`.
+    /// Copies a layout of this plan into the part, moved by `by`.
     pub(crate) fn put(&self, layout: &Layout, by: Point, part: &mut PlacedPart) {
         for (&v, at) in self.vertices.iter().zip(&layout.boxes) {
             part.boxes[v] = at.moved(by);

@@ -1,6 +1,6 @@
-//! Long parts in rows one below the other, like the lines of a text: chains of a hundred layers fit a page that way.
+//! Long parts in rows one below the other, like lines of text, so that chains of a hundred layers fit a page.
 //!
-//! Each row is a layout of its own; the edges between rows run through the channels between them.
+//! Each row is a separate layout; the edges between rows run through the channels between them.
 
 use super::subplan::Subplan;
 use super::{Draft, PlacedPart};
@@ -13,9 +13,9 @@ use crate::layout::{Component, Layers, Layout, LayoutOptions, Orientation, Plan,
 const LONG: f64 = 2.5;
 /// The most rows.
 const MOST_ROWS: usize = 12;
-/// The most edges from a row to the next: with more of them the rows are no longer read one by one.
+/// The most edges from a row to the next: with more of them the rows cannot be read one by one.
 const MOST_CUT: usize = 8;
-/// The room beside an edge in a channel, and between a channel and the boxes.
+/// The space beside an edge in a channel, and between a channel and the boxes.
 const LANE: f64 = 8.0;
 const BESIDE: f64 = 12.0;
 
@@ -25,8 +25,8 @@ pub(crate) fn is_long(size: Size, options: &LayoutOptions, orientation: Orientat
     turned.w > LONG * turned.h && pack::fit(size, options.page) < 1.0
 }
 
-/// The part in rows, cut at these layers in every number of rows that makes it fit the page better than the one before;
-/// none if it cannot be cut between its namespaces, or lies in one: then its inside can.
+/// The part in rows, for each number of rows that fits the page better than the previous one; none if it
+/// cannot be cut between its namespaces, or lies in one namespace, whose inside can then be cut.
 pub(crate) fn wraps(
     plan: &Plan,
     options: &LayoutOptions,
@@ -55,8 +55,8 @@ pub(crate) fn wraps(
     found
 }
 
-/// The first layer of each row but the first: where few edges pass, as evenly as that allows, and where no namespace is
-/// cut in two.
+/// The first layer of each row but the first: where few edges pass and no namespace is cut, as evenly as
+/// possible.
 fn cuts(part: &Component, layers: &Layers, many: usize) -> Option<Vec<usize>> {
     let mut passing = vec![0_usize; layers.ranks];
     for &(from, to) in &part.ends {
@@ -102,7 +102,7 @@ impl Wrapped {
     ) -> Option<Self> {
         let row_of = |v: usize| cuts.partition_point(|&cut| cut <= layers.rank[v]);
         let row: Vec<usize> = (0..part.vertices.len()).map(row_of).collect();
-        // A row may be as long as it likes: it is a row already.
+        // A row may be of any length, as it is not wrapped again.
         let endless = LayoutOptions {
             page: Size::new(1e5, 1e5),
             ..*options
@@ -123,7 +123,8 @@ impl Wrapped {
         })
     }
 
-    /// The rows below each other, with the edges from row to row in the channels between; `None` if a way is blocked.
+    /// The rows below each other, with the edges from row to row in the channels between; `None` if a route
+    /// is blocked.
     fn placed(&self, plan: &Plan, part: &Component) -> Option<PlacedPart> {
         let mut placed = PlacedPart::unplaced(part);
         let cut: Vec<usize> = (0..part.ends.len())
@@ -161,7 +162,7 @@ impl Wrapped {
             let via = via((&from.rect, &to.rect), &lanes, margin - BESIDE);
             placed.routes[link] = map.via(from, to, &via)?;
         }
-        // An edge that is followed through a channel costs a reader as much as a crossing does.
+        // Following an edge through a channel costs a reader as much as a crossing.
         placed.crossings = self.crossings + many as u64;
         Some(placed)
     }
@@ -180,10 +181,10 @@ impl Wrapped {
     }
 }
 
-/// The room between a row and the next.
+/// The channel between a row and the next.
 #[derive(Clone, Default)]
 struct Channel {
-    /// Where its first lane runs.
+    /// The position of its first lane.
     y: f64,
     lanes: usize,
 }

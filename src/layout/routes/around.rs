@@ -1,4 +1,5 @@
-//! Routes between boxes at arbitrary places: straight where nothing is in the way, else around the corners of boxes.
+//! Routes between boxes at arbitrary positions: straight if nothing is in the way, else around the corners of
+//! boxes.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -6,15 +7,16 @@ use std::collections::{BTreeMap, BinaryHeap};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{Outline, Plan, Route};
 
-/// The distance that an edge keeps from foreign boxes, and at which it turns around their corners.
+/// The distance that an edge keeps from other boxes, and at which it turns around their corners.
 const CLEAR: f64 = 3.0;
 const TURN: f64 = 5.0;
 /// The distance of edges between the same two boxes.
 const PARALLEL: f64 = 6.0;
-/// The number of pairs of line and box that may be looked at, over all edges; the edges left then run straight.
+/// The number of pairs of line and box that may be checked for all edges together; the remaining edges are
+/// straight.
 const EFFORT: usize = 40_000_000;
 
-/// A route per link, and the number of them that run through foreign boxes because no way was found.
+/// A route per link, and the number of them that run through other boxes because no route was found.
 pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
     let mut map = Map::new(boxes);
     let mut met: BTreeMap<(usize, usize), usize> = BTreeMap::new();
@@ -49,7 +51,7 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
 /// The radius at which an edge with given points turns.
 const BEND: f64 = 9.0;
 
-/// The end of a route: a place among the boxes, its rectangle and its outline.
+/// The end of a route: the index of a box, its rectangle and its outline.
 #[derive(Clone, Copy)]
 pub(crate) struct End {
     pub(crate) at: usize,
@@ -89,7 +91,7 @@ fn straight(p: Point, q: Point) -> [Point; 3] {
     [p.towards(q, 1.0 / 3.0), p.towards(q, 2.0 / 3.0), q]
 }
 
-/// A vertex with its place.
+/// A vertex with its position.
 struct VertexPlace<'a> {
     plan: &'a Plan,
     boxes: &'a [Rect],
@@ -145,7 +147,7 @@ fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Poi
         } else {
             -PARALLEL
         };
-    // The same side for edges there and back.
+    // Edges in both directions use the same side.
     let step = if from.v < to.v { step } else { -step };
     let length = start.distance(end).max(1e-9);
     let aside = Point::new(
@@ -162,7 +164,7 @@ fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Poi
     (inside(from.rect()), inside(to.rect()))
 }
 
-/// The route along a way, cut at the outlines, as straight pieces.
+/// The route along a path, cut at the outlines, as straight pieces.
 fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
     let last = way.len() - 1;
     let start = a.leaves(way[0], way[1]);
@@ -186,8 +188,8 @@ pub(crate) struct Map {
 
 impl Map {
     pub(crate) fn new(boxes: &[Rect]) -> Self {
-        // Where a look from every corner at every box is beyond the effort, no way would be found: all edges run
-        // straight.
+        // If checking every corner against every box exceeds the effort, no route would be found: all edges
+        // are straight.
         if boxes.len().saturating_mul(boxes.len()) > EFFORT {
             return Self {
                 obstacles: Vec::new(),
@@ -217,8 +219,8 @@ impl Map {
         }
     }
 
-    /// A route from one box to another around whatever lies between; its first and its last point between the boxes
-    /// lie on level lanes and may move along them. `None` if a way is blocked.
+    /// A route from one box to another around the boxes between them; its first and last points between the
+    /// boxes lie on level lanes and may move along them. `None` if a route is blocked.
     pub(crate) fn via(&mut self, from: End, to: End, points: &[Point]) -> Option<Route> {
         let [first, between @ .., last] = points else {
             return None;
@@ -232,8 +234,8 @@ impl Map {
         Some(rounded(&way))
     }
 
-    /// The way from a box to a point of a level lane. Where it has to turn on the way, it meets the lane upright from
-    /// its last turn: a way back to the point itself would be a sharp bend.
+    /// The path from a box to a point of a level lane. If it has to turn, it meets the lane vertically from
+    /// its last turn: going back to the point itself would be a sharp bend.
     fn way_to_lane(&mut self, end: End, lane: Point) -> Option<Vec<Point>> {
         let own = (end.at, end.at);
         let mut way = self.way(end.rect.centre(), lane, own)?;
@@ -246,7 +248,7 @@ impl Map {
         Some(way)
     }
 
-    /// The shortest way around the boxes that are not its own.
+    /// The shortest path around all boxes but its own.
     fn way(&mut self, a: Point, b: Point, own: (usize, usize)) -> Option<Vec<Point>> {
         if self.effort == 0 {
             return None;
@@ -260,7 +262,7 @@ impl Map {
         let mut from = vec![0; points.len()];
         let mut done = vec![false; points.len()];
         best[0] = 0.0;
-        // Lengths are not negative, so their bits sort like them.
+        // Lengths are not negative, so their bits have the same order.
         let mut queue = BinaryHeap::from([(Reverse(a.distance(b).to_bits()), 0)]);
         while let Some((_, at)) = queue.pop() {
             if at == 1 {
@@ -282,7 +284,7 @@ impl Map {
         None
     }
 
-    /// Whether a line meets no box besides its own; without effort left, no line does.
+    /// Whether a line touches no box besides its own; false for every line once the effort is spent.
     fn clear(&mut self, a: Point, b: Point, own: (usize, usize)) -> bool {
         if self.effort < self.obstacles.len() {
             self.effort = 0;
@@ -298,7 +300,7 @@ impl Map {
     }
 }
 
-/// The points on the way to the second one.
+/// The points on the path to the second one.
 fn traced(points: &[Point], from: &[usize]) -> Vec<Point> {
     let mut way = vec![points[1]];
     let mut at = 1;

@@ -51,8 +51,8 @@ fn turn(event: &Event) -> Option<(NodeId, Kind)> {
     }
 }
 
-/// A node known only from the messages of one topic that hands it over or takes it over need not have stopped or
-/// started.
+/// A node that is known only from one topic's messages need not have stopped or started when another node
+/// takes that topic over.
 fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     let turns = headlines(drafts, &[Kind::Started, Kind::Stopped]);
     let turns = by(drafts, turns, turn);
@@ -79,7 +79,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         for step in steps.get(&topic).into_iter().flatten() {
             let other = drafts.get(*step);
             let node = context.elements.ends(other.what).0;
-            // A mux has the rate of the sender whose turn it is.
+            // A mux has the rate of the sender that it selects.
             let is_mux = node.is_some_and(|node| !from.contains(&node) && !to.contains(&node));
             if is_mux && is_within(other.time, event.time, TOGETHER_NS) {
                 drafts.fold(*step, hand);

@@ -98,7 +98,7 @@ impl<'a> WindowTurns<'a> {
 
     fn event(&self, at: usize, change: &Change) -> Event {
         let (kind, what, time, detail) = described(change);
-        // The last sign of life is not the end.
+        // The last sign of a node is not its end.
         let time = time.filter(|_| !matches!(change, Change::Removed { .. }));
         let time = time.filter(|t| self.window.span.contains(*t));
         let whole = self.whole(change).filter(|whole| *whole != at);
@@ -201,7 +201,7 @@ impl<'a> WindowTurns<'a> {
     }
 }
 
-/// The event that a change is, its element, its time as far as it is known, and its values.
+/// The event for a change: its element, its time if known, and its values.
 pub(crate) fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
     let is_node = |what: &Element| matches!(what, Element::Node(_));
     match change {

@@ -16,7 +16,7 @@ use crate::graph::{Element, NodeId, TopicId};
 /// The most senders of a topic that take over from each other: a topic of more is shared.
 const MOST_SENDERS: usize = 100;
 
-/// An interval of sending of one role, without a gap.
+/// An interval in which one role publishes without a gap.
 #[derive(Clone, Debug)]
 struct RoleSending {
     role: Arc<str>,
@@ -65,7 +65,7 @@ pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// The intervals of sending of each role, sorted by first message.
+/// The publishing intervals of each role, sorted by first message.
 fn sendings(context: &LogInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
     for sender in senders {
@@ -120,7 +120,7 @@ fn replaced(all: &[RoleSending], end: Stamp) -> Vec<(RoleSending, RoleSending)> 
         let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
             continue;
         };
-        // A role that sent before and continues does not take over, and leaves nothing to take over.
+        // A role that was publishing already and continues does not take over from anybody.
         let carried = others().any(|s| {
             s.role != new.role && s.last > old.last && s.first < old.last.plus(-OVERLAP_NS)
         });

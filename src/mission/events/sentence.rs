@@ -44,7 +44,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
                     |id: &u32| visible(elements.nodes[*id as usize].name.as_str()).into_owned();
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
-            // Another node that sends is the mux between them.
+            // A third node that publishes is the mux between them.
             let mux = match event.what {
                 Element::Topic(topic) => mux(elements, topic, from.iter().chain(to)),
                 _ => Vec::new(),

@@ -36,7 +36,10 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
     let topics = elements.topics.iter();
     let topics = topics.filter(|t| !is_quiet(t.name.as_str())).count();
     let lives = if knows_publishers(elements, &mission.sending) && !roles.is_empty() {
-        format!("what was alive when: {}", words::count(roles.len(), "node"))
+        format!(
+            "when each element was running: {}",
+            words::count(roles.len(), "node")
+        )
     } else {
         let topics = words::count(topics, "topic");
         format!("when each topic carried messages: {topics}, most without a known publisher")

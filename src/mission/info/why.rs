@@ -10,9 +10,9 @@ use crate::evidence::EvidenceLine;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
 
-/// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with its
-/// evidence and life, then the `pieces` in order of time. Plain text, a line each; repeated pieces are written once,
-/// with their number. Names are as recorded.
+/// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each
+/// with its evidence and lifetime, then the `pieces` in order of time. Plain text, a line each; repeated
+/// pieces are written once, with their number. Names are as recorded.
 ///
 /// # Errors
 /// [`Error::Usage`] if the mission has no such element, naming similar ones.
@@ -127,14 +127,14 @@ fn describe(
     };
     writeln!(
         out,
-        "{}\n  proved by {}; {signs}",
+        "{}\n  evidence: {}; {signs}",
         visible(title),
         words.join(", ")
     )?;
     let windows = mission.graphs.rows(element).count();
     writeln!(
         out,
-        "  there in {windows} of {} parts of the mission",
+        "  present in {windows} of {} parts of the mission",
         mission.windows.len()
     )
 }
@@ -159,7 +159,7 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
     let hint = if close.is_empty() {
         "`bagreel info` lists every name".to_owned()
     } else {
-        format!("close to it: {}", close.join(", "))
+        format!("similar names: {}", close.join(", "))
     };
     let what = match names {
         [name] => format!("there is no node or topic `{name}`"),

@@ -22,7 +22,7 @@ pub(crate) struct ChangeRow<'a> {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum ChangeValues<'a> {
-    /// The time of what came, went or restarted, if known.
+    /// The time at which the element appeared, vanished or restarted, if known.
     Time {
         time_ns: Option<i64>,
     },

@@ -1,6 +1,6 @@
-//! Nodes, topics and edges in JSON: in one window, or over the whole mission, with their lives, stretches and, in the
-//! form of runs, their windows as columns. Each is one struct for writing and for reading; when read, everything except
-//! names is optional.
+//! Nodes, topics and edges in JSON: in one window, or over the whole mission, with their lifetimes, stretches
+//! and, in the form of runs, their windows as columns. Each is one struct for writing and for reading; when
+//! read, everything except names is optional.
 
 use std::borrow::Cow;
 

@@ -8,10 +8,10 @@
 //!   "state": [["active", 35979]], "degree": [["measured", 35979]], "count": [9, [10, 700], 11, …], …}}, …]
 //! ```
 //!
-//! `windows` are pairs of the first and the last place. A column has a value per window of these in order; `[value,
-//! times]` is a run of equal ones; a missing column is `null` in all of them. The rate is the count over the window's
-//! length, unless a column `hz` overrides it (there `"="` is that rate); of a node the count is
-//! `sent`.
+//! `windows` contains pairs of a first and a last index. A column has one value for each of these windows, in
+//! order; `[value, times]` is a run of equal values; a missing column is `null` in all of them. The rate is
+//! the count divided by the window's length, unless a column `hz` overrides it (in which `"="` stands for
+//! that rate); a node's count is `sent`.
 
 mod columns;
 

@@ -6,9 +6,9 @@
 //! {"what": "topic", "name": "/scan", …, "stretches": […], "pauses": [[from_ns, to_ns], …]}
 //! ```
 //!
-//! The stretches of a topic are those of all unknown senders together. Flags are 1 for messages at even intervals, plus 2
-//! if the stretch begins where the previous one ends. `pauses` are the longest ones between two messages. Up to schema 2
-//! these were lists of their own, in `sending`.
+//! The stretches of a topic are those of all unknown senders together. Flags are 1 for messages at even
+//! intervals, plus 2 if the stretch begins where the previous one ends. `pauses` are the longest intervals
+//! between two messages. Up to schema 2 these were separate lists in `sending`.
 
 use std::collections::BTreeMap;
 

@@ -78,7 +78,7 @@ impl Json<'_> {
     /// The errors of `out`.
     pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let lines = LineFormatter::down_to(if self.is_runs() { 3 } else { 4 });
-        // Its own buffer: the serializer writes a few bytes at a time.
+        // Buffered here, because the serializer writes a few bytes at a time.
         let mut out = BufWriter::with_capacity(1 << 16, out);
         let mut serializer = serde_json::Serializer::with_formatter(&mut out, lines);
         self.serialize(&mut serializer)?;
@@ -103,7 +103,7 @@ impl Serialize for Json<'_> {
         map.serialize_entry("messages", &mission.messages)?;
         map.serialize_entry("period_ns", &mission.period.nanos())?;
         map.serialize_entry("step_ns", &mission.step.nanos())?;
-        // Under its old key, too, for one release.
+        // Also under the old key, for one release.
         let rows = List(events(&mission.log, &mission.elements));
         map.serialize_entry("events", &rows)?;
         map.serialize_entry("ledger", &rows)?;

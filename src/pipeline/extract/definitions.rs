@@ -25,14 +25,13 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
                 path: path.clone(),
                 line: 0,
                 reason,
-                hint: "its fields are written as ROS writes them, one a line in a `.msg` file"
-                    .to_owned(),
+                hint: "a `.msg` file lists one field per line, in ROS's syntax".to_owned(),
             })?;
         }
         if files.is_empty() {
             return Err(Error::usage(
                 format!("`{}` contains no `.msg` or `.idl` file", folder.display()),
-                "name the folder of a package or of several: `my_msgs/msg/Thing.msg`",
+                "give the folder of one or more packages, which contain files such as `my_msgs/msg/Thing.msg`",
             ));
         }
     }
@@ -64,8 +63,11 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
         }
         if waiting.len() + found.len() > MOST_FILES {
             return Err(Error::usage(
-                format!("`{}` holds more than {MOST_FILES} files", folder.display()),
-                "name the folder of your message packages",
+                format!(
+                    "`{}` contains more than {MOST_FILES} files",
+                    folder.display()
+                ),
+                "give the folder of your message packages",
             ));
         }
     }

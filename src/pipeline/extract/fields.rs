@@ -21,15 +21,15 @@ use crate::pipeline::collect::no_messages;
 /// The columns before a message's fields: its log time, and its publisher if known.
 const TIME: &str = "time_ns";
 const PUBLISHER: &str = "publisher";
-/// The table of the others: topic, type, file, number of rows.
+/// The columns of the index of tables: topic, type, file, number of rows.
 const INDEX: &str = "index";
 /// The bytes of messages that one table buffers before its rows are written.
 const MOST_WAITING: usize = 4 << 20;
-/// The same number for all tables together.
+/// The bytes of messages that all tables together buffer.
 const MOST_WAITING_IN_ALL: usize = 32 << 20;
 /// The most types named in an error.
 const MOST_NAMED: usize = 3;
-/// The bytes of encoded rows that all tables hold in memory.
+/// The bytes of encoded rows that all tables together keep in memory.
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
@@ -129,7 +129,7 @@ impl Lost {
 struct FieldTable {
     topic: String,
     type_name: String,
-    /// The name of its file, once it has one.
+    /// The name of its file, once it is created.
     file: String,
     decoder: Decoder,
     batch: Batch,
@@ -325,7 +325,7 @@ struct MessageTarget {
     type_name: String,
     /// The index of the table, or the reason why there is none; `None` for topics that are not requested.
     table: Option<Result<usize, String>>,
-    /// The decoder to try if the first message does not fit the other.
+    /// The decoder to try if the first message does not match the other one.
     older: Option<Decoder>,
     publisher: Option<NodeName>,
     /// The number of stamped messages that have not been delivered.

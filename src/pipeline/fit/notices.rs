@@ -14,7 +14,7 @@ pub(super) fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>,
         let inside = |other: &&Arc<str>| lies_in(other, name);
         let words = match kept.iter().filter(inside).count() {
             0 => name.to_string(),
-            many => format!("{name} but for {} in it", words::count(many, "node")),
+            many => format!("{name} except {} in it", words::count(many, "node")),
         };
         (Arc::clone(name), words)
     };

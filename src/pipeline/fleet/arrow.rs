@@ -45,7 +45,7 @@ pub fn mission_batches(mission: &Mission) -> Result<Vec<(&'static str, RecordBat
 /// The counts in the rows of a table `counts`, written by any program.
 ///
 /// # Errors
-/// [`Error::Usage`] for a column that is missing, of another type, or unknown where it must be known.
+/// [`Error::Usage`] for a column that is missing, of another type, or null where a value is required.
 pub fn counts_of(batch: &RecordBatch) -> Result<Vec<Count>> {
     // A role is derived from the name, and older tables lack it.
     let columns = COUNTS.iter().filter(|(name, ..)| *name != ROLE);
@@ -80,8 +80,8 @@ fn count(table: &Batch, row: usize) -> Result<Count> {
 }
 
 fn missing(name: &str) -> Error {
-    let what = format!("a row's `{name}` is unknown or makes no sense");
-    Error::usage(what, "give what `tables` gave")
+    let what = format!("the `{name}` of a row is missing or not valid");
+    Error::usage(what, "pass tables as `tables` returned them")
 }
 
 fn known<'a>(table: &'a Batch, name: &str, row: usize) -> Option<&'a TableColumn> {

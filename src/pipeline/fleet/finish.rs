@@ -16,9 +16,9 @@ use crate::mission::raw::{
 };
 use crate::mission::{Mission, mission_of};
 
-/// Makes a mission from the counts of all its bags, in any order: every window from the first message to the last, a
-/// publication `active` in windows with messages and `silent` in those between. A node is alive while it publishes.
-/// Facts from payloads (subscribers, `/rosout`) and medians are missing.
+/// Makes a mission from the counts of all its bags, in any order: every window from the first message to the
+/// last, a publication `active` in windows with messages and `silent` in those between. A node is present
+/// while it publishes. Facts from payloads (subscribers, `/rosout`) and medians are missing.
 ///
 /// # Errors
 /// [`Error::Usage`] for no counts, for those of several missions or periods, and for more than 100,000 windows.
@@ -83,7 +83,7 @@ fn check(counts: &[Count]) -> Result<(Period, usize)> {
     let many = wins().max().unwrap_or(0) - wins().min().unwrap_or(0) + 1;
     if many > i128::from(budget::WINDOWS) {
         return Err(Error::usage(
-            format!("its messages lie {many} windows apart"),
+            format!("its messages are {many} windows apart"),
             "remove the counts at impossible times, or use a longer period",
         ));
     }

@@ -200,7 +200,7 @@ fn endings() -> Vec<String> {
     all
 }
 
-/// Whether an object has a bag's extension: inspecting each would need a request.
+/// Whether an object has a bag's extension; inspecting each object would cost a request.
 fn is_named(url: &str) -> bool {
     endings().iter().any(|ending| url.ends_with(ending))
 }
@@ -295,7 +295,7 @@ fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     Ok(())
 }
 
-/// The start of a bag, from its tail if possible.
+/// The start of a bag, read from its end if possible.
 fn begins(input: &Input) -> Result<Option<Stamp>> {
     if input.is_pipe() {
         return Err(Error::usage(

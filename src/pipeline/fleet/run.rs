@@ -183,7 +183,7 @@ struct FleetWork<'a> {
 }
 
 impl FleetWork<'_> {
-    /// Takes one bag after the other until none is left.
+    /// Counts one bag after the other until none is left.
     fn run(&self, to: &Sender<Result<BagOutcome>>) {
         while !self.is_stopped.load(Ordering::Relaxed) {
             let at = self.next.fetch_add(1, Ordering::Relaxed);
@@ -345,7 +345,7 @@ impl FleetFiles {
     fn open(folder: &Path) -> Result<Self> {
         let (counts, bags) = (folder.join("counts"), folder.join("bags"));
         for folder in [&counts, &bags] {
-            fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
+            fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
         }
         let earlier = [earlier(&counts)?, earlier(&bags)?];
         Ok(Self {

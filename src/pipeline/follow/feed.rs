@@ -40,8 +40,8 @@ impl Certainty {
     }
 }
 
-/// What makes two rows of the log one event, beside their time: numbers become more precise, while another state, or
-/// another number of switched nodes, is another event.
+/// The key by which two rows of the log are the same event, besides their time: numbers become more precise,
+/// while another state, or another number of switched nodes, is another event.
 #[derive(PartialEq)]
 enum Key {
     Event {
@@ -151,7 +151,7 @@ fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Sta
                 stopped: one.stopped,
                 started: one.started,
             };
-            // The last of its stops is certain by then.
+            // By then the last of its stops is certain.
             let is_over = now.since(one.time) >= SWITCH_NS + SURE_NS;
             let certainty = if is_over {
                 Certainty::Sure

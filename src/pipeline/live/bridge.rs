@@ -32,9 +32,9 @@ const HEAD: usize = 13;
 struct Bridge<'a> {
     socket: WebSocket<Patient>,
     watched: &'a mut Watched,
-    /// The channel in the file of each subscription, which has the number of its channel.
+    /// The channel in the file for each subscription; a subscription has the number of the server's channel.
     subscribed: BTreeMap<u64, usize>,
-    /// What was described since the whole graph was last requested; `None` once it is in use.
+    /// The graph as described since it was last requested as a whole; `None` once it is in use.
     whole: Option<LiveGraph>,
     /// The time of that request; `None` before the first.
     requested: Option<Instant>,
@@ -42,7 +42,7 @@ struct Bridge<'a> {
     has_asked: bool,
 }
 
-/// Listens to the server at `place` (`host:port`).
+/// Connects to the server at `place` (`host:port`) and records what it sends.
 pub(super) fn watch(place: &str, watched: &mut Watched) -> io::Result<()> {
     let stream = connect(place.split('/').next().unwrap_or_default())?;
     let request = format!("ws://{place}").into_client_request();
@@ -77,7 +77,9 @@ impl Bridge<'_> {
             self.socket.get_mut().wait(BEAT / 10);
             match self.socket.read() {
                 Ok(Message::Text(text)) if text.len() > MOST_TEXT => {
-                    return Err(io::Error::other("it described too much at once"));
+                    return Err(io::Error::other(
+                        "its description of the graph is too large",
+                    ));
                 }
                 Ok(Message::Text(text)) => {
                     let message = serde_json::from_str(&text).map_err(io::Error::other)?;
@@ -105,7 +107,8 @@ impl Bridge<'_> {
         Ok(())
     }
 
-    /// Takes the whole graph over after a request, and requests it again; returns whether the graph may be new.
+    /// Adopts the whole graph after a request, and requests it again; returns whether the graph may have
+    /// changed.
     fn renew(&mut self) -> io::Result<bool> {
         let Some(requested) = self.requested else {
             return Ok(false);
@@ -114,7 +117,7 @@ impl Bridge<'_> {
             self.send(&json!({"op": "unsubscribeConnectionGraph"}))?;
             self.request()?;
         }
-        // Changes that were under way may precede the whole.
+        // Changes already in transit may arrive before the whole graph.
         let is_whole =
             requested.elapsed() >= BEAT && self.whole.as_ref().is_some_and(|g| !g.is_empty());
         if let Some(mut whole) = self.whole.take_if(|_| is_whole) {

@@ -55,7 +55,7 @@ fn ask(place: &str, method: &str) -> io::Result<String> {
         "POST /RPC2 HTTP/1.0\r\nHost: {place}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\n\r\n",
         body.len()
     );
-    // At once: a server that answers the first part and closes would cut off the rest.
+    // Sent in one piece: a server that answers the first part and closes would cut off the rest.
     stream.write_all((head + &body).as_bytes())?;
     let mut answer = String::new();
     stream.take(MOST_ANSWER).read_to_string(&mut answer)?;
@@ -102,5 +102,5 @@ fn text<'a>(value: Node<'a, 'a>) -> &'a str {
 }
 
 fn no_master() -> io::Error {
-    io::Error::other("its answer is not that of a ROS master")
+    io::Error::other("its response is not that of a ROS master")
 }

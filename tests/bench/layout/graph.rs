@@ -1,4 +1,4 @@
-//! The test graphs: the union of all windows of an evolution, with sizes as labels would give them.
+//! The test graphs: the union of all windows of a mission, with sizes as for labels.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(crate) struct Graph {
     pub(crate) clusters: Vec<String>,
 }
 
-/// The union of all windows of an evolution.
+/// The union of all windows of a mission.
 pub(crate) fn read(path: &Path) -> Graph {
     let text = std::fs::read_to_string(path).unwrap();
     union(&serde_json::from_str(&text).unwrap())

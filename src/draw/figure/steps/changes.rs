@@ -1,5 +1,5 @@
-//! The map with differences: nodes that come and go, and those connected to them, at the same places in every phase, with
-//! changes of the phase in colour.
+//! The map with differences: nodes that start and stop, and those connected to them, at fixed positions in
+//! every phase, with changes of the phase in colour.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,8 +15,9 @@ use crate::draw::figure::place::PlacedPanel;
 use crate::draw::figure::talks::Talk;
 use crate::draw::scene::Scene;
 
-/// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that come and go together;
-/// where that is too high and the user chose no steps, without the first phase, then without the smallest steps.
+/// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that start
+/// and stop together; if that is too high and the user chose no steps, without the first phase, then without
+/// the smallest steps.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let mut steps = StepSource::new(sheet)?;
     let most = steps.columns;
@@ -42,12 +43,12 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         steps.drop_least(&mut chosen);
     }
     Err(Error::usage(
-        format!("these phases are higher than {MOST_HEIGHT} mm at the same places"),
-        "`--steps 3,5` draws fewer of them, `--kind steps` each at its own places, `--ns-filter` leaves nodes out",
+        format!("these phases are higher than {MOST_HEIGHT} mm with fixed positions"),
+        "draw fewer with `--steps 3,5`, use `--kind steps`, or omit nodes with `--ns-filter`",
     ))
 }
 
-/// All that a step changes, with its neighbours, over all phases.
+/// The elements that the steps change, with their neighbours, over all phases.
 struct Union<'u, 's> {
     steps: &'u StepSource<'s>,
     /// The rows of each box, and whether it ever changes.
@@ -125,7 +126,7 @@ impl<'u, 's> Union<'u, 's> {
         self.talks = phases.map(|phase| of_phase(phase.span)).collect();
     }
 
-    /// The panels of these phases; `None` where they are too wide.
+    /// The panels of these phases; `None` if they are too wide.
     fn panels(&self, phases: &[usize]) -> Option<Vec<Panel>> {
         let (steps, source) = (self.steps, self.steps.sheet.source);
         let mut links: BTreeMap<(usize, usize), Talk> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! The events of the log in a step: what began, what ended, what changed hands.
+//! The events of the log in a step: elements that began, ended, or were taken over.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ impl StepSource<'_> {
         (turns[0] + turns[1]) * 4 + self.handed(k).len()
     }
 
-    /// The time of the step into phase `k`: from the middle of the phase before to its own.
+    /// The time of the step into phase `k`: from the middle of the previous phase to its own.
     fn time(&self, k: usize) -> Span {
         let middle = |k: usize| {
             let span = self.sheet.source.phases[k].span;
@@ -26,7 +26,8 @@ impl StepSource<'_> {
         Span::new(middle(k - 1), middle(k))
     }
 
-    /// The nodes that phase `k` has more of, or fewer, than the one before, with the events by which they began or ended.
+    /// The nodes that phase `k` adds or removes compared with the previous one, with the events by which they
+    /// began or ended.
     pub(super) fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EventId>> {
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let (old, new) = match sign {

@@ -4,15 +4,15 @@ use super::StepSource;
 use crate::draw::figure::panel::Panel;
 
 impl StepSource<'_> {
-    /// The number of steps that are not among these, though something changes in them.
+    /// The number of steps with changes that are not among these.
     pub(super) fn left_out(&self, chosen: &[usize]) -> usize {
         let all = 1..self.sheet.source.phases.len();
         let changes = all.filter(|k| !chosen.contains(k) && self.weight(*k) > 0);
         changes.count()
     }
 
-    /// Leaves out the panels that repeat an earlier one elsewhere, unless they were asked for; returns a sentence for
-    /// each: `5 → 6 as 1 → 2, in /robot2.`
+    /// Leaves out the panels that repeat an earlier one elsewhere, unless they were requested; returns a
+    /// sentence for each: `5 → 6 as 1 → 2, in /robot2.`
     pub(super) fn fold_repeated(&self, panels: &mut Vec<Panel>) -> Vec<String> {
         let mut seen: Vec<(Vec<(bool, String)>, String)> = Vec::new();
         let mut repeated = Vec::new();

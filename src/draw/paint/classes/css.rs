@@ -29,13 +29,13 @@ fn base(style: &Style) -> String {
     body(&mut out, ".topic", &style.topic);
     edges(&mut out, style);
     badges(&mut out, style);
-    // A shape of its own among those of its box.
+    // A separate shape among those of its box.
     let _ = write!(out, "g>rect.l{{fill:{};stroke:none}}", style.latched.stroke);
     out
 }
 
-/// The rules for what classes change of that: rate, confidence, state and mark; a later rule counts more. Only these class
-/// words have rules.
+/// The rules for the changes by classes: rate, confidence, state and mark; later rules take precedence. Only
+/// these class words have rules.
 fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // The rate of a silent element is not worth showing.
     let mut out = String::from(

@@ -1,4 +1,4 @@
-//! Names as DOT ids and labels, escaped as `rqt_graph` escapes them, and never two alike.
+//! Names as DOT ids and labels, escaped as in `rqt_graph`, and unique.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use crate::base::words::is_invisible;
 use crate::view::{ItemKind, View};
 
-/// The longest id in characters; a longer one is cut, and the label keeps the whole name.
+/// The longest id in characters; a longer one is cut, and the label has the whole name.
 const LONGEST_ID: usize = 1000;
 
 /// A name as part of a DOT id, as `PydotFactory.escape_name` makes it: percent-encoded, then `/` as `__`, `%` and
@@ -76,11 +76,11 @@ fn unlike(mut id: String, taken: &mut BTreeSet<String>) -> String {
     }
 }
 
-/// A text as a quoted DOT string that `qt_dotgraph` reads back as the same text: it strips quotes from the ends and
-/// then decodes the escapes of Python's strings. Graphviz knows `\\`, `\"` and `\n` of them.
+/// A text as a quoted DOT string that `qt_dotgraph` reads back as the same text: it strips quotes from the
+/// ends and then decodes the escapes of Python's strings. Of these, Graphviz supports `\\`, `\"` and `\n`.
 pub(super) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
-    // A quote at the end would be stripped with ours, and its backslash be left over.
+    // A quote at the end would be stripped with ours, leaving its backslash.
     let end = text.trim_end_matches('"').len();
     for (at, c) in text.char_indices() {
         match c {

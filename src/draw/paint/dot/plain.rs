@@ -1,4 +1,4 @@
-//! The profile `plain`: no places, but a title and colours, so that `dot -Tpdf` makes a figure of it.
+//! The profile `plain`: without positions, with a title and colours, for `dot -Tpdf`.
 
 use std::fmt::Write as _;
 

@@ -1,8 +1,9 @@
-//! The profile `rqt`: as `rqt_graph` saves a graph, with every place in the file, so that it loads there.
+//! The profile `rqt`: as `rqt_graph` saves a graph, with all positions, so that it can load the file.
 //!
-//! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and draws nothing
-//! that has no place. It breaks on edge labels without `lp`, widths that are not whole numbers, edges at both ends,
-//! clusters without a `graph` statement and colours in parts; all edges must be at the top level, or they appear twice.
+//! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and does
+//! not draw elements without a position. It fails on edge labels without `lp`, widths that are not whole
+//! numbers, edges with heads at both ends, clusters without a `graph` statement and colours in parts; all
+//! edges must be at the top level, or they appear twice.
 
 use std::fmt::Write as _;
 
@@ -124,7 +125,7 @@ impl RqtWriter<'_> {
         out.push_str("];\n");
     }
 
-    /// Our own attributes, which loaders pass over.
+    /// Our own attributes, which loaders ignore.
     fn extras(&self, out: &mut String, shown: &Shown, members: &[Element]) {
         let (state, confidence) = (shown.state.word(), shown.confidence.word());
         let _ = write!(out, ", state={state}, degree={confidence}");
@@ -143,7 +144,7 @@ impl RqtWriter<'_> {
         }
     }
 
-    /// The tool tip in the manner of `rqt_graph`'s own: a line per value. Qt takes it for rich text.
+    /// The tooltip in the style of `rqt_graph`: a line per value. Qt interprets it as rich text.
     fn tooltip(&self, arrow: &Arrow, shown: &Shown) -> String {
         let name = |at: u32| {
             let item = self.drawing.view.items.get(at as usize);
@@ -190,7 +191,7 @@ impl RqtWriter<'_> {
         (!qos.is_empty()).then(|| qos.to_string())
     }
 
-    /// The way of an edge: its tip, then its curve up to the arrow's head.
+    /// The route of an edge: its tip, then its curve up to the arrow's head.
     fn spline(&self, arrow: &Arrow, route: &Route) -> String {
         let place = |at: u32| {
             self.layout
@@ -224,7 +225,7 @@ impl RqtWriter<'_> {
     }
 }
 
-/// About the middle of a route, for a label that the layout left without a place.
+/// A point near the middle of a route, for a label that the layout did not place.
 fn middle(route: &Route) -> Point {
     let mid = route.curves.get(route.curves.len() / 2);
     mid.map_or(route.start, |[a, b, _]| {
@@ -250,7 +251,7 @@ fn inches(points: f64) -> String {
     format!("{:.4}", points / POINTS_PER_INCH)
 }
 
-/// Text inside a tool tip that is read as HTML.
+/// Text inside a tooltip that is interpreted as HTML.
 fn rich(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;")
 }

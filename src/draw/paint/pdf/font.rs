@@ -23,7 +23,7 @@ const IDENTITY: SystemInfo<'static> = SystemInfo {
 /// Units of a width in a PDF, per em.
 const PER_EM: f32 = 1000.0;
 
-/// A font, and what has been written with it.
+/// A font, and the glyphs written with it.
 pub(super) struct PdfFont<'a> {
     font: FontRef<'a>,
     shaper: ShaperData,
@@ -31,7 +31,7 @@ pub(super) struct PdfFont<'a> {
     widths: GlyphMetrics<'a>,
     units: f32,
     used: GlyphRemapper,
-    /// The text of each glyph in the document's font, for those who search and copy.
+    /// The text of each glyph in the document's font, for searching and copying.
     texts: BTreeMap<u16, String>,
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Glyph<'t> {
     at: (f32, f32),
     /// The part of the text that it shows first.
     shown: &'t str,
-    /// Whether a reader places it where it belongs by the widths alone.
+    /// Whether viewers place it correctly by the widths alone.
     is_regular: bool,
 }
 
@@ -61,7 +61,7 @@ impl<'a> PdfFont<'a> {
         })
     }
 
-    /// Whether something was written with it.
+    /// Whether any text was written with it.
     pub(super) fn is_used(&self) -> bool {
         !self.texts.is_empty()
     }
@@ -111,7 +111,7 @@ impl<'a> PdfFont<'a> {
         width.unwrap_or_default() / self.units
     }
 
-    /// Writes a text in runs whose glyphs stand at their natural places.
+    /// Writes a text in runs whose glyphs are at their natural positions.
     pub(super) fn show(
         &mut self,
         content: &mut Content,
@@ -145,7 +145,7 @@ impl<'a> PdfFont<'a> {
         content.end_text();
     }
 
-    /// Notes the text of a glyph; a single character is what it shows elsewhere, too.
+    /// Records the text of a glyph; a single character takes precedence.
     fn learn(&mut self, id: u16, shown: &str) {
         let known = self.texts.entry(id).or_default();
         if known.is_empty() || shown.chars().count() == 1 && known.chars().count() > 1 {
@@ -173,8 +173,7 @@ impl<'a> PdfFont<'a> {
 
     /// Writes the font with the glyphs in use as five objects, the first of which is `first`.
     ///
-    /// # Errors
-    /// The reason for which its glyphs cannot be taken out.
+    /// # Errors The reason why its glyphs cannot be extracted.
     pub(super) fn write(&self, pdf: &mut Pdf, first: Ref) -> Result<(), String> {
         let [whole, cid, described, stream, cmap] =
             [0, 1, 2, 3, 4].map(|next| Ref::new(first.get() + next));
@@ -240,7 +239,7 @@ impl<'a> PdfFont<'a> {
             .ascent(scaled(metrics.ascent))
             .descent(scaled(metrics.descent))
             .cap_height(scaled(metrics.cap_height.unwrap_or(metrics.ascent)))
-            // Required, and only of use to a reader that replaces the font.
+            // Required, but only used by viewers that replace the font.
             .stem_v(80.0);
         if is_cff {
             descriptor.font_file3(file);
@@ -249,7 +248,7 @@ impl<'a> PdfFont<'a> {
         }
     }
 
-    /// The name of the font with a tag of its own, as subsets must have one (ISO 32000-1, 9.6.4).
+    /// The name of the font with a unique tag, as required for subsets (ISO 32000-1, 9.6.4).
     fn name(&self, first: Ref) -> String {
         let mut number = first.get();
         let tag: String = std::iter::repeat_with(|| {
@@ -271,7 +270,7 @@ impl<'a> PdfFont<'a> {
     }
 }
 
-/// Draws outlines of a font as a path: up is down on our pages.
+/// Draws outlines of a font as a path, with the y axis flipped.
 struct PathPen<'c> {
     content: &'c mut Content,
     origin: (f32, f32),

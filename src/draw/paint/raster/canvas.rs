@@ -1,4 +1,4 @@
-//! Frames one after another: only changed parts are drawn again, with the same pixels as if all were.
+//! Frames one after another: only changed parts are redrawn, with the same pixels as a full redraw.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use crate::draw::scene::{Group, Scene};
 /// The largest share of changed tiles; above it, everything is redrawn.
 const MOST_SHARE: f64 = 0.7;
 
-/// A page that frames are drawn on in turn; it remembers the last one.
+/// A page on which frames are drawn one after another; it stores the last one.
 pub struct Canvas<'a> {
     painter: &'a Painter,
     scale: f64,
@@ -25,12 +25,12 @@ struct Last {
     drawn: Vec<Arc<RasterGroup>>,
     sheet: PixelSheet,
     scratch: PixelSheet,
-    /// The tiles that differ from the scene before; `None` for all of them.
+    /// The tiles that differ from the previous scene; `None` for all of them.
     dirty: Option<Tiles>,
 }
 
 impl<'a> Canvas<'a> {
-    /// An empty canvas; scenes drawn on it will be `scale` times as large.
+    /// An empty canvas; scenes on it are `scale` times as large.
     pub fn new(painter: &'a Painter, scale: f64) -> Self {
         Self {
             painter,
@@ -39,7 +39,7 @@ impl<'a> Canvas<'a> {
         }
     }
 
-    /// The scene in pixels, equal to [`Painter::paint`]; quick if little differs from the scene before.
+    /// The scene in pixels, equal to [`Painter::paint`]; fast if little differs from the previous scene.
     ///
     /// # Errors
     /// As [`Painter::paint`].
@@ -80,7 +80,7 @@ impl Last {
         })
     }
 
-    /// Draws again the parts that differ, or all of it where they are too many.
+    /// Redraws the parts that differ, or everything if there are too many.
     fn followed_by(mut self, scene: Scene, painter: &Painter) -> Result<Self> {
         if scene.size != self.scene.size || scene.background != self.scene.background {
             return Self::first(scene, painter, self.sheet.scale);
@@ -105,7 +105,7 @@ impl Last {
         })
     }
 
-    /// Draws the groups that meet these tiles, and copies these tiles alone.
+    /// Draws the groups that overlap these tiles, and copies only these tiles.
     fn mend(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>], dirty: &Tiles) {
         self.scratch.clear(dirty, scene);
         for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
@@ -114,7 +114,7 @@ impl Last {
         self.sheet.copy(dirty, &self.scratch);
     }
 
-    /// The place in the scene before of each group that is the same there.
+    /// The index in the previous scene of each group that is equal there.
     fn stays(&self, scene: &Scene) -> Vec<Option<usize>> {
         let ids = self.scene.groups.iter().map(|group| group.id.as_str());
         let before: HashMap<&str, usize> = ids.zip(0..).collect();
@@ -132,7 +132,7 @@ impl Last {
         drawn: &[Arc<RasterGroup>],
         stays: &[Option<usize>],
     ) -> Option<Tiles> {
-        // What stays must stay in order, or what lies above what would differ.
+        // Unchanged groups must keep their order, or overlaps would differ.
         if !stays.iter().flatten().is_sorted() {
             return None;
         }
@@ -148,7 +148,7 @@ impl Last {
 }
 
 impl PixelSheet {
-    /// The bytes of each row of pixels inside the tiles, by their place.
+    /// The byte range of each row of pixels inside the tiles.
     fn rows(&self, tiles: &Tiles) -> impl Iterator<Item = Range<usize>> + use<> {
         let (width, height) = (self.pixels.width as usize, self.pixels.height as usize);
         let scale = self.scale;

@@ -1,4 +1,5 @@
-//! A group as it is laid on pages: small ones as pixels that were drawn once, large ones as a tree to draw each time.
+//! A group as it is composited onto pages: small ones as cached pixels, large ones as a tree to draw each
+//! time.
 
 use resvg::usvg::Tree;
 use tiny_skia::{Pixmap, PixmapMut, Transform};
@@ -6,7 +7,8 @@ use tiny_skia::{Pixmap, PixmapMut, Transform};
 use super::Pixels;
 use crate::base::cast;
 
-/// The largest number of pixels around a group of which pixels are kept: a box with its words has about ten thousand.
+/// The largest number of pixels of a group that is cached as pixels: a box with its words has about ten
+/// thousand.
 const MOST_PIXELS: f64 = 65_536.0;
 /// Pixels around a group's box, for soft edges.
 const MARGIN: f64 = 2.0;
@@ -17,7 +19,7 @@ pub(super) enum Drawn {
     Tree(Box<Tree>),
 }
 
-/// The pixels of a group that are not clear: lines leave most of the area around them clear.
+/// The pixels of a group that are not transparent: most of the area around lines is.
 pub(super) struct GroupPixels {
     runs: Vec<Run>,
     /// Premultiplied red, green, blue and alpha, run by run.
@@ -40,7 +42,7 @@ impl Drawn {
         }
     }
 
-    /// The bytes that are kept of its pixels.
+    /// The number of cached bytes of its pixels.
     pub(super) fn bytes(&self) -> usize {
         match self {
             Self::Pixels(pixels) => pixels.rgba.len() + size_of_val(&*pixels.runs),
@@ -48,7 +50,7 @@ impl Drawn {
         }
     }
 
-    /// Lays the group on a page of opaque pixels.
+    /// Composites the group onto a page of opaque pixels.
     pub(super) fn lay(&self, scale: f64, page: &mut Pixels) {
         match self {
             Self::Pixels(pixels) => pixels.lay(page),
@@ -64,7 +66,7 @@ impl Drawn {
 }
 
 impl GroupPixels {
-    /// The pixels of the group; `None` where they are too many.
+    /// The pixels of the group; `None` if there are too many.
     fn of(tree: &Tree, scale: f64, page: (u32, u32)) -> Option<Self> {
         let area = tree.root().abs_layer_bounding_box();
         let low = |at: f32, most: u32| {
@@ -91,7 +93,8 @@ impl GroupPixels {
         ))
     }
 
-    /// The pixels of `map` that are not clear; its corner is at this column and row of a page `across` pixels wide.
+    /// The pixels of `map` that are not transparent; its corner is at this column and row of a page `across`
+    /// pixels wide.
     fn inked(map: &Pixmap, (left, top): (usize, usize), across: usize) -> Self {
         let (mut runs, mut rgba) = (Vec::new(), Vec::new());
         let rows = map.data().chunks_exact(map.width() as usize * 4);
@@ -131,11 +134,11 @@ impl GroupPixels {
     }
 }
 
-/// Lays a premultiplied pixel over an opaque one.
+/// Composites a premultiplied pixel over an opaque one.
 fn over(to: &mut [u8], from: &[u8], rest: u8) {
     for (to, from) in to.iter_mut().zip(&from[..3]) {
         let under = u32::from(*to) * u32::from(rest) + 128;
-        // A 255th, rounded.
+        // Division by 255, rounded.
         let under = (under + (under >> 8)) >> 8;
         *to = from.saturating_add(u8::try_from(under).unwrap_or(u8::MAX));
     }

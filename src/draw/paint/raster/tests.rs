@@ -36,7 +36,7 @@ fn words(id: &str, text: &str, weight: Weight) -> Group {
     group
 }
 
-/// A blob and a line whose places depend on `at`.
+/// A blob and a line whose positions depend on `at`.
 fn element(id: usize, at: usize) -> Group {
     let style = Style::builtin("light").unwrap();
     let x = (at * 37 % 170) as f64 + 0.3;
@@ -93,7 +93,8 @@ fn text_is_drawn_in_both_weights_and_as_wide_as_measured() {
     );
 }
 
-/// How far the channels of the painter's picture are from those of the whole document drawn at once.
+/// The largest difference between the channels of the painter's picture and those of the whole document drawn
+/// at once.
 fn apart(scene: &Scene, scale: f32) -> Vec<u8> {
     let painter = painter();
     let pixels = painter.paint(scene, f64::from(scale)).unwrap();
@@ -108,7 +109,8 @@ fn apart(scene: &Scene, scale: f32) -> Vec<u8> {
 #[test]
 fn separately_drawn_groups_equal_the_whole_document() {
     let scene = page((0..12).map(|i| element(i, i)).collect());
-    // Soft edges are rounded once more for each group, and a curve is cut into other steps elsewhere on a page.
+    // Antialiased edges are rounded once more for each group, and a curve is subdivided differently elsewhere
+    // on a page.
     let small = apart(&scene, 1.0);
     let rounded = small.iter().filter(|d| **d <= 2).count();
     assert!(
@@ -117,7 +119,7 @@ fn separately_drawn_groups_equal_the_whole_document() {
         small.len()
     );
     assert!(small.iter().all(|d| *d <= 24), "{:?}", small.iter().max());
-    // So large that no group's pixels are kept: the very same.
+    // So large that no group's pixels are cached: the pixels are identical.
     assert!(apart(&scene, 6.0).iter().all(|d| *d == 0));
 }
 

@@ -1,4 +1,4 @@
-//! The parts of the page that a group may touch: a bit per square of the page, never one too few.
+//! The parts of the page that a group may touch: a bit per square of the page, never too few.
 
 use std::ops::Range;
 
@@ -95,7 +95,7 @@ impl Tiles {
     }
 
     fn add_shape(&mut self, shape: &Shape) {
-        // Half the width, up to four times as far at a pointed corner, and more for soft edges and rounding.
+        // Half the width, up to four times that at a pointed corner, and more for antialiasing and rounding.
         let reach = shape.stroke.width.max(0.0) * 2.0 + 3.0;
         match &shape.form {
             Form::Rect(rect, _) | Form::Ellipse(rect) => self.add(rect.grown(reach)),
@@ -152,7 +152,7 @@ impl Tiles {
     }
 }
 
-/// The place of a coordinate among the tiles; those before the page count as the first.
+/// The tile index of a coordinate; coordinates before the page are in the first tile.
 fn tile(at: f64) -> usize {
     cast::to_usize((at / SIDE).clamp(0.0, 1e6))
 }
@@ -165,7 +165,7 @@ fn text_box(text: &Text, fonts: &Fonts) -> Rect {
     let width = fonts.width(&text.text, text.size, text.weight);
     let left = text.at.x - text.anchor.before(width);
     let halo = text.halo.map_or(0.0, |(_, width)| width);
-    // Higher and lower than any letter of ours; half an em aside for letters that lean out.
+    // Above and below any letter of our fonts; half an em on each side for overhanging letters.
     Rect::new(left, text.at.y - 1.3 * text.size, width, 1.8 * text.size)
         .grown(0.5 * text.size + halo + 3.0)
 }

@@ -14,7 +14,7 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
-    /// The argument of this name, or the one at `place`.
+    /// The argument of this name, or the one at position `place`.
     pub(super) fn get(&self, place: usize, name: &str) -> Option<&PythonValue> {
         self.named(name).or(self.positional.get(place))
     }

@@ -175,7 +175,7 @@ fn opaque_functions_are_followed_and_unknowns_reported() {
     assert!(
         texts
             .iter()
-            .any(|t| t.contains("line 5: its condition is only decided when it runs")),
+            .any(|t| t.contains("line 5: its condition is only known at run time")),
         "{texts:?}"
     );
     assert!(

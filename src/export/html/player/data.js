@@ -1,4 +1,5 @@
-// What the page holds, unpacked: any value of any element in any window is one search away. `data.rs` says what it is.
+// The page's data, unpacked: any value of any element in any window is found by one search. `data.rs`
+// describes it.
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) });
 const say = (id, text) => { const element = $[id]; if (element.textContent != text) element.textContent = text; };
 const make = (tag, props, ...inside) => {
@@ -15,14 +16,14 @@ const data = JSON.parse(await unpacked($.data));
 say('data', '');
 const { words, starts, ends, told, phases, rows, hands, sizes } = data;
 const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
-// How long the lives take: of two missions, whose windows have no times, as long as the longer one.
+// The length of the lifelines: for two missions, whose windows have no times, that of the longer one.
 const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lives]) => lives.filter((_, k) => k % 3 < 2))) : total;
-// The window that shows a time: the last that begins before it.
+// The window that contains a time: the last one that begins before it.
 const windowAt = s => Math.max(0, starts.findLastIndex(start => start <= s + 1e-6));
 const iso = (s, from, to) => new Date(Math.round(s * 1e3)).toISOString().slice(from, to).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');
 const clock = s => data.sides?.[windowAt(s)] ?? iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
 
-// The value of a run list in a window, and the place of its run.
+// The value of a run list in a window, and the index of its run.
 function place(list, w, lo = 0, hi = list.length) {
 	while (lo < hi) { const mid = (lo + hi >> 2) * 2; list[mid] <= w ? lo = mid + 2 : hi = mid; }
 	return lo;
@@ -44,7 +45,7 @@ class Graph {
 		this.live = this.els.map(e => e.querySelector('.r'));
 		this.cur = this.els.map(() => '');
 		this.dom = new Map(this.els.map((e, i) => [e, i]));
-		// What a class says: the mark, whether it is there, and the same without marks.
+		// The meaning of a class: its mark, whether the element exists, and the class without marks.
 		this.marks = classes.map(c => KINDS.findIndex(k => c.split(' ').includes(k)));
 		this.there = classes.map((c, k) => k > 0 && this.marks[k] != 1);
 		this.plain = classes.map(c => c.split(' ').filter((word, k) => !k || /^(stated|inferred|declared|w\d)$/.test(word)).join(' '));
@@ -68,7 +69,7 @@ class Graph {
 		const k = this.class(i, w);
 		return this.there[k] && !/^(silent|latched|declared)/.test(this.classes[k]) ? this.labels[at(this.lives[i][1], w)] : '';
 	}
-	// Messages per second, as the label says.
+	// Messages per second, as in the label.
 	hz(i, w) {
 		const [, number, unit] = this.rate(i, w).match(/([\d.]+) (Hz|kHz|msg)( each)?$/) ?? [];
 		return number ? number * ({ kHz: 1e3, msg: 1 / (ends[w] - starts[w]) }[unit] ?? 1) : 0;
@@ -78,7 +79,7 @@ class Graph {
 		const list = this.lives[i][3], p = place(list, w);
 		return p && list[p - 2] == w ? this.labels[list[p - 1]] : '';
 	}
-	// How one window differs from another: class words, and what is told of it.
+	// The difference between two windows: class words and text.
 	difference(i, from, to) {
 		const a = this.isThere(i, from), b = this.isThere(i, to);
 		if (!a && !b) return NONE;
@@ -89,7 +90,7 @@ class Graph {
 		const [x, y] = [from, to].map(w => this.lifecycle(i, w));
 		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;
 	}
-	// Windows in which something happens to it.
+	// The windows in which it changes.
 	turns(i) {
 		const found = new Set(told.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.lives[i][0];
 		for (let r = 0; r < list.length; r += 2) {

@@ -1,4 +1,4 @@
-// Keys and buttons, and the beginning.
+// Keys, buttons and initialization.
 const toggle = (id, name, on) => { $[id].ariaPressed = on; document.body.classList.toggle(name, !on); };
 const sideIsOpen = () => !document.body.classList.contains('noside');
 function side(on) {
@@ -18,7 +18,7 @@ function escape() {
 	if (range) { span(null); return seek(now); }
 	if (base >= 0) compare(-1);
 }
-// Panel and life lines are there where they have room, until somebody chooses.
+// Panel and lifelines are shown if there is space, until the user chooses.
 let isChosen = false;
 function arrange() {
 	if (isChosen || beforePrint) return;
@@ -53,27 +53,27 @@ onkeydown = e => {
 document.addEventListener('click', e => {
 	const key = e.target.closest?.('[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
 	if (key) press(key, 1);
-	// In a frame without an address of its own a link would load the page around it.
+	// In a frame without its own address, a link would load the surrounding page.
 	if (a) {
 		e.preventDefault();
 		go(windowAt(parseFloat(a.hash.slice(3))));
 		if (innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
 	}
 });
-// Until somebody chooses what to look at, it is chosen anew for every size of the stage.
+// Until the user changes the view, it is adapted to every new size of the stage.
 let fresh = false;
 for (const event of ['pointerdown', 'wheel', 'keydown']) addEventListener(event, () => { fresh = false; }, { capture: true, passive: true });
-// Keys go on working after a choice.
+// Keys continue to work after a choice.
 $.speed.onchange = () => $.play.focus();
 const resized = () => { if (beforePrint) return; wide = stage.clientWidth; high = stage.clientHeight; drawTime(); fresh ? firstView() : fit(view); if (!$.big.hidden) enlarge(true); };
 new ResizeObserver(resized).observe(stage);
-// The address that was asked for, even where ours was written over it since.
+// The requested address, even if ours has replaced it since.
 onhashchange = e => load(e.newURL.split('#')[1]);
 if ($.open) $.open.hidden = !folded;
 $.notes.hidden = !$.notes.querySelector('li');
 addEventListener('resize', arrange);
 arrange();
-// Paper shows all of it, with names and lives, whatever the screen shows.
+// Printed pages show the whole graph, with names and lifelines, regardless of the screen.
 onbeforeprint = () => {
 	beforePrint = [view, $.deck.classList.contains('small')];
 	if (!isBoard) fit(homeOf());

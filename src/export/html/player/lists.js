@@ -1,8 +1,8 @@
-// Lists beside the stage: each tells how much it leaves out, and shows it.
+// Lists beside the stage: each states how many entries it omits, and shows them on request.
 const MANY = 50;
 // The shape of an element: ellipse, box, line.
 const shape = i => make('i', { className: i < 0 ? '' : 'is-' + whole.kind(i) });
-// A button that picks an element, with what is to be said of it.
+// A button that selects an element, with a text about it.
 const entry = (i, text, sign = '', time = '') => make('button', {
 	className: sign, title: i < 0 ? text : whole.name(i),
 	onclick: () => pick(i, 1, 1),
@@ -19,7 +19,7 @@ function fill(id, all, row, most = MANY) {
 	if (kept && !list.contains(document.activeElement)) $.title.focus({ preventScroll: true });
 }
 const signOf = i => base < 0 ? KINDS[whole.marks[whole.class(i, now)]] ?? (whole.isThere(i, now) ? '' : 'away') : whole.difference(i, base, now)[0] ?? '';
-// An element with its rate, or with how it differs.
+// An element with its rate, or with its difference.
 function element(i) {
 	const [, differs] = base < 0 ? [0, whole.turn(i, now)] : whole.difference(i, base, now);
 	const rate = differs || whole.rate(i, now);
@@ -27,10 +27,10 @@ function element(i) {
 }
 function listNews() {
 	if (base < 0) {
-		say('newstitle', data.sides ? 'What differs' : range ? 'Changes in these windows' : 'Changes in this window');
+		say('newstitle', data.sides ? 'Differences' : range ? 'Changes in these windows' : 'Changes in this window');
 		const all = told.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
 		const n = all.reduce((sum, [, n]) => sum + n, 0), lines = all.flatMap(([, , , lines]) => lines);
-		// Nothing, as before.
+		// Still empty.
 		if (!n && $.news.firstChild?.textContent == 'None.') return;
 		fill('news', lines, ([s, sign, i, text, id]) => {
 			const line = entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s)));
@@ -41,15 +41,15 @@ function listNews() {
 		if (!n) $.news.append(make('p', { textContent: 'None.' }));
 		return;
 	}
-	say('newstitle', `What differs from window ${base + 1}`);
+	say('newstitle', `Differences from window ${base + 1}`);
 	const all = marked(whole);
 	fill('news', all, element);
-	if (!all.length) $.news.append(make('p', { textContent: 'Nothing.' }));
+	if (!all.length) $.news.append(make('p', { textContent: 'None.' }));
 }
 onSeek.push(listNews);
 
-// Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then what
-// begins with the text, then what holds it; where nothing does, what is nearly written so.
+// Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then
+// names that begin with the text, then names that contain it; without any, similar names.
 function found(text) {
 	const q = text.toLowerCase().trim();
 	if (!q) return NONE;
@@ -70,7 +70,7 @@ function found(text) {
 	const close = items.filter(i => apart(i) <= most);
 	return close.length ? sorted(close, apart) : sorted(items.filter(i => isInOrder(q, lower[i])), () => 0);
 }
-// The letters to insert, leave out or exchange.
+// The edit distance.
 function distance(a, b) {
 	if (Math.abs(a.length - b.length) > 2) return 9;
 	let row = [...Array(b.length + 1).keys()];
@@ -93,7 +93,7 @@ function search() {
 	hits = q ? new Set(hitList.flatMap(i => [i, ...(i < whole.N ? whole.ends(i) : whole.ends(i))])) : null;
 	if (hits) for (const i of hitList) if (i < whole.N) for (const k of whole.ends(i)) whole.ends(k).forEach(end => hits.add(end));
 	if (hits && shown == folded) hits = new Set(shown.holds.flatMap((held, i) => held.some(h => hits.has(h)) ? i : NONE).concat([...Array(shown.count - shown.N).keys()].map(k => k + shown.N)));
-	say('count', q && (hitList.length ? `${hitList.length} found` : 'nothing found'));
+	say('count', q && (hitList.length ? `${hitList.length} found` : 'no matches'));
 	$.onlybox.hidden = !q;
 	fill('hits', hitList, element);
 	dress();
@@ -106,7 +106,7 @@ function clearSearch() {
 }
 $.q.oninput = search;
 $.only.onchange = () => { only = $.only.checked; dress(); };
-// Namespaces, each with a box that leaves it out.
+// Namespaces, each with a checkbox that hides it.
 function listSpaces() {
 	const counts = new Map();
 	for (const name of whole.names) counts.set(spaceOf(name), (counts.get(spaceOf(name)) ?? 0) + 1);

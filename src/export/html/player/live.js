@@ -1,5 +1,5 @@
-// Only in a page that is served while the recording grows: a newer page takes the place of this one where the newest window
-// is shown, and waits where one looks back.
+// Only in a page that is served while the recording grows: a newer page replaces this one if the newest
+// window is shown; otherwise it waits.
 let shownPage, newestPage;
 const renew = () => {
 	if (newestPage == shownPage || now < last || timer || $.help.open) return;

@@ -1,17 +1,18 @@
-// What a window looks like: classes, rates, header. `shown` is the graph on the stage, `base` the window to compare with.
+// The look of a window: classes, rates, header. `shown` is the graph on the stage, `base` the window for
+// comparison.
 let now = 0, base = -1, shown = folded ?? whole, sel = -1, timer = 0, hits = null;
 let near = new Set(), only = false, looping = false;
-// A range of windows shown as one: its ends, the window that it grows from, and what it looks like, per graph.
+// A range of windows shown as one: its ends, the window at which it began, and its looks, per graph.
 let range = null, anchor = -1, rangeLooks = new Map();
-// Namespaces that the reader left out.
+// Namespaces that the user hid.
 const without = new Set();
 const spaceOf = name => name.startsWith('/') && name.indexOf('/', 1) > 0 ? name.slice(0, name.indexOf('/', 1)) : '/';
 const isOut = (g, i) => without.size > 0 && (i < g.N ? [i] : g.ends(i)).some(k => without.has(spaceOf(g.names[k])) || without.has(g.names[k]));
 const onSeek = [], stage = $.stage;
 const calm = matchMedia('(prefers-reduced-motion)');
 
-// Class and label of every element over the range: what was there at any time, marked where its end differs from its
-// beginning; rates are means over all of it.
+// Class and label of every element over the range: all that existed at any time, marked if the end differs
+// from the beginning; rates are means over the range.
 function looksOf(g) {
 	if (rangeLooks.has(g)) return rangeLooks.get(g);
 	const [from, to] = range, length = ends[to] - starts[from], looks = [];
@@ -24,7 +25,7 @@ function looksOf(g) {
 			last = list[p + 1];
 			for (let w = Math.max(from, list[p]); w < end; w++) sum += g.hz(i, w) * (ends[w] - starts[w]);
 		}
-		// What begins in the first window was not there before it; class 0 is nobody.
+		// Elements that begin in the first window did not exist before it; class 0 means absent.
 		const was = first > 0 && g.marks[first] != 0, mark = was == after ? '' : after ? ' added' : ' removed';
 		looks.push(last < 0 ? ['off', ''] : [g.plain[last] + mark, sum ? spell(sum / length) + ' Hz' : '']);
 	}
@@ -32,7 +33,7 @@ function looksOf(g) {
 	return looks;
 }
 const spell = hz => hz >= 99.95 ? hz.toFixed(0) : hz >= .95 ? +hz.toFixed(1) + '' : hz ? +hz.toPrecision(2) + '' : '0';
-// Shows the windows from one to another as one graph; `null` shows single windows again.
+// Shows a range of windows as one graph; `null` shows single windows again.
 function span(ends) {
 	range = ends && [Math.min(...ends), Math.max(...ends)];
 	if (!range) anchor = -1;
@@ -53,7 +54,7 @@ function labelOf(g, i, w) {
 	const topic = i >= g.N && g.arrows[i - g.N][2], turn = g.turn(i, w);
 	return lifecycle || (turn && topic ? topic + ' ' : '') + turn || g.labels[at(g.lives[i][1], w)];
 }
-// Brings the elements of the stage to the present window; answers which of them look different.
+// Updates the elements of the stage to the current window; returns those that look different.
 function dress() {
 	const g = shown, moved = [];
 	g.els.forEach((e, i) => {
@@ -71,7 +72,7 @@ function dress() {
 	g.svg?.classList.toggle('pinned', near.size > 0);
 	return moved;
 }
-// What is marked in the present window, or differs from the base.
+// The elements that are marked in the current window, or differ from the base.
 function marked(g = shown) {
 	const all = [];
 	if (range) return looksOf(g).flatMap(([look], i) => /added|removed/.test(look) ? i : NONE);
@@ -101,13 +102,13 @@ function seek(w, quiet) {
 function header() {
 	const place = `window ${now + 1} of ${W}`, chips = chipsOf();
 	if (range) say('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${clock(starts[range[0]])} – ${clock(ends[range[1]])} of ${clock(total)} · mean rates`);
-	else say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
+	else say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
-	// The events of the log that the chips count; what differs between any two windows need not be one.
+	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
 	if (base < 0 && !range) $.chips.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
 	else delete $.chips.dataset.entries;
 	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
@@ -129,13 +130,13 @@ function go(w) {
 	span(anchor < 0 ? null : [anchor, w]);
 	seek(w);
 }
-// To the next window with a headline; of the followed element only, if one is.
+// To the next window with a headline; only of the followed element, if any.
 function jump(by) {
 	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.turns(sel) : news;
 	let w = now;
 	do w += by; while (w >= 0 && w < W && !turns.has(w));
 	if (w >= 0 && w < W) go(w);
-	else { play(0); say('live', by > 0 ? 'No change after this one' : 'No change before this one'); }
+	else { play(0); say('live', by > 0 ? 'No later change' : 'No earlier change'); }
 }
 function compare(w) {
 	if (w >= 0) span(null);
@@ -150,7 +151,7 @@ function show(g) {
 	shown.svg.setAttribute('hidden', '');
 	shown = g;
 	shown.svg.removeAttribute('hidden');
-	say('open', shown == folded ? 'Open all' : 'Fold');
+	say('open', shown == folded ? 'Expand all' : 'Collapse');
 	near = near_of(sel);
 	dress();
 	fit(shown.home);

@@ -1,4 +1,4 @@
-// What can be taken away: a link that names exactly this view, and the view as a picture.
+// Export: a link to exactly this view, and the view as a picture.
 let later;
 const escapes = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
 function link() {
@@ -11,7 +11,8 @@ function save() {
 	clearTimeout(later);
 	later = setTimeout(() => { if (!timer) try { history.replaceState(0, '', link()); } catch {} }, 50);
 }
-// A window by its time; an element by its kind and name, or by a name alone: a node before a topic.
+// A window by its time; an element by its kind and name, or by its name alone, in which case nodes precede
+// topics.
 function load(hash = '') {
 	const to = new URLSearchParams(hash), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
 	$.q.value = to.get('q') ?? '';
@@ -35,7 +36,7 @@ function load(hash = '') {
 	if (to.get('table')) table(true);
 	if (looping && !calm.matches) play(1);
 }
-// The stage as it is, with the rules that colour it and the font that it is set in.
+// The stage as it is, with its style rules and its font.
 function picture() {
 	const copy = svg().cloneNode(true), k = scaleOf(view);
 	const box = [view[0] + view[2] / 2 - wide / k / 2, view[1] + view[3] / 2 - high / k / 2, wide / k, high / k];

@@ -1,12 +1,12 @@
-// The selection: who it is, how we know, what happened to it, and whom it is connected to.
+// The selection: its name, its evidence, its changes, and its connections.
 function near_of(i) {
 	if (i < 0) return new Set();
 	const at = shown == whole ? [i] : [...shown.holds.keys()].filter(k => shown.holds[k].includes(i));
 	return new Set(at.flatMap(k => [k, ...shown.ends(k).flatMap(end => end < shown.N ? end : [end, ...shown.ends(end)])]));
 }
-// The element of everything that one of the stage stands for: the same, or the first of those that it holds.
+// The element of the whole graph for an element on the stage: the same one, or the first of its members.
 const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key(i)) ?? -1 : -1;
-// Selects an element of everything; `look` brings it into view, `from` says that a list did.
+// Selects an element of the whole graph; `look` brings it into view, `from` means that a list did.
 function pick(i, look, fromList) {
 	sel = i;
 	group = -1;
@@ -25,16 +25,16 @@ function pick(i, look, fromList) {
 	}
 	save();
 }
-// To the nearest window in which an element is there.
+// To the nearest window in which an element exists.
 function toLife(i) {
 	for (let far = 1; far < W; far++) for (const w of [now - far, now + far]) {
 		if (w >= 0 && w < W && whole.isThere(i, w)) {
 			go(w);
-			return say('live', `${whole.name(i)} is not there at that time; ${clock(starts[w])} is the nearest at which it is`);
+			return say('live', `${whole.name(i)} does not exist at that time; the nearest time is ${clock(starts[w])}`);
 		}
 	}
 }
-// A box of the picture that stands for several: what it holds, and how to see those one by one.
+// A box of the picture that represents several elements: its members, and how to expand it.
 let group = -1, viewBefore;
 function pickGroup(i) {
 	pick(-1);
@@ -42,15 +42,15 @@ function pickGroup(i) {
 	pin();
 	save();
 }
-// In the picture a group and whom it is connected to; opened, what it holds with its connections.
+// In the picture, a group and its connections; when expanded, its members and their connections.
 function pin() {
 	near = new Set(shown == folded ? nearBox(group) : folded.holds[group].flatMap(i => i < whole.N ? [i, ...whole.ends(i)] : i));
 	dress();
 	card();
 }
 const nearBox = i => [i, ...shown.ends(i).flatMap(end => [end, ...shown.ends(end)])];
-// Opens the group where it stands: what it held has its middle there, as far as all of that can be seen. Or folds it
-// again and looks from where the reader came.
+// Expands the group in place, with its members around its middle, as far as all of them are visible. Or
+// collapses it again and restores the previous view.
 function unfold() {
 	if (shown == whole) {
 		show(folded);
@@ -64,9 +64,9 @@ function unfold() {
 	bring(held, TOPIC);
 	pin();
 	stand(around(boxesOf(held)), there);
-	say('live', `${held.length} elements, one by one`);
+	say('live', `${held.length} elements, expanded`);
 }
-// Moves the view so that the middle of a box stands at a place of the stage, and all of the box on it.
+// Moves the view so that the middle of a box is at a point of the stage, and all of the box is visible.
 function stand([x, y, w, h], there) {
 	const k = scaleOf(view), within = (at, part, all) => Math.max(part / 2, Math.min(all - part / 2, at));
 	if (w * k > wide || h * k > high) return minimap();
@@ -74,9 +74,9 @@ function stand([x, y, w, h], there) {
 	fit([x + w / 2 - left / k, y + h / 2 - top / k, wide / k, high / k]);
 }
 $.unfold.onclick = unfold;
-const STATES = { active: 'active', silent: 'silent: alive, no message now', latched: 'latched: alive by a message that is kept', declared: 'declared: known from a header only', off: 'not there now' };
-const DEGREES = { stated: 'stated by somebody', inferred: 'inferred by a rule', declared: 'declared only' };
-// What is known of an element in a window, line by line.
+const STATES = { active: 'active', silent: 'silent: running, no message in this window', latched: 'latched: its last message is still valid', declared: 'declared: known from a header only', off: 'not present in this window' };
+const DEGREES = { stated: 'stated by a log, graph or file', inferred: 'inferred by a rule', declared: 'declared only' };
+// The facts about an element in a window, line by line.
 function explain(g, i, w) {
 	const [state, ...rest] = g.classes[g.class(i, w)].split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
 	const told = g.turn(i, w) || g.rate(i, w), sign = g.marks[g.class(i, w)], lifecycle = g.lifecycle(i, w);
@@ -89,8 +89,8 @@ function card() {
 	const [title, state, ...facts] = explain(g, i, now), differs = base < 0 ? NONE : g.difference(i, base, now);
 	say('name', g.name(i));
 	$.title.className = 'is-' + g.kind(i);
-	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · against window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
-	// What a group holds is listed below.
+	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · compared with window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
+	// The members of a group are listed below.
 	$.facts.replaceChildren(...facts.filter(fact => group < 0 || !/^\d+ together/.test(fact)).map(fact => make('p', { textContent: fact })));
 	drawLife(g.lives[i][0], g.classes);
 	drawRate($.rate, g, i);
@@ -99,8 +99,8 @@ function card() {
 	if (!$.big.hidden) enlarge(true);
 	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;
-	say('unfold', shown == whole ? 'Fold again' : 'Open');
-	say('endstitle', group < 0 ? 'Connected' : 'Holds');
+	say('unfold', shown == whole ? 'Collapse' : 'Expand');
+	say('endstitle', group < 0 ? 'Connected' : 'Members');
 	const past = told.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.holds[group].includes(line[2])).map(line => [w, ...line]));
 	$.story.hidden = !past.length;
 	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
@@ -112,7 +112,7 @@ function drawLife(life, classes) {
 	$.life.setAttribute('viewBox', `0 0 ${total} 9`);
 	$.life.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
 }
-// The rate of an element in each window, with an axis; nothing where it has none.
+// The rate of an element in each window, with an axis; empty if it has none.
 function drawRate(svg, g, i, w = 300, h = 84) {
 	const rates = starts.map((_, k) => g.hz(i, k)), top = Math.max(...rates), deep = 16, left = 4, x = s => left + s / total * (w - left - 4), y = hz => h - deep - hz / top * (h - deep - 18);
 	const named = (tag, attributes, text = '') => {
@@ -134,7 +134,7 @@ function drawRate(svg, g, i, w = 300, h = 84) {
 		...times.map(k => named('text', { x: x(total * k), y: h - 3, 'text-anchor': k == 0 ? 'start' : k == 1 ? 'end' : 'middle' }, clock(Math.floor(total * k)))));
 	svg.setAttribute('aria-label', `Rate of ${g.name(i)}, at most ${spell(top)} Hz`);
 }
-// The same plot as large as the stage.
+// The same plot in the size of the stage.
 function enlarge(on) {
 	const g = group < 0 ? whole : folded, i = group < 0 ? sel : group;
 	on &&= i >= 0;
@@ -147,7 +147,7 @@ $.enlarge.onclick = () => enlarge(true);
 onSeek.push(card);
 $.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
 
-// What the pointer is over.
+// The element under the pointer.
 function hover(e, [title, ...lines]) {
 	$.tip.replaceChildren(make('b', { textContent: title }), ...lines.filter(Boolean).map(line => make('div', { textContent: line })));
 	$.tip.hidden = false;

@@ -1,4 +1,5 @@
-// Everything as a table: what, rate, how it differs, its course, when it was there; sorted and filtered.
+// All elements as a table: kind, name, rate, difference, rate over time, first and last time; sorted and
+// filtered.
 const COLUMNS = [
 	['Kind', i => whole.kind(i)], ['Name', i => whole.name(i)], ['Now', i => whole.hz(i, now)], ['Change', i => change(i)],
 	['Course', i => mean(i)], ['First', i => times(i)[0]], ['Last', i => times(i)[1]], ['State', i => whole.classes[whole.class(i, now)].split(' ')[0]],
@@ -7,7 +8,7 @@ let sortBy = 1, upward = true, most = 200;
 const before = () => base < 0 ? Math.max(0, now - 1) : base;
 const change = i => whole.hz(i, now) - whole.hz(i, before());
 const ofLife = new Map();
-// From when to when it was there, and its rates in at most 60 steps.
+// The times at which it existed, and its rates in at most 60 steps.
 function course(i) {
 	if (!ofLife.has(i)) {
 		const list = whole.lives[i][0], there = [];
@@ -41,7 +42,7 @@ function cells(i) {
 		cell(away ? '–' : whole.rate(i, now).replace(/^.* over .* (?=[\d.]+ k?Hz)/, '') || '–', 'n'),
 		cell(Math.abs(delta) < 1e-9 ? '' : (delta > 0 ? '+' : '−') + spell(Math.abs(delta)), 'n ' + (delta > 0 ? 'up' : 'down')),
 		spark, cell(first == Infinity ? '–' : clock(Math.floor(first)), 'n'), cell(end ? clock(Math.floor(end)) : '–', 'n'),
-		cell(away ? 'not there' : whole.classes[whole.class(i, now)].split(' ')[0] + (signOf(i) ? ', ' + signOf(i).split(' ').at(-1) : '')),
+		cell(away ? 'absent' : whole.classes[whole.class(i, now)].split(' ')[0] + (signOf(i) ? ', ' + signOf(i).split(' ').at(-1) : '')),
 	];
 }
 function fillTable() {
@@ -53,7 +54,7 @@ function fillTable() {
 	});
 	const [head, body] = $.sheet.querySelectorAll('thead, tbody');
 	head.replaceChildren(make('tr', {}, ...COLUMNS.map(([title], k) => {
-		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Against before' : `Against window ${base + 1}`) : k == 2 ? 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
+		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Since previous' : `Since window ${base + 1}`) : k == 2 ? 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
 		const cell = make('th', { scope: 'col' }, button);
 		cell.ariaSort = sortBy == k ? (upward ? 'ascending' : 'descending') : 'none';
 		return cell;

@@ -1,4 +1,4 @@
-// The timeline: phases, changes and life lines at their true times, and the head over the present window.
+// The timeline: phases, changes and lifelines at their exact times, and the playhead over the current window.
 const ROW = isBoard ? 20 : 14, part = s => s / long, percent = s => 100 * part(s) + '%';
 let pitch = ROW, beforePrint;
 phases.forEach(([from, to, name], p) => {
@@ -8,7 +8,7 @@ phases.forEach(([from, to, name], p) => {
 	$.band.append(button);
 });
 $.time.classList.toggle('nophases', !phases.length);
-// A row of the timeline of topics tells the type and the rate, too.
+// A row of the topic timeline also shows the type and the rate.
 const rowNames = rows.map(([i, label, inside]) => i < 0
 	? make('div', { className: inside ? 'inside' : 'space', textContent: label, title: label })
 	: make('button', { className: inside ? 'inside' : '', title: whole.name(i), onclick: () => pick(i, 1) },
@@ -18,12 +18,12 @@ const tellRates = () => isBoard && rows.forEach(([i], r) => {
 	if (i >= 0) rowNames[r].lastChild.textContent = (range ? looksOf(whole)[i][1] : whole.rate(i, now)) || '–';
 });
 onSeek.push(tellRates);
-// The place of each row; those of namespaces that are left out have none.
+// The position of each row; rows of hidden namespaces have none.
 const isRowOut = ([i]) => i >= 0 && isOut(whole, i);
 let placeOf = [];
 
 const bit = (x, y, w, h) => `M${x.toFixed(1)} ${y.toFixed(1)}h${w.toFixed(1)}v${h.toFixed(1)}h${(-w).toFixed(1)}z`;
-// A mark that names the events of the log it stands for.
+// A mark with the log events that it represents.
 function markOf([className, ids, d]) {
 	const path = document.createElementNS('http://www.w3.org/2000/svg', 'path');
 	path.setAttribute('class', className);
@@ -31,7 +31,7 @@ function markOf([className, ids, d]) {
 	path.setAttribute(String(ids).includes(' ') ? 'data-entries' : 'data-entry', ids);
 	return path;
 }
-// Draws all in the pixels there are.
+// Draws everything in the available pixels.
 function drawTime() {
 	const small = !isBoard && !beforePrint && ($.deck.classList.contains('small') || innerWidth <= 760), wide = $.axis.clientWidth, x = s => part(s) * wide;
 	pitch = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
@@ -69,7 +69,7 @@ function drawTime() {
 	drawRow();
 	drawHead();
 }
-// A plus above, a diamond in the middle, a minus below; those that would cover each other are one.
+// A plus above, a diamond in the middle, a minus below; overlapping marks are merged.
 function drawMarks(x) {
 	const all = [], last = [];
 	for (const [, , , lines] of told) for (const [s, sign, , , id] of lines) {
@@ -106,8 +106,8 @@ function drawRow() {
 }
 onSeek.push(drawHead);
 
-// A press seeks; one near a mark goes to exactly that change; one on a row picks who lives there. A drag of the frame
-// moves it; one that begins beside it chooses a range of windows.
+// A click seeks; near a mark it goes to exactly that change; on a row it selects the element. Dragging the
+// frame moves it; dragging elsewhere selects a range of windows.
 const timeAt = e => (e.clientX - $.axis.getBoundingClientRect().left) / $.axis.clientWidth * total;
 function markAt(e) {
 	const s = timeAt(e), near = 7 / $.axis.clientWidth * total;
@@ -124,7 +124,7 @@ $.axis.onpointerdown = e => {
 	if (data.sides) return;
 	const w = e.target.closest('#marks') ? markAt(e) : -1, s = timeAt(e);
 	const [from, to] = range ?? [now, now], inside = !range && s >= starts[from] && s < ends[to];
-	// The frame is held where it was taken.
+	// The frame keeps its offset to the pointer.
 	grip = s - starts[now];
 	first = inside && e.pointerType != 'touch' ? -1 : windowAt(s);
 	anchor = -1;

@@ -1,11 +1,13 @@
-// Where the stage looks: a gesture moves the picture by X, Y, S; its end draws it anew. Text too small to be read gives way.
+// The view of the stage: a gesture moves the picture by X, Y, S; at its end it is redrawn. Text that is too
+// small to read is hidden.
 const isBoard = document.body.classList.contains('board');
 let X = 0, Y = 0, S = 1, idle;
 const READABLE = 9, MOST = 6, pointers = new Map();
 for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
 const svg = () => shown.svg ?? $.graph;
 const homeOf = () => shown.home ?? (shown.home = $.graph.getAttribute('viewBox').split(' ').map(Number));
-// The size of the stage. Who asks the page for it lays the page out, so it is asked only where it may have changed.
+// The size of the stage. Querying it forces a layout of the page, so it is only queried if it may have
+// changed.
 let wide = stage.clientWidth, high = stage.clientHeight;
 const scaleOf = ([, , w, h]) => Math.min(wide / w, high / h);
 let view = homeOf();
@@ -33,7 +35,7 @@ function zoom(by, dx = 0, dy = 0, x = wide / 2, y = high / 2) {
 	clearTimeout(idle);
 	idle = setTimeout(settle, 160);
 }
-// Draws anew what a gesture only moved.
+// Redraws after a gesture, which only moves the picture.
 function settle() {
 	const k = scaleOf(view), left = view[0] - (wide / k - view[2]) / 2, top = view[1] - (high / k - view[3]) / 2;
 	svg().style.willChange = svg().style.transform = '';
@@ -46,7 +48,7 @@ function around(boxes) {
 	const low = k => Math.min(...boxes.map(b => b[k])), high = k => Math.max(...boxes.map(b => b[k] + b[k + 2]));
 	return [low(0) - 30, low(1) - 30, high(0) - low(0) + 60, high(1) - low(1) + 60];
 }
-// Looks at some elements, at least so close that text can be read; `most` says how close at most.
+// Zooms to some elements, so that their text is legible; `most` limits the scale.
 function bring(all, least = RATE, most = 1.5) {
 	const boxes = boxesOf(all);
 	if (!boxes.length) return;
@@ -55,7 +57,7 @@ function bring(all, least = RATE, most = 1.5) {
 	if (box[2] > w * 1.01 || box[3] > h * 1.01) [x, y] = densest(boxes, w, h);
 	fit([x - w / 2, y - h / 2, w, h]);
 }
-// The middle of the window of this size that holds most boxes.
+// The middle of the window of this size that contains most boxes.
 function densest(boxes, w, h) {
 	let best = [-1, 0, 0];
 	for (const [x, y] of boxes.slice(0, 300)) {
@@ -69,7 +71,7 @@ function densest(boxes, w, h) {
 	}
 	return best.slice(1);
 }
-// All of it if its names can be read, else the changes of this window.
+// The whole graph if its names are legible, else the changes of this window.
 function firstView() {
 	if (isBoard) return;
 	if (scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
@@ -78,7 +80,7 @@ function firstView() {
 	bring(some, scaleOf(around(boxesOf(some))) >= RATE ? RATE : TOPIC);
 }
 
-// The minimap: everything small, with a frame around what is seen.
+// The minimap: the whole graph, with a frame around the visible part.
 const outline = boxes => boxes.map(([x, y, w, h]) => `M${x} ${y}h${w}v${h}h-${w}z`).join('');
 function minimap() {
 	const [x, y, w, h] = homeOf(), k = scaleOf(view), seen = [wide / k, high / k];
@@ -97,7 +99,7 @@ function minimap() {
 	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
 	outOfTheWay();
 }
-// The minimap stands in the first corner in which it covers nothing that is selected; if there is none it fades.
+// The minimap is in the first corner in which it covers no selected element; if there is none, it fades.
 function outOfTheWay() {
 	const k = scaleOf(view), { offsetWidth: w, offsetHeight: h } = $.mini, edge = 14;
 	const left = view[0] + view[2] / 2 - wide / k / 2, top = view[1] + view[3] / 2 - high / k / 2;
@@ -118,7 +120,7 @@ $.mini.onpointerdown = e => { e.stopPropagation(); if (e.isTrusted) $.mini.setPo
 $.mini.onpointermove = e => { if (e.buttons) { e.stopPropagation(); lookFromMini(e); } };
 $.mini.onclick = e => e.stopPropagation();
 
-// Wheel, drag and pinch. A gesture that went somewhere is no click.
+// Wheel, drag and pinch. A gesture with movement is not a click.
 let far = 0;
 const inStage = e => { const { left, top } = stage.getBoundingClientRect(); return [e.clientX - left, e.clientY - top]; };
 const isGraph = e => !e.target.closest?.('#sheet');

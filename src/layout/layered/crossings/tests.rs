@@ -56,7 +56,7 @@ fn cached_rows_equal_recomputed_ones() {
             kept.transpose();
             let rows = kept.rows(kept.items());
             assert_eq!(kept.crossings(), counted(&layers, &rows));
-            // A settled row stops the swaps of a fresh start.
+            // A stable row ends the swaps of a fresh start.
             let settled = kept.is_settled.clone();
             kept.is_settled.fill(false);
             (0..layers.ranks).for_each(|rank| kept.changed(rank));
