@@ -1,4 +1,4 @@
-//! Prints who publishes a topic when, how often, and how we know.
+//! Prints the publishers of a topic, with times, rates and evidence.
 //!
 //! `cargo run --release --example publishers -- examples/warehouse.bag /robot1/cmd_vel`
 
@@ -8,8 +8,8 @@ use bagreel::{Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let bag = arguments.next().ok_or("name a bag")?;
-    let topic = arguments.next().ok_or("name a topic")?;
+    let bag = arguments.next().ok_or("give a bag")?;
+    let topic = arguments.next().ok_or("give a topic")?;
     let reading = Reading::of([bag]);
     let mission = read(&reading)?;
     let elements = &mission.elements;

@@ -1,4 +1,4 @@
-//! Prints the story of a mission: what began, ended, came back and changed, when, and how surely that is known.
+//! Prints the event log of a mission: starts, stops, restarts and changes, with times and their uncertainty.
 //!
 //! `cargo run --release --example story -- examples/warehouse.bag`
 
@@ -8,7 +8,7 @@ use bagreel::values::{Detail, Event};
 use bagreel::{Mission, Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let bag = std::env::args().nth(1).ok_or("name a bag")?;
+    let bag = std::env::args().nth(1).ok_or("give a bag")?;
     let mission = read(&Reading::of([bag]))?;
     let log = &mission.log;
     let mut phases = log.phases.iter().peekable();
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Whom or what an event is about.
+/// The element that an event is about.
 fn name(mission: &Mission, event: &Event) -> String {
     let elements = &mission.elements;
     let (node, topic) = elements.ends(event.what);
@@ -39,7 +39,7 @@ fn name(mission: &Mission, event: &Event) -> String {
     names.join(" ")
 }
 
-/// What more there is to say: rates, senders, values before and after.
+/// The details of an event: rates, senders, values before and after.
 fn detail(mission: &Mission, event: &Event) -> String {
     let nodes = |ids: &[u32]| {
         let names = ids

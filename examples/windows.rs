@@ -1,4 +1,5 @@
-//! Prints the graph of each window of a bag: how many nodes talk, and what changed against the window before.
+//! Prints a line per window of a bag: the size of its graph, and the number of changes since the previous
+//! window.
 //!
 //! `cargo run --release --example windows -- examples/courier.mcap`
 
@@ -7,7 +8,7 @@
 use bagreel::{Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let bag = std::env::args().nth(1).ok_or("name a bag")?;
+    let bag = std::env::args().nth(1).ok_or("give a bag")?;
     let reading = Reading::of([bag]);
     let mission = read(&reading)?;
     println!(

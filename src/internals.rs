@@ -1,5 +1,5 @@
-//! The modules that the project's own tests, benchmarks and fuzz targets reach past the front page. No promise is made
-//! of them.
+//! The modules that the project's tests, benchmarks and fuzz targets use besides the public API. They are not
+//! stable.
 
 /// See `src/base.rs`.
 pub mod base {

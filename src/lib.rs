@@ -4,7 +4,8 @@
 //! bag ──> evidence ──> graph ──> mission ──> view ──> layout ──> draw ──> export
 //! ```
 //!
-//! `pipeline` is that line in the order it happens; everything before the scene decides, everything after it only draws.
+//! `pipeline` executes that line in order; all decisions are made before the scene, everything after it only
+//! draws.
 //!
 //! ```
 //! use bagreel::{Output, Reading, Render, read, render};
@@ -23,45 +24,47 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! The [`EventLog`] of a mission contains its events, the same for all windows; `examples/story.rs` prints it.
+//! The [`EventLog`] of a mission contains its events, independent of windows; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
-//! | station | takes | gives |
+//! | station | input | output |
 //! |---|---|---|
-//! | `base` | | times, names, errors, notices, words: the nouns that all share |
+//! | `base` | | times, names, errors, notices, words: types that all modules share |
 //! | [`bag`] | files | connections and messages, distinguished by the first bytes |
 //! | `evidence` | messages | observations: the publishers and subscribers, with the kind and the strength of the evidence |
 //! | `graph` | observations and windows | the computation graph of each window, and the changes |
 //! | `mission` | graphs | the whole sequence, as a value and as JSON; its log and its summary |
 //! | `view` | a mission | the part of it that the picture shows: filtered, grouped, collapsed, counted |
-//! | `layout` | the union of a view | places for everything, once, so that nothing moves |
-//! | `draw` | a view with places | scenes, and the painters that turn a scene into SVG, PDF or pixels |
+//! | `layout` | the union of a view | positions of all elements, computed once, so that nothing moves |
+//! | `draw` | a view with positions | scenes, and the painters that turn a scene into SVG, PDF or pixels |
 //! | `export` | scenes and missions | files |
 //! | `gate` | missions and expectations | the differences, and whether they are allowed |
-//! | `pipeline` | a job | the whole program in the order it happens |
+//! | `pipeline` | a job | the whole program in the order of execution |
 //! | `cli` | the command line | a job for the pipeline |
 //!
-//! To add a thing: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
-//! `evidence/source/` and `evidence::SOURCES`, an output one in `export/` and `export::FORMATS`, a style one in
-//! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
+//! To extend bagreel: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one
+//! in `evidence/source/` and `evidence::SOURCES`, an output one in `export/` and `export::FORMATS`, a style
+//! one in `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
-//! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
-//! *window* one half-open interval `[start, end)`. An *observation* is a statement of one source about the graph,
-//! with its times; an *inference* is a fact that follows from observations; a *confidence* is the strength of the evidence
-//! for something. The *graph* of a window contains the *states* of nodes, topics, publications and subscriptions, its
-//! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
-//! every run. The *view* contains *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
-//! every place and colour decided; a *painter* writes it down; an *encoder* makes a file of it.
+//! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of
+//! time, a *window* one half-open interval `[start, end)`. An *observation* is a statement of one source
+//! about the graph, with its times; an *inference* is a fact that follows from observations; a *confidence*
+//! is the strength of the evidence for it. The *graph* of a window contains the *states* of nodes, topics,
+//! publications and subscriptions, its *elements*. A *mission* is the sequence of all windows. A *role* is a
+//! node's name without the part that differs from run to run. The *view* contains *items* (boxes) and
+//! *arrows*; a *mark* is the change of one. A *scene* is a drawing with all positions and colours determined;
+//! a *painter* converts it to an output form; an *encoder* writes it to a file.
 //!
-//! Versions. Before 1.0 a minor version (0.2) may change this library: names, fields and signatures may move, and each such
-//! change stands in `CHANGELOG.md`; a patch (0.1.1) changes none of them. Structs and enums that will grow are
-//! `#[non_exhaustive]`. What files of other programs rely on changes no sooner: the exit codes, the JSON of missions (its
-//! `schema` says which; older ones are read), columns of tables (new ones may be added) and the keys of `graph.yaml`.
-//! Pictures may look better in any version. The module `internals` is no part of the library.
+//! Versions. Before 1.0 a minor version (0.2) may change this library: names, fields and signatures may
+//! change, and `CHANGELOG.md` lists each such change; a patch (0.1.1) changes none of them. Structs and enums
+//! that will grow are `#[non_exhaustive]`. The same applies to interfaces that other programs rely on: the
+//! exit codes, the JSON of missions (with a version in `schema`; older ones are read), columns of tables (new
+//! ones may be added) and the keys of `graph.yaml`. Pictures may change in any version. The module
+//! `internals` is not part of the library.
 //!
-//! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
-//! for the same bag.
+//! The library is silent and deterministic: it never prints (except `cli`), reads no clock, and writes the
+//! same bytes for the same bag.
 
 #![cfg_attr(
     not(all(feature = "render", feature = "source")),
@@ -69,11 +72,11 @@
         dead_code,
         unreachable_pub,
         unused_imports,
-        reason = "what only these features use"
+        reason = "used by these features only"
     )
 )]
 
-// In the order of the line, which is why they stand apart: sorted they would tell nothing.
+// Separate lines keep the order of the stations, which sorting would lose.
 mod base;
 
 pub mod bag;
@@ -117,7 +120,7 @@ pub use pipeline::Reading;
 pub use pipeline::{Render, Rendered};
 
 pub mod values {
-    //! The values that those of the front page are made of: times and names, the elements of a graph, the events of a
+    //! The types used by those of the front page: times and names, the elements of a graph, the events of a
     //! log, and options.
 
     pub use crate::base::name::{NodeName, TopicName};
@@ -144,7 +147,7 @@ pub mod values {
 pub use pipeline::fleet;
 
 pub mod commands {
-    //! The work of the commands beside `render`: the summary, the log, the table of messages, the survey of a folder.
+    //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
@@ -161,11 +164,11 @@ pub use cli::run as run_command;
 #[doc(hidden)]
 pub mod internals;
 
-/// Reads bags, or a mission's own JSON, into a mission.
+/// Reads bags, or a mission's JSON, into a mission.
 ///
 /// # Errors
-/// If an input cannot be read at all, if no input contains a message, and for times that make no sense. Damaged data is left
-/// out and reported in [`Mission::notices`].
+/// If an input cannot be read at all, if no input contains a message, and for invalid times. Damaged data is
+/// left out and reported in [`Mission::notices`].
 pub fn read(reading: &Reading) -> Result<Mission> {
     pipeline::read(reading, &mut pipeline::Unwatched)
 }
@@ -173,7 +176,7 @@ pub fn read(reading: &Reading) -> Result<Mission> {
 /// Reads, draws and writes every output, each whole or not at all.
 ///
 /// # Errors
-/// As [`read`], and where an output cannot be written or an option makes no sense.
+/// As [`read`], and if an output cannot be written or an option is invalid.
 #[cfg(feature = "render")]
 pub fn render(job: &Render) -> Result<Rendered> {
     pipeline::render(job, &mut pipeline::Unwatched)

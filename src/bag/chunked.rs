@@ -226,7 +226,7 @@ impl<G: Grammar> Indexed<G> {
     fn by_index(&self, plan: &ChunkPlan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
         let connections = plan.connections.list().iter();
         let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
-        Want::settle(&mut wants);
+        Want::resolve(&mut wants);
         plan.notices.iter().for_each(|n| sink.notice(n.clone()));
         let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
         let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();

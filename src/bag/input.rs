@@ -51,7 +51,7 @@ impl Input {
     pub fn name(&self) -> String {
         match self {
             Self::Path(path) => file_name(path),
-            Self::Url(url) => file_name(Path::new(&told_url(url))),
+            Self::Url(url) => file_name(Path::new(&public_url_of(url))),
             Self::Stdin => "standard input".to_owned(),
         }
     }
@@ -59,7 +59,7 @@ impl Input {
 
 /// A URL that is safe to report: for web servers, without the password and the query, which may contain a signature
 /// that grants access.
-pub(crate) fn told_url(url: &str) -> String {
+pub(crate) fn public_url_of(url: &str) -> String {
     let Some((scheme, rest)) = url.split_once("://").filter(|_| url.starts_with("http")) else {
         return url.to_owned();
     };
@@ -136,7 +136,7 @@ pub(crate) const HEAD: usize = 512;
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,
-        Input::Url(url) => return Err(elsewhere(&told_url(url))),
+        Input::Url(url) => return Err(elsewhere(&public_url_of(url))),
         Input::Stdin => {
             let stream = ByteStream::of_reader(io::stdin());
             return Ok(BagPlace::Pipe(input.name(), stream));

@@ -81,7 +81,7 @@ pub struct Message<'a> {
 
 impl Want {
     /// Resolves every [`Want::Beside`] for a bag that is read by its index.
-    pub(crate) fn settle(wants: &mut [Self]) {
+    pub(crate) fn resolve(wants: &mut [Self]) {
         let is_read = wants
             .iter()
             .any(|w| matches!(w, Self::Head(_) | Self::Payload));

@@ -7,20 +7,20 @@ pub(crate) use without::{list, open, version};
 
 #[cfg(not(feature = "remote"))]
 mod without {
-    use crate::bag::input::told_url;
+    use crate::bag::input::public_url_of;
     use crate::bag::model::{OpenOptions, Reader};
     use crate::bag::unknown::elsewhere;
     use crate::base::error::Result;
 
     pub(crate) fn list(url: &str) -> Result<Vec<String>> {
-        Err(elsewhere(&told_url(url)))
+        Err(elsewhere(&public_url_of(url)))
     }
 
     pub(crate) fn open(url: &str, _: &OpenOptions) -> Result<Box<dyn Reader>> {
-        Err(elsewhere(&told_url(url)))
+        Err(elsewhere(&public_url_of(url)))
     }
 
     pub(crate) fn version(url: &str) -> Result<(u64, Option<String>)> {
-        Err(elsewhere(&told_url(url)))
+        Err(elsewhere(&public_url_of(url)))
     }
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use crate::bag::input::told_url;
+use crate::bag::input::public_url_of;
 use crate::bag::source::{FileSource, Ranges};
 use crate::base::error::Result;
 use store::{Object, StoreRefusal};
@@ -89,7 +89,7 @@ impl Refused {
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) if it does not exist, [`Error::Remote`](crate::Error::Remote) if the store fails.
 fn object(url: &str) -> Result<Opened> {
-    let public_url = &told_url(url);
+    let public_url = &public_url_of(url);
     let (object, first) = Object::open(url, FIRST).map_err(|why| why.error(public_url))?;
     let (len, etag) = (object.len, object.etag.clone());
     let refused: Arc<OnceLock<StoreRefusal>> = Arc::default();
@@ -118,7 +118,7 @@ fn object(url: &str) -> Result<Opened> {
 
 /// The size and the version of the object at `url`.
 pub(crate) fn version(url: &str) -> Result<(u64, Option<String>)> {
-    let opened = Object::open(url, 1).map_err(|why| why.error(&told_url(url)));
+    let opened = Object::open(url, 1).map_err(|why| why.error(&public_url_of(url)));
     opened.map(|(object, _)| (object.len, object.etag))
 }
 

@@ -225,12 +225,12 @@ impl<'a> ByteStream<'a> {
 
     /// The CRC-32 of all bytes taken since [`ByteStream::sum_up`]; `None` without that.
     pub(crate) fn sum(&mut self) -> Option<u32> {
-        self.settle_sum();
+        self.update_sum();
         self.sum.as_ref().map(Checksum::crc)
     }
 
     /// Adds the bytes taken since the last call, many at once.
-    fn settle_sum(&mut self) {
+    fn update_sum(&mut self) {
         if let Some(sum) = &mut self.sum {
             sum.add(&self.buffer[self.summed..self.used]);
             self.summed = self.used;
@@ -269,7 +269,7 @@ impl<'a> ByteStream<'a> {
 
     /// Reads until `n` bytes are buffered or the stream ends.
     fn fill(&mut self, n: usize) -> io::Result<()> {
-        self.settle_sum();
+        self.update_sum();
         self.summed = 0;
         self.buffer.copy_within(self.used..self.filled, 0);
         self.filled = self.ahead();

@@ -316,7 +316,7 @@ impl Reader for Sqlite3Bag {
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
         let mut clip = Clip::new(range, sink);
         let mut wants: Vec<Want> = self.topics.iter().map(|t| clip.connection(t)).collect();
-        Want::settle(&mut wants);
+        Want::resolve(&mut wants);
         if self.ready.left_behind {
             let text = "the newest rows lie in a log beside the bag that is too large to copy";
             clip.notice(Notice::new(NoticeKind::Damaged, text));

@@ -115,8 +115,8 @@ impl<'a> Watched<'a> {
     /// Decides whether a run has begun, once enough of it is known: of the connections that publish again, most have
     /// gone back in time, and not only one of several.
     fn decide(&mut self, is_end: bool) {
-        let spoke = self.lines.iter().filter(|line| line.last.is_some()).count();
-        let fewest = spoke.min(2) as u64;
+        let active = self.lines.iter().filter(|line| line.last.is_some()).count();
+        let fewest = active.min(2) as u64;
         let is_known = |s: &mut Suspect| is_end || s.is_past && s.fell + s.went_on >= fewest;
         let Some(suspect) = self.suspect.take_if(is_known) else {
             return;

@@ -113,7 +113,7 @@ pub(crate) const BACK_NS: i64 = 5 * SECOND;
 /// The shortest duration of a larger share of a topic's messages.
 pub(crate) const SHARE_HOLDS_NS: i64 = 5 * SECOND;
 
-// ---- What belongs together.
+// ---- Related events.
 
 /// The longest time between the start or end of a node and that of an edge, or the silence of a topic, that it causes.
 pub(crate) const TOGETHER_NS: i64 = 5 * SECOND;

@@ -10,7 +10,7 @@ use crate::base::leftovers;
 /// The time that the work may take to stop by itself: people notice half a second. Its temporary files are removed.
 const GRACE: Duration = Duration::from_millis(250);
 /// The time limit for the last message: standard error may be a pipe that is not read.
-const LAST_WORDS: Duration = Duration::from_millis(50);
+const REPORT_LIMIT: Duration = Duration::from_millis(50);
 /// The base of exit codes for signals, as in shells.
 const BY_SIGNAL: u8 = 128;
 
@@ -73,9 +73,9 @@ fn end(signal: u8, report: fn()) {
     leftovers::remove();
     let message = thread::spawn(report);
     let mut waited = Duration::ZERO;
-    while !message.is_finished() && waited < LAST_WORDS {
-        thread::sleep(LAST_WORDS / 10);
-        waited += LAST_WORDS / 10;
+    while !message.is_finished() && waited < REPORT_LIMIT {
+        thread::sleep(REPORT_LIMIT / 10);
+        waited += REPORT_LIMIT / 10;
     }
     #[expect(clippy::exit, reason = "the work may hang where it cannot on_signal")]
     std::process::exit(i32::from(BY_SIGNAL + signal));

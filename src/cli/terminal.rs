@@ -48,7 +48,7 @@ impl Terminal {
                 colour(io::stdout().is_terminal()),
             ),
             progress: Progress::new(!typed.quiet),
-            stop: Stop::listen(last_words),
+            stop: Stop::listen(report_stop),
         }
     }
 
@@ -310,7 +310,7 @@ impl Watch for Terminal {
 }
 
 /// Prints why the process ends, on a line of its own.
-fn last_words() {
+fn report_stop() {
     let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
 }
 

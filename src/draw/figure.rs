@@ -1,4 +1,4 @@
-//! Figures for papers, exact in width and never with text below 6 pt: lives, map and steps.
+//! Figures for papers, exact in width and never with text below 6 pt: lifelines, map and steps.
 //!
 //! A figure that does not fit with nodes is tried with groups; if that fails, the error suggests a filter.
 //! Text is never scaled.

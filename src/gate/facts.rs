@@ -257,7 +257,7 @@ impl<'a> Facts<'a> {
     }
 
     /// Whether the bag names all publishers of a topic.
-    pub(crate) fn tells_publishers(&self, topic: TopicId) -> bool {
+    pub(crate) fn lists_publishers(&self, topic: TopicId) -> bool {
         let unknown = self.mission.elements.topics[topic as usize].unknown_publishers;
         let known = self.publishers(topic);
         !self.is_rewritten
@@ -269,7 +269,7 @@ impl<'a> Facts<'a> {
 
     /// Whether the bag lists all subscribers, in general or for these nodes, so that an unlisted node is not a
     /// subscriber.
-    pub(crate) fn tells_subscribers(&self, nodes: &[NodeId]) -> bool {
+    pub(crate) fn lists_subscribers(&self, nodes: &[NodeId]) -> bool {
         self.mission.elements.subscribes.iter().any(|edge| {
             let own = nodes.contains(&edge.node) && has(edge.evidence, &["links"]);
             own || has(edge.evidence, &LISTING) && !self.is_tool(&[edge.node])

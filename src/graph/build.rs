@@ -3,6 +3,7 @@
 
 pub(crate) mod assemble;
 pub(crate) mod history;
+pub(crate) mod lifetimes;
 pub(crate) mod liveness;
 pub(crate) mod measures;
 pub(crate) mod merged;
@@ -10,7 +11,6 @@ pub(crate) mod rates;
 pub(crate) mod recordings;
 pub(crate) mod restarts;
 pub(crate) mod senders;
-pub(crate) mod settle;
 pub(crate) mod tempo;
 pub(crate) mod tracks;
 pub(crate) mod windows;

@@ -5,7 +5,7 @@ use super::caption::CaptionWriter;
 use super::items::Viewed;
 use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
-use super::marks::{News, Parts};
+use super::marks::{Parts, WindowMarks};
 use super::settle::{Lengths, settled};
 use super::showing::{Showing, ShowingWriter};
 use super::state::{LivingItems, Now};
@@ -205,7 +205,7 @@ impl<'a> ShownWindows<'a> {
         self.turn = WindowTurn {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
-            changed: News::new(
+            changed: WindowMarks::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),

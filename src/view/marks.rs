@@ -29,14 +29,14 @@ pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// The changes of one window by the id of the item or arrow.
 #[derive(Default)]
-pub(crate) struct News {
+pub(crate) struct WindowMarks {
     pub(crate) headlines: Vec<Headline>,
     pub(crate) lasting: Vec<Lasting>,
     pub(crate) items: BTreeMap<u32, Changed>,
     pub(crate) arrows: BTreeMap<u32, Changed>,
 }
 
-impl News {
+impl WindowMarks {
     /// The changes of the window `span`, with the events of earlier windows that last. `parts` are the parts
     /// of each headline; they are reported with it, whenever they happened. A start or appearance before
     /// `beginning` is not a change.
@@ -49,7 +49,7 @@ impl News {
         let mut changed = Self::default();
         for last in &lasting {
             if let Some(event) = log.events.get(last.event as usize) {
-                changed.tell(viewed, event, last.event, last.part());
+                changed.report(viewed, event, last.event, last.part());
             }
         }
         changed.lasting = lasting;
@@ -65,19 +65,19 @@ impl News {
                 what: event.what,
                 time: event.time,
             });
-            changed.tell(viewed, event, id, Part::of(event, span));
+            changed.report(viewed, event, id, Part::of(event, span));
             // A return has its own mark.
             let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
                 if let Some(part) = log.events.get(*part as usize) {
-                    changed.tell(viewed, part, id, Part::Whole);
+                    changed.report(viewed, part, id, Part::Whole);
                 }
             }
         }
         changed
     }
 
-    fn tell(&mut self, viewed: &Viewed, event: &Event, headline: EventId, part: Part) {
+    fn report(&mut self, viewed: &Viewed, event: &Event, headline: EventId, part: Part) {
         let sign = EventSign::of(event, headline, part);
         self.add(viewed, event.what, &sign);
         match (&event.detail, event.what) {

@@ -12,8 +12,8 @@ worded! {
     pub enum Mode {
         /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
         Nodes = "nodes",
-        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both directions, for a
-        /// graph that no page can hold.
+        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both
+        /// directions, for a graph that does not fit any page.
         Bundles = "bundles",
         /// Nodes and topics, in each window only those that carry messages in it.
         Active = "active",
@@ -227,7 +227,7 @@ pub struct ViewOptions {
 }
 
 impl ViewOptions {
-    /// The settings of `rqt_graph`'s window when it opens. Its "Unreachable" is left out: a bag cannot tell which node
+    /// The settings of `rqt_graph`'s window when it opens. Its "Unreachable" is left out: a bag cannot add which node
     /// would not have answered.
     pub fn rqt_defaults() -> Self {
         Self {

@@ -339,12 +339,12 @@ mod tests {
 
     fn reported(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
         let life = &runs.arrows[0];
-        let tell = |w| {
+        let add = |w| {
             let class = &runs.classes[at(&life.classes, w) as usize];
             let label = &runs.labels[at(&life.rates, w) as usize];
             (class.as_str(), label.as_str())
         };
-        (0..windows).map(tell).collect()
+        (0..windows).map(add).collect()
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A window with changes: the marks of its items and arrows.
 
 use super::items::Viewed;
-use super::marks::{Changed, News};
+use super::marks::{Changed, WindowMarks};
 use super::state::{LivingItems, Now};
 use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
@@ -11,7 +11,7 @@ use crate::mission::event_log::{Detail, Event, EventId, Kind};
 pub(super) struct WindowTurn {
     pub(super) before: LivingItems,
     pub(super) after: LivingItems,
-    pub(super) changed: News,
+    pub(super) changed: WindowMarks,
 }
 
 /// An item in a window with headlines.

@@ -74,7 +74,7 @@ impl ChunkMessages {
 
     /// Reports all messages to `sink`; returns how many were only in the index, and how many only in the chunk. If the
     /// two disagree, the index is used if the chunk is damaged or lacks more messages than it has in excess.
-    pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> (u64, u64) {
+    pub(super) fn report_all(&mut self, sink: &mut dyn Sink) -> (u64, u64) {
         let believed = self.doubtful || self.missing > self.surplus;
         let mut witnessed = 0;
         for record in self.behind.drain(..).filter(|_| believed) {

@@ -169,7 +169,7 @@ impl<G: Grammar> Forward<'_, G> {
     }
 
     fn chunk(&mut self, stream: &mut ByteStream<'_>, head: &ChunkHead) -> Result<(), NoRecord> {
-        self.settle();
+        self.report_chunk();
         self.is_chunked = head.packed > 0;
         self.found.compression.extend(head.how);
         if head.misnamed {
@@ -217,15 +217,15 @@ impl<G: Grammar> Forward<'_, G> {
             Vec::new()
         };
         if self.found_messages.is_of_another(id, &stamps) {
-            self.settle();
+            self.report_chunk();
         }
         self.found_messages.behind(Behind { id, count, stamps });
         pass(stream, len)
     }
 
     /// Reports the messages of the last chunk, once everything after it has been read.
-    fn settle(&mut self) {
-        let (mended, surplus) = self.found_messages.settle(self.sink);
+    fn report_chunk(&mut self) {
+        let (mended, surplus) = self.found_messages.report_all(self.sink);
         if mended > 0 {
             self.found.complete = false;
             super::index::absent(self.sink, mended);
@@ -246,7 +246,7 @@ impl<G: Grammar> Forward<'_, G> {
     }
 
     fn finish(mut self, stop: NoRecord, at: u64) -> ForwardScan {
-        self.settle();
+        self.report_chunk();
         let early = self.early.runs.values();
         let homeless =
             early.map(|(stamps, _)| stamps.len() as u64).sum::<u64>() + self.early.dropped;

@@ -38,7 +38,7 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     if crc != 0 && bytes.sum() != Some(crc) {
         return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
     }
-    Ok(summary.settle(source))
+    Ok(summary.into_plan(source))
 }
 
 /// The number of bytes of a footer record and of the closing bytes of the file.
@@ -164,7 +164,7 @@ impl Summary {
     }
 
     /// Sorts the chunks and decides whether they contain all messages.
-    fn settle(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
+    fn into_plan(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
         let chunks = &mut self.plan.chunks;
         chunks.sort_by_key(|c| c.start);
         chunks.dedup_by_key(|c| c.start);

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use super::{Opened, Refused};
-use crate::bag::input::{BagPlace, HEAD, Medium, told_url};
+use crate::bag::input::{BagPlace, HEAD, Medium, public_url_of};
 use crate::bag::model::{ETAG, OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{FAR, FileSource, Temporary};
 use crate::bag::unknown::explain;
@@ -27,7 +27,7 @@ struct Watched {
 /// Opens the bag at `url`.
 pub(crate) fn open(url: &str, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     if url.ends_with('/') {
-        let what = format!("`{}` is a prefix, not a bag", told_url(url));
+        let what = format!("`{}` is a prefix, not a bag", public_url_of(url));
         return Err(Error::usage(
             what,
             "give one bag; `bagreel tables` counts all of a store",

@@ -45,7 +45,7 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     tail.plan.body = body..index_pos;
     tail.plan.notices.extend(encrypted(&encryptor));
     match tail.records(source, (connections, chunks)) {
-        Ok(()) => Ok(tail.settle()),
+        Ok(()) => Ok(tail.into_plan()),
         Err(NoRecord::Io(e)) => Err(e),
         Err(_) => Ok(Unindexed::wrong("its index is cut or damaged")),
     }
@@ -190,7 +190,7 @@ impl Tail {
     }
 
     /// Sorts the chunks and sets the end of each.
-    fn settle(mut self) -> Result<ChunkPlan, Unindexed> {
+    fn into_plan(mut self) -> Result<ChunkPlan, Unindexed> {
         let body = self.plan.body.clone();
         let chunks = &mut self.plan.chunks;
         if chunks.is_empty() && body.end > body.start {

@@ -1,4 +1,4 @@
-//! The legend of a figure of lives, with only the signs that are drawn.
+//! The legend of a figure of lifelines, with only the signs that are drawn.
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::lives::LivesFigure;

@@ -26,7 +26,7 @@ const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
 /// width of that column; in millimetres.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
 
-/// The content of a figure of lives.
+/// The content of a figure of lifelines.
 pub(crate) struct LivesFigure<'a> {
     pub(crate) source: &'a FigureSource<'a>,
     pub(crate) tracks: Vec<Track>,

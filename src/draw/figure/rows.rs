@@ -1,4 +1,4 @@
-//! The rows of a figure of lives and their order: the staircase, namespaces, collapsed rows.
+//! The rows of a figure of lifelines and their order: the staircase, namespaces, collapsed rows.
 
 use std::collections::BTreeSet;
 

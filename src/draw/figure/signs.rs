@@ -1,4 +1,4 @@
-//! The signs of a figure of lives: ticks, crosses, small circles and letters.
+//! The signs of a figure of lifelines: ticks, crosses, small circles and letters.
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::lives::RowPlace;

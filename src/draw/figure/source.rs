@@ -168,7 +168,7 @@ impl<'a> FigureSource<'a> {
         }
     }
 
-    /// The number of the phase that a moment lies in, counted from 0.
+    /// The number of the phase that contains a point in time, counted from 0.
     pub(crate) fn phase_at(&self, at: Stamp) -> usize {
         let next = self.phases.partition_point(|p| p.span.start <= at);
         next.saturating_sub(1)

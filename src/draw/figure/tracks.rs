@@ -35,7 +35,7 @@ pub(crate) struct SendingBar {
     pub(crate) share: f64,
 }
 
-/// One row of a figure of lives.
+/// One row of a figure of lifelines.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Track {
     /// The full name: a role, or a topic.

@@ -26,11 +26,11 @@ pub(crate) trait ElementLook {
     fn class(&self) -> String;
     /// The words of its live text.
     fn text(&self) -> String;
-    /// Writes its live text at a position, as one or more elements; `tells_changes` if it is shown only in
+    /// Writes its live text at a position, as one or more elements; `shows_changes` if it is shown only in
     /// windows in which its rate changed.
-    fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
+    fn live(&self, xml: &mut Xml, (x, y): (i64, i64), shows_changes: bool) {
         xml.open("text")
-            .attribute("class", if tells_changes { "r c" } else { "r" })
+            .attribute("class", if shows_changes { "r c" } else { "r" })
             .attribute("x", x)
             .attribute("y", y)
             .text(&self.text())
@@ -119,7 +119,7 @@ impl<'a> Classes<'a> {
             }
             let place = (whole(text.at.x), whole(text.at.y));
             if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
-                look.live(xml, place, part.tells_changes);
+                look.live(xml, place, part.shows_changes);
                 continue;
             }
             let name = element.and_then(|(part, _)| part.name.as_ref());

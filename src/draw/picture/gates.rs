@@ -119,9 +119,9 @@ impl Gate {
             let shown = view.arrows_shown.get(at);
             shown.is_some_and(|shown| !shown.looks().iter().all(is_quiet))
         };
-        let is_lead_news = changed(self.lead);
+        let is_lead_changed = changed(self.lead);
         let all = self.members.iter();
-        all.map(move |(at, _)| (*at, is_lead_news || changed(*at)))
+        all.map(move |(at, _)| (*at, is_lead_changed || changed(*at)))
     }
 
     /// The look of the line for all lines that are unchanged in a window, and these lines; `None` if there

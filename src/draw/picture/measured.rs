@@ -269,7 +269,7 @@ impl Measurer<'_> {
     /// The space for the widest label that each arrow shows in some window.
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
-        let reported = told_by_arrows(self.view);
+        let reported = shown_by_arrows(self.view);
         let nothing = Showing::default();
         let all = self
             .view
@@ -350,7 +350,7 @@ pub(crate) fn shown_rates(view: &View) -> Vec<ShownRates> {
 }
 
 /// Whether each arrow shows its rate: a publication whose topic does not, a subscription with another rate.
-fn told_by_arrows(view: &View) -> Vec<bool> {
+fn shown_by_arrows(view: &View) -> Vec<bool> {
     let shown_rates = shown_rates(view);
     let reported = |arrow: &Arrow| {
         arrow.kind != ArrowKind::Publish

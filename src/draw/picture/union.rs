@@ -38,7 +38,7 @@ pub struct UnionElement {
     /// Whether its last text differs between windows: a rate or a lifecycle state.
     pub is_live: bool,
     /// Whether that text is shown only in windows in which its rate changed.
-    pub tells_changes: bool,
+    pub shows_changes: bool,
     /// The rectangle of an item; empty for an arrow.
     pub rect: Rect,
     /// Its name if the drawing's font lacks some characters, for viewers with more fonts.
@@ -128,15 +128,15 @@ impl Picture<'_> {
                 shown.lifecycle = is_live.then(|| "-".into());
                 let mut group = boxes.item(item, &card, &shown);
                 let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);
-                let tells_changes =
+                let shows_changes =
                     card.shown_rates == ShownRates::Changes && marks.iter().any(is_rate);
-                if tells_changes {
+                if shows_changes {
                     group.text(boxes.rate_label_text(card.place, "-"));
                 }
                 UnionElement {
                     group,
-                    is_live: is_live || tells_changes,
-                    tells_changes,
+                    is_live: is_live || shows_changes,
+                    shows_changes,
                     rect: card.place,
                     name: label.unshown.clone(),
                     latch: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
@@ -179,7 +179,7 @@ impl Picture<'_> {
                 UnionElement {
                     group: arrows.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),
-                    tells_changes: false,
+                    shows_changes: false,
                     rect: Rect::default(),
                     name: None,
                     latch: None,

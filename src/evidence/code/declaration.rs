@@ -132,19 +132,19 @@ impl Call {
             self.declaration(role, self.topic.as_ref().map(beside), types)
         };
         // The roles on an action's outgoing (feedback, result, status) and incoming (goal, cancel) topics.
-        let action1 = |tells, stated| {
+        let action1 = |publishes, stated| {
             vec![
-                one(tells, "/feedback", "Feedback"),
-                one(tells, "/result", "Result"),
-                fixed(tells, "/status", "actionlib_msgs/GoalStatusArray"),
+                one(publishes, "/feedback", "Feedback"),
+                one(publishes, "/result", "Result"),
+                fixed(publishes, "/status", "actionlib_msgs/GoalStatusArray"),
                 one(stated, "/goal", "Goal"),
                 fixed(stated, "/cancel", "actionlib_msgs/GoalID"),
             ]
         };
-        let action2 = |tells| {
+        let action2 = |publishes| {
             vec![
-                one(tells, "/_action/feedback", "_FeedbackMessage"),
-                fixed(tells, "/_action/status", "action_msgs/GoalStatusArray"),
+                one(publishes, "/_action/feedback", "_FeedbackMessage"),
+                fixed(publishes, "/_action/status", "action_msgs/GoalStatusArray"),
             ]
         };
         match self.made {

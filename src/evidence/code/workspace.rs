@@ -97,10 +97,10 @@ impl Workspace {
             launches,
             ..Self::default()
         };
-        let telling = files
+        let relevant = files
             .into_iter()
             .filter(|(_, code)| !code.classes.is_empty());
-        for (path, code) in telling {
+        for (path, code) in relevant {
             for (place, class) in code
                 .classes
                 .iter()

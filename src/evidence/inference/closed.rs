@@ -57,23 +57,23 @@ impl Closed {
         }
         context.retain(|_, span| span.nanos() >= SETTLED_NS);
         closed.settled = context.into_keys().collect();
-        closed.tell(known);
+        closed.fill(known);
         closed
     }
 
-    fn tell(&mut self, known: &Conclusions<'_>) {
-        let mut untold = BTreeSet::new();
+    fn fill(&mut self, known: &Conclusions<'_>) {
+        let mut unnamed = BTreeSet::new();
         for stream in known.streams {
             match stream.publisher {
                 Some(node) if stream.trust == Reliability::Whole => {
                     self.stated.entry(stream.topic).or_default().insert(node);
                 }
                 _ => {
-                    untold.insert(stream.topic);
+                    unnamed.insert(stream.topic);
                 }
             }
         }
-        self.stated.retain(|topic, _| !untold.contains(topic));
+        self.stated.retain(|topic, _| !unnamed.contains(topic));
     }
 
     /// Whether every message of a topic names its publisher, and this node is never named.

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_record_of_a_shared_file_does_not_tell_programs_apart() {
+    fn a_log_record_of_a_shared_file_does_not_distinguish_programs() {
         let shared = [
             "./clients/roscpp/src/libros/connection.cpp",
             "./src/rclcpp/subscription_base.cpp",

@@ -94,7 +94,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
     };
     let observations = known.facts.list.iter().map(|fact| fact.observation);
-    let untold: BTreeSet<Observation> = observations
+    let unnamed: BTreeSet<Observation> = observations
         .filter(
             |observation| matches!(observation, Observation::Reports(_, topic) if !stated(*topic)),
         )
@@ -103,7 +103,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let Observation::Reports(node, topic) = fact.observation else {
             continue;
         };
-        if untold.contains(&fact.observation) {
+        if unnamed.contains(&fact.observation) {
             let node = known.meant(node);
             known.add(Inference {
                 what: ElementKey::Publish(node, topic),

@@ -155,7 +155,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         if let Some(what) = end(known, *node, *topic, before, after, echo) {
-            tell(source, known, what, (before, after), echo);
+            observe(source, known, what, (before, after), echo);
         }
     }
 }
@@ -276,7 +276,7 @@ fn end(
     }
 }
 
-fn tell(
+fn observe(
     source: SourceId,
     known: &mut Conclusions<'_>,
     what: ElementKey,

@@ -45,7 +45,7 @@ pub(crate) fn read(
 
 /// A subscription in a log text.
 #[derive(Debug, PartialEq, Eq)]
-struct ToldSubscription<'a> {
+struct LoggedSubscription<'a> {
     /// The subscriber; `None` for the logging node.
     node: Option<&'a str>,
     topic: &'a str,
@@ -62,15 +62,15 @@ enum How {
 }
 
 /// The subscription in a log text of roscpp.
-fn link(text: &str) -> Option<ToldSubscription<'_>> {
+fn link(text: &str) -> Option<LoggedSubscription<'_>> {
     let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
     let caller = || between("callerid=[", "]");
-    let own = |topic| ToldSubscription {
+    let own = |topic| LoggedSubscription {
         node: None,
         topic,
         how: How::Lasts,
     };
-    let clients = |node, topic, how| ToldSubscription {
+    let clients = |node, topic, how| LoggedSubscription {
         node: Some(node),
         topic,
         how,
@@ -105,7 +105,7 @@ mod tests {
         let text = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to \
                     [callerid=[/slam] address=[TCPROS connection on port 1 to [127.0.0.1:2 on socket 3]]]";
         let slam = |how| {
-            Some(ToldSubscription {
+            Some(LoggedSubscription {
                 node: Some("/slam"),
                 topic: "/scan",
                 how,
@@ -122,7 +122,7 @@ mod tests {
         let text = "Client [/bad] wants topic /scan to have datatype/md5sum [a/b], but our version has [c/d].";
         assert_eq!(
             link(text),
-            Some(ToldSubscription {
+            Some(LoggedSubscription {
                 node: Some("/bad"),
                 topic: "/scan",
                 how: How::Refused
@@ -135,7 +135,7 @@ mod tests {
         let text = "Retrying connection to [127.0.0.1:4] for topic [/scan]";
         assert_eq!(
             link(text),
-            Some(ToldSubscription {
+            Some(LoggedSubscription {
                 node: None,
                 topic: "/scan",
                 how: How::Lasts

@@ -45,7 +45,7 @@ struct PageData<'a> {
     date: String,
     /// The headlines of each window that has any.
     #[serde(rename = "told")]
-    reported: Vec<ToldData>,
+    reported: Vec<ReportedData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
@@ -88,11 +88,11 @@ struct GraphData<'a> {
 }
 
 /// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the
-/// texts of the three badges, and for each of the first [`MOST_TOLD`] headlines its time, its sign (0
+/// texts of the three badges, and for each of the first [`MOST_REPORTED`] headlines its time, its sign (0
 /// appeared, 1 vanished, 2 changed), its element (-1 for one that is not drawn), its text, its index in the
 /// log.
 #[derive(Serialize)]
-struct ToldData(
+struct ReportedData(
     usize,
     usize,
     [String; 3],
@@ -106,7 +106,7 @@ struct ToldData(
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EventId)>);
 
 /// The most headlines of one window that are listed.
-const MOST_TOLD: usize = 200;
+const MOST_REPORTED: usize = 200;
 
 /// The data as JSON that is safe between the tags of a page.
 pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
@@ -240,7 +240,7 @@ fn reported(
     page: &HtmlPage<'_>,
     places: &BTreeMap<Element, u32>,
     clock: PageClock,
-) -> Vec<ToldData> {
+) -> Vec<ReportedData> {
     let mission = page.sequence.mission;
     let frames = page.whole.view.frames.iter().enumerate();
     let frames = frames.filter(|(_, frame)| frame.is_changed());
@@ -265,7 +265,7 @@ fn reported(
         let lines = frame
             .headlines
             .iter()
-            .take(MOST_TOLD)
+            .take(MOST_REPORTED)
             .filter_map(|headline| {
                 let event = mission.log.events.get(headline.event as usize)?;
                 let what = place(&headline.what);
@@ -274,7 +274,7 @@ fn reported(
                 Some((time, sign(event.kind), what, sentence, headline.event))
             })
             .chain(returns);
-        ToldData(at, frame.counts.total(), chips, lines.collect())
+        ReportedData(at, frame.counts.total(), chips, lines.collect())
     };
     frames.map(reported).collect()
 }

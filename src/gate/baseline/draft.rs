@@ -229,12 +229,17 @@ fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
 
 fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let since = |s: &TopicInRun<'_>, at: Stamp| at.since(s.facts.mission.span.start);
-    let heard = || seen.iter().filter_map(|s| Some((s, s.facts.heard(s.id)?)));
-    let ends: Vec<i64> = heard()
+    let received = || {
+        seen.iter()
+            .filter_map(|s| Some((s, s.facts.received(s.id)?)))
+    };
+    let ends: Vec<i64> = received()
         .filter(|(s, _)| s.ends())
-        .map(|(s, heard)| since(s, heard.end))
+        .map(|(s, received)| since(s, received.end))
         .collect();
-    let began: Vec<i64> = heard().map(|(s, heard)| since(s, heard.start)).collect();
+    let began: Vec<i64> = received()
+        .map(|(s, received)| since(s, received.start))
+        .collect();
     let ends_somewhere = !ends.is_empty();
     let same = |get: &dyn Fn(&TopicInRun<'_>) -> Option<BTreeSet<String>>| {
         let first = seen.first().and_then(get)?;
@@ -260,7 +265,7 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
             .all(|s| s.facts.messages(s.id) >= FEWEST_OF_MEAN);
     let is_timed = !is_latched && is_regular;
     // An even topic stays; for others, the last message shows whether they do.
-    let tails = heard().map(|(s, heard)| s.facts.mission.span.end.since(heard.end));
+    let tails = received().map(|(s, received)| s.facts.mission.span.end.since(received.end));
     let stays = times
         .stays(tails.max().unwrap_or(0))
         .filter(|_| hz.is_none());
@@ -356,15 +361,15 @@ fn longest(seen: &[TopicInRun<'_>], may_end: bool) -> Option<i64> {
     let gap = longest.max(usual).max(GAP_NS);
     let life = seen
         .iter()
-        .filter_map(|s| s.facts.heard(s.id))
+        .filter_map(|s| s.facts.received(s.id))
         .map(|h| h.nanos());
     (gap < life.min()? / 2).then(|| two_digits(gap))
 }
 
 impl TopicInRun<'_> {
     fn ends(&self) -> bool {
-        let heard = self.facts.heard(self.id);
-        heard.is_some_and(|h| self.facts.mission.span.end.since(h.end) > CLOSING_NS)
+        let received = self.facts.received(self.id);
+        received.is_some_and(|h| self.facts.mission.span.end.since(h.end) > CLOSING_NS)
     }
 
     fn types(&self) -> BTreeSet<String> {
@@ -375,8 +380,8 @@ impl TopicInRun<'_> {
     /// The nodes that publish it; `None` unless all of them are known.
     fn by(&self) -> Option<BTreeSet<String>> {
         let known = self.facts.publishers(self.id);
-        let is_told = self.facts.tells_publishers(self.id);
-        is_told.then(|| self.facts.sure_roles(&known))
+        let is_listed = self.facts.lists_publishers(self.id);
+        is_listed.then(|| self.facts.sure_roles(&known))
     }
 
     /// The nodes that subscribe to it, if measured or stated.

@@ -122,15 +122,15 @@ fn node(
         _ => false,
     };
     if ended {
-        let fate = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
+        let outcome = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
             Some((end, _)) => format!("ends at {}", facts.clock(end)),
             None => "stays".to_owned(),
         };
         all.push(Difference::changed(
             "end",
             name,
-            fate(a, one),
-            fate(b, other),
+            outcome(a, one),
+            outcome(b, other),
         ));
     }
 }
@@ -162,7 +162,7 @@ fn topic(
     let listeners = |facts: &Facts<'_>, id| facts.sure_roles(&facts.subscribers(id));
     let senders = (senders(a, first), senders(b, second));
     let listeners = (listeners(a, first), listeners(b, second));
-    let tells = |side: Where, role: &str, kind: &str| {
+    let is_observable = |side: Where, role: &str, kind: &str| {
         // Whether the edge would be observable in the mission that lacks it.
         let (facts, id) = if side == Where::First {
             (b, second)
@@ -176,8 +176,8 @@ fn topic(
             .copied()
             .collect();
         match kind {
-            "publishes" => facts.tells_publishers(id),
-            _ => facts.tells_subscribers(&nodes),
+            "publishes" => facts.lists_publishers(id),
+            _ => facts.lists_subscribers(&nodes),
         }
     };
     for (kind, (one, other)) in [("publishes", senders), ("subscribes", listeners)] {
@@ -195,7 +195,7 @@ fn topic(
                 _ => format!("{name} → {role}"),
             };
             let mut difference = Difference::only(kind, edge, side, "present");
-            difference.is_known = tells(side, role, kind);
+            difference.is_known = is_observable(side, role, kind);
             all.push(difference);
         }
     }

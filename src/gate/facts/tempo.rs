@@ -49,7 +49,7 @@ impl Rate {
 
 impl<'a> Facts<'a> {
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
-    pub(crate) fn heard(&self, topic: TopicId) -> Option<Span> {
+    pub(crate) fn received(&self, topic: TopicId) -> Option<Span> {
         let of = self.mission.sending.of_topic(topic).iter();
         let stretches = of.flat_map(|sender| &sender.stretches);
         let first = stretches.clone().map(|s| s.first).min()?;
@@ -78,7 +78,7 @@ impl<'a> Facts<'a> {
     /// The rates by which a topic is checked: of every window, or more than half of one, from its first message to the
     /// mission's end, or to its last message if it `may_end`.
     pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
-        let Some(heard) = self.heard(topic) else {
+        let Some(received) = self.received(topic) else {
             return Vec::new();
         };
         let mut rows = self.rows(topic).peekable();
@@ -97,10 +97,10 @@ impl<'a> Facts<'a> {
                 count: row.as_ref().map_or(0, |(_, row)| count(row)),
                 median_s: row.as_ref().and_then(|(_, row)| row.median.value()),
             };
-            if let Some(span) = self.counted(window.span, heard, may_end) {
+            if let Some(span) = self.counted(window.span, received, may_end) {
                 all.push(rate(span));
-            } else if first.is_none() && heard.end >= window.span.end {
-                first = begun(window.span, heard.start).map(rate);
+            } else if first.is_none() && received.end >= window.span.end {
+                first = begun(window.span, received.start).map(rate);
             }
         }
         // A topic that exists for little more than a window rarely fills one, so a part is used.
@@ -114,29 +114,30 @@ impl<'a> Facts<'a> {
     /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than
     /// two.
     pub(crate) fn mean(&self, topic: TopicId) -> Option<Rate> {
-        let heard = self.heard(topic)?;
+        let received = self.received(topic)?;
         let count = self.messages(topic).checked_sub(1)?;
         (count > 0).then_some(Rate {
             window: 0,
-            span: heard,
+            span: received,
             count,
             median_s: None,
         })
     }
 
     /// The part of a window in which a topic with messages in `received` counts; `None` if it is too short.
-    fn counted(&self, window: Span, heard: Span, may_end: bool) -> Option<Span> {
+    fn counted(&self, window: Span, received: Span, may_end: bool) -> Option<Span> {
         let whole = self.mission.span;
         let mut span = window;
-        if heard.start > span.start {
+        if received.start > span.start {
             // A topic that exists when the recorder starts is received a moment later; others have a partial window.
-            let found = span.start == whole.start && heard.start.since(whole.start) <= DISCOVERY_NS;
-            span.start = found.then_some(heard.start)?;
+            let found =
+                span.start == whole.start && received.start.since(whole.start) <= DISCOVERY_NS;
+            span.start = found.then_some(received.start)?;
         }
-        if heard.end < span.end {
-            let is_over = whole.end.since(heard.end) <= CLOSING_NS;
+        if received.end < span.end {
+            let is_over = whole.end.since(received.end) <= CLOSING_NS;
             match (is_over, may_end) {
-                (true, _) => span.end = heard.end,
+                (true, _) => span.end = received.end,
                 (false, true) => return None,
                 (false, false) => {}
             }
@@ -164,8 +165,8 @@ impl<'a> Facts<'a> {
         }
         all.extend(self.pauses(topic).filter_map(|gap| clipped(gap, during)));
         let whole = self.mission.span;
-        if let (Some(heard), false) = (self.heard(topic), may_end) {
-            let span = Span::new(heard.end.plus(-1), whole.end);
+        if let (Some(received), false) = (self.received(topic), may_end) {
+            let span = Span::new(received.end.plus(-1), whole.end);
             // An end at the robot's shutdown is not a silence.
             if span.nanos() > CLOSING_NS {
                 all.extend(clipped(span, during));

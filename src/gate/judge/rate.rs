@@ -87,7 +87,7 @@ impl Judge<'_> {
         within: &At<During>,
     ) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let Some(active) = self.facts.heard(topic) else {
+        let Some(active) = self.facts.received(topic) else {
             return Vec::new();
         };
         let allowed = within.value.on(whole);
@@ -116,7 +116,7 @@ impl Judge<'_> {
         may_end: &At<During>,
     ) -> Vec<Finding> {
         let whole = self.facts.mission.span;
-        let Some(active) = self.facts.heard(topic) else {
+        let Some(active) = self.facts.received(topic) else {
             return Vec::new();
         };
         let allowed = may_end.value.on(whole);

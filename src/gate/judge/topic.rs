@@ -244,7 +244,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let who = wanted.value.as_str();
         let kind = FindingKind::PublisherMissing;
-        if !self.facts.tells_publishers(topic) {
+        if !self.facts.lists_publishers(topic) {
             let says =
                 format!("cannot tell whether {who} publishes {name}: its publishers are unknown");
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
@@ -294,7 +294,7 @@ impl Judge<'_> {
             .collect();
         // An absent node has no subscriptions.
         let is_absent = roles.is_empty() && self.names_nodes;
-        if !is_absent && !self.facts.tells_subscribers(&nodes) {
+        if !is_absent && !self.facts.lists_subscribers(&nodes) {
             let says = format!(
                 "cannot tell whether {who} subscribes to {name}: this bag has no evidence of subscribers"
             );

@@ -22,7 +22,7 @@ type MermaidBox<'a> = (bool, &'a str);
 
 /// What happened to a box.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum BoxFate {
+enum BoxChange {
     Gone,
     New,
     Changed,
@@ -30,7 +30,7 @@ enum BoxFate {
 
 /// The chart; `None` if no finding is about the graph. Ends with a newline.
 pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
-    let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, String)> = BTreeMap::new();
+    let mut marked: BTreeMap<MermaidBox<'_>, (BoxChange, String)> = BTreeMap::new();
     for finding in findings {
         if let Some((item, class)) = class(finding) {
             marked.entry(item).or_insert((class, label(finding)));
@@ -45,22 +45,22 @@ pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> 
     Some(written(&items, &marked, &edges))
 }
 
-fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxFate)> {
+fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxChange)> {
     let class = match finding.kind {
         FindingKind::NodeMissing | FindingKind::NodeGone | FindingKind::TopicMissing => {
-            BoxFate::Gone
+            BoxChange::Gone
         }
         FindingKind::UnexpectedNode
         | FindingKind::UnexpectedTopic
         | FindingKind::NodeForbidden
-        | FindingKind::TopicForbidden => BoxFate::New,
+        | FindingKind::TopicForbidden => BoxChange::New,
         FindingKind::OrderBroken
         | FindingKind::ReactionMissing
         | FindingKind::TooManyChanges
         | FindingKind::AllowUnused => {
             return None;
         }
-        _ => BoxFate::Changed,
+        _ => BoxChange::Changed,
     };
     let is_node = matches!(
         finding.kind,
@@ -88,7 +88,7 @@ fn label(finding: &Finding) -> String {
 /// The edges of marked boxes, and those that are missing; the latter first, and dotted (true).
 fn edges<'a>(
     facts: &Facts<'a>,
-    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, String)>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxChange, String)>,
     findings: &[&'a Finding],
 ) -> Vec<(MermaidBox<'a>, MermaidBox<'a>, bool)> {
     let mut all = Vec::new();
@@ -143,7 +143,7 @@ fn edges<'a>(
 
 fn written(
     items: &BTreeSet<MermaidBox<'_>>,
-    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, String)>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxChange, String)>,
     edges: &[(MermaidBox<'_>, MermaidBox<'_>, bool)],
 ) -> String {
     let mut place: BTreeMap<&MermaidBox<'_>, usize> = BTreeMap::new();
@@ -160,9 +160,9 @@ fn written(
         let more = mark.map_or("", |(_, label)| label);
         let text = escaped(format!("{name} {more}").trim_end());
         let class = match mark {
-            Some((BoxFate::Gone, _)) => ":::gone",
-            Some((BoxFate::New, _)) => ":::new",
-            Some((BoxFate::Changed, _)) => ":::changed",
+            Some((BoxChange::Gone, _)) => ":::gone",
+            Some((BoxChange::New, _)) => ":::new",
+            Some((BoxChange::Changed, _)) => ":::changed",
             None => "",
         };
         let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");

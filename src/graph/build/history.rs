@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
+use super::lifetimes::compute_lifetimes;
 use super::liveness::{Lifetime, Liveness};
 use super::merged::fall_silent;
 use super::recordings::{doubled, hide, pauses, unseen};
 use super::restarts::restarts;
 use super::senders::{Sender as TopicSender, Traffic};
-use super::settle::settle;
 use super::tracks::{Tracks, tracks};
 use crate::base::error::Result;
 use crate::base::role::role;
@@ -135,7 +135,7 @@ fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> i
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
     let mut tracks = tracks(recorded, findings, traffic, &restarts)?;
     fall_silent(&mut tracks, traffic, findings);
-    settle(
+    compute_lifetimes(
         &mut tracks,
         &findings.inferences,
         &restarts,

@@ -87,7 +87,7 @@ fn turns<'a>(
         .collect()
 }
 
-/// The stretches of a turn; `None` if one goes on into the next turn, so that two send at a time.
+/// The stretches of a turn; `None` if one continues into the next turn, so that two publish at the same time.
 fn within(stretches: &[Stretch], from: Stamp, to: Stamp) -> Option<&[Stretch]> {
     let first = stretches.partition_point(|s| s.first < from);
     let next = stretches.partition_point(|s| s.first < to);

@@ -144,11 +144,11 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
         return inference.confidence;
     };
     let senders = traffic.get(&findings.streams[at].topic);
-    let spoke = senders.and_then(|senders| {
+    let sent = senders.and_then(|senders| {
         let place = senders.streams.iter().position(|s| *s == at)?;
         senders.traces[place]
     });
-    match spoke {
+    match sent {
         Some(_) => inference.confidence,
         None => inference.confidence.max(Confidence::Declared),
     }
@@ -194,8 +194,8 @@ struct Followed<'a> {
 /// Adds the messages of one stream to the track of a publication or topic.
 fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
     let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
-    let spoke = senders.traces.get(place).copied().flatten();
-    let (Some((first, last)), Some(sender)) = (spoke, sender) else {
+    let sent = senders.traces.get(place).copied().flatten();
+    let (Some((first, last)), Some(sender)) = (sent, sender) else {
         track.extent = track.extent.max(Extent::Whole);
         return;
     };

@@ -24,8 +24,8 @@ impl<'a> ColumnWalk<'a> {
         }
     }
 
-    /// Passes to `tell` every element that may differ in the next window, with its row there, if it exists.
-    pub(crate) fn next(&mut self, mut tell: impl FnMut(Element, Option<Row>)) {
+    /// Calls `visit` for every element that may differ in the next window, with its row there, if it exists.
+    pub(crate) fn next(&mut self, mut visit: impl FnMut(Element, Option<Row>)) {
         let lists = self.due.iter_mut().zip(&mut self.cursors);
         for ((due, cursors), kind) in lists.zip(Element::KINDS) {
             for (at, due) in due.iter_mut().enumerate() {
@@ -34,7 +34,7 @@ impl<'a> ColumnWalk<'a> {
                 }
                 let (row, stays) = cursors[at].next_run();
                 *due = self.window.saturating_add(stays);
-                tell(kind(u32::try_from(at).unwrap_or(u32::MAX)), row);
+                visit(kind(u32::try_from(at).unwrap_or(u32::MAX)), row);
             }
         }
         self.window += 1;

@@ -26,7 +26,7 @@ pub(crate) fn is_long(size: Size, options: &LayoutOptions, orientation: Orientat
 }
 
 /// The part in rows, for each number of rows that fits the page better than the previous one; none if it
-/// cannot be cut between its namespaces, or lies in one namespace, whose inside can then be cut.
+/// cannot be cut between its namespaces, or is inside one namespace, whose contents can then be cut.
 pub(crate) fn wraps(
     plan: &Plan,
     options: &LayoutOptions,

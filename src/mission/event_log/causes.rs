@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 use crate::graph::{Element, NodeId, TopicId};
 
 /// Makes events with a known cause parts of it.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     hand_overs(context, drafts);
     subscribers(context, drafts);
     follow_inputs(context, drafts);

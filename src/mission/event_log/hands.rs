@@ -37,7 +37,7 @@ impl RoleSending {
 }
 
 /// Adds all hand-overs.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let stretches = context
         .history
         .sending

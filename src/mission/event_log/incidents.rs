@@ -11,7 +11,7 @@ use crate::evidence::observation::Name;
 use crate::graph::{Element, NodeId};
 
 /// Adds all of them.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     for incident in &context.history.incidents {
         let (kind, detail) = match &incident.kind {
             IncidentKind::Starved(policy) => {

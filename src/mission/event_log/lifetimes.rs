@@ -24,7 +24,7 @@ struct Wholes {
 }
 
 /// Adds the events of all lifetimes.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
     for turns in turns_by_role(context).values() {
         add_role(context, drafts, &mut wholes, turns);

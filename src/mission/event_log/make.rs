@@ -62,13 +62,13 @@ impl Drafts {
 /// Every event of a mission, sorted.
 pub(crate) fn make(context: &LogInput<'_>) -> Vec<Event> {
     let mut drafts = Drafts::default();
-    lifetimes::tell(context, &mut drafts);
-    silence::tell(context, &mut drafts);
-    hands::tell(context, &mut drafts);
-    rates::tell(context, &mut drafts);
+    lifetimes::add(context, &mut drafts);
+    silence::add(context, &mut drafts);
+    hands::add(context, &mut drafts);
+    rates::add(context, &mut drafts);
     lifecycles(context, &mut drafts);
-    incidents::tell(context, &mut drafts);
-    causes::tell(context, &mut drafts);
+    incidents::add(context, &mut drafts);
+    causes::add(context, &mut drafts);
     sorted(drafts.list, context.elements).0
 }
 

@@ -7,7 +7,7 @@ use crate::graph::Element;
 use crate::graph::history::{Bound, Sender, Stretch};
 
 /// Adds all changes of rates.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let senders = context.history.sending.senders.iter();
     for sender in senders.filter(|v| !v.is_latched && !context.is_by_the_way(v.topic)) {
         for pair in sender.stretches.windows(2) {

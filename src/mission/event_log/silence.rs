@@ -13,7 +13,7 @@ use crate::graph::{Element, NodeId, Record, TopicId};
 type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
-pub(super) fn tell(context: &LogInput<'_>, drafts: &mut Drafts) {
+pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EventId)>> = BTreeMap::new();
     for (node, senders) in by(context, |v| v.node.filter(|_| !v.is_latched)) {
@@ -69,9 +69,9 @@ fn by<'a>(
     key: impl Fn(&Sender) -> Option<u32>,
 ) -> BTreeMap<TopicId, Vec<&'a Sender>> {
     let mut of: BTreeMap<u32, Vec<&Sender>> = BTreeMap::new();
-    for voice in &context.history.sending.senders {
-        if let Some(key) = key(voice) {
-            of.entry(key).or_default().push(voice);
+    for sender in &context.history.sending.senders {
+        if let Some(key) = key(sender) {
+            of.entry(key).or_default().push(sender);
         }
     }
     of

@@ -48,7 +48,7 @@ fn ros2(info: &Info) -> Vec<String> {
         info.topics_without_publisher, info.topics_without_subscriber
     ));
     advice.extend(from_files(info));
-    for (topic, tells) in [
+    for (topic, reveals) in [
         ("/rosout", "nodes that log"),
         (
             "/parameter_events",
@@ -56,7 +56,7 @@ fn ros2(info: &Info) -> Vec<String> {
         ),
     ] {
         if !has(info, topic) {
-            advice.push(format!("also record `{topic}`, which reveals {tells}"));
+            advice.push(format!("also record `{topic}`, which reveals {reveals}"));
         }
     }
     advice.push(

@@ -275,7 +275,7 @@ impl LifeJson {
     }
 }
 
-/// The lives to write: none in a window.
+/// The lifetimes to write: none in a window.
 fn lives(is_window: bool, all: &[Span]) -> &[Span] {
     if is_window { &[] } else { all }
 }

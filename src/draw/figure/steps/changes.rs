@@ -192,7 +192,7 @@ impl<'u, 's> Union<'u, 's> {
         let drawn: Vec<usize> = (0..states.len())
             .filter(|at| states[*at].is_some())
             .collect();
-        let fate_of = |(talk, _): &(Talk, BoxState)| {
+        let change_of = |(talk, _): &(Talk, BoxState)| {
             let (key, ends) = ((talk.from, talk.to), [states[talk.from]?, states[talk.to]?]);
             let before = k.checked_sub(1).map(|before| &self.talks[before]);
             if ends.contains(&BoxState::Ended) {
@@ -210,7 +210,7 @@ impl<'u, 's> Union<'u, 's> {
         let arrows: Vec<(usize, BoxState)> = links
             .iter()
             .enumerate()
-            .filter_map(|(at, link)| Some((at, fate_of(link)?)))
+            .filter_map(|(at, link)| Some((at, change_of(link)?)))
             .collect();
         let shown: Vec<usize> = arrows.iter().map(|(at, _)| *at).collect();
         let looks = drawn.iter().filter_map(|at| {

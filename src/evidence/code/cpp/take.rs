@@ -79,7 +79,7 @@ impl<'a> CppReader<'a> {
                 .handles
                 .get(callee.object)
                 .cloned()
-                .unwrap_or_else(|| spoken(callee.object).to_owned());
+                .unwrap_or_else(|| namespace_hint(callee.object).to_owned());
             self.declare(node, made, &given, types, &space);
         } else if let ("make_shared" | "make_unique", template) = (callee.name, callee.template)
             && let Some((made, inner)) = by_constructor(template)
@@ -203,7 +203,7 @@ impl<'a> CppReader<'a> {
 
 /// The namespace suggested by a node handle's name, if it is constructed elsewhere: `pnh`, `private_nh_`. The bag
 /// verifies the guess, as only a topic of exactly this name counts.
-fn spoken(object: &str) -> &'static str {
+fn namespace_hint(object: &str) -> &'static str {
     let name = object.to_lowercase();
     let is_private = ["pnh", "private", "priv_n", "nhp", "nh_p"]
         .iter()

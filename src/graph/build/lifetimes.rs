@@ -14,7 +14,7 @@ use crate::evidence::observation::Name;
 const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 
 /// Computes all lifetimes; `mission` contains the first and last moments.
-pub(crate) fn settle(
+pub(crate) fn compute_lifetimes(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     inferences: &[Inference],
     restarts: &Restarts,
