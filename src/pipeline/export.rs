@@ -342,7 +342,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
         "`--start` and `--end`".to_owned()
     };
     Some(format!(
-        "{frames} frames will take about {about}; {advice} would show less, `--skip-unchanged` only what changes"
+        "{frames} frames will take about {about}; to show less, use {advice}, or `--skip-unchanged` for changes only"
     ))
 }
 

@@ -26,7 +26,7 @@ pub struct Lasting {
 pub(crate) enum Part {
     /// All of it that is drawn.
     Whole,
-    /// A node leaves, to come back in a later window.
+    /// A node leaves and returns in a later window.
     Leaves,
     /// A node is away during the whole window.
     Away,
@@ -77,7 +77,7 @@ impl<'a> LastingEvents<'a> {
         }
     }
 
-    /// Those that last into a window or end in it. Windows come in the order of their starts.
+    /// Those that last into a window or end in it. Windows are in the order of their starts.
     pub(crate) fn at(&mut self, window: Span) -> Vec<Lasting> {
         let begun = |at: usize| self.all.get(at).is_some_and(|e| e.1.time < window.start);
         while begun(self.next) {

@@ -108,9 +108,9 @@ pub struct Shown {
     pub topics: Vec<TopicRow>,
     /// The number of equal namespaces it represents in the window; 0 for everything else.
     pub each: usize,
-    /// The nodes and topics in a folded namespace in the graph of the window; none for everything else.
+    /// The nodes and topics in a collapsed namespace in the graph of the window; none for everything else.
     pub members: Members,
-    /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
+    /// The number of headlines of each kind about elements inside a collapsed namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
     /// The number of messages in the window, if known.
     pub count: Option<u64>,
@@ -118,7 +118,7 @@ pub struct Shown {
     pub lifecycle: Option<Arc<str>>,
 }
 
-/// The numbers of nodes and topics in a folded namespace that are in the graph of a window.
+/// The numbers of nodes and topics in a collapsed namespace that are in the graph of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Members {
     /// The number of nodes.
@@ -129,7 +129,7 @@ pub struct Members {
 
 impl Members {
     /// The number written in the box: of its nodes, or of its topics if it has no nodes; `None` if it is not
-    /// a folded namespace.
+    /// a collapsed namespace.
     pub(crate) fn number(self) -> Option<(usize, &'static str)> {
         match (self.nodes, self.topics) {
             (0, 0) => None,

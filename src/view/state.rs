@@ -285,7 +285,7 @@ impl<'a> Now<'a> {
         Some(shown)
     }
 
-    /// The members of a folded namespace that are in the window's graph.
+    /// The members of a collapsed namespace that are in the window's graph.
     fn members(&self, item: &Item) -> Members {
         let mut members = Members::default();
         let is_there = |what: &Element| self.rows.of(*what).is_some_and(Option::is_some);

@@ -108,7 +108,7 @@ impl WindowTurn {
         shown
     }
 
-    /// The number of headlines reported on a folded namespace or a bundle; `None` without any.
+    /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let reported = self.changed.headlines.iter();
         let counts = Counts::of(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));

@@ -49,7 +49,7 @@ fn changed(counts: &Counts) -> String {
         .join(", ")
 }
 
-/// The words for changes inside a folded namespace: `+1 −4 nodes, 1 restarted`.
+/// The words for changes inside a collapsed namespace: `+1 −4 nodes, 1 restarted`.
 pub(crate) fn inside(counts: &Counts) -> String {
     let pair = |came: usize, went: usize, word: &str| match (came, went) {
         (0, 0) => String::new(),

@@ -1,5 +1,5 @@
-//! `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` are a node's own. A
-//! caller of another name, unless the topic lies below it, runs that node as a nodelet.
+//! `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` belong to
+//! one node. A caller of another name, unless the topic is below it, runs that node as a nodelet.
 
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, SourceId};
