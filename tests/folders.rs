@@ -129,7 +129,7 @@ fn a_folder_is_one_recording_or_an_error_that_lists_them() {
                 Is::Noted(words) => assert!(code == 0 && said.contains(words), "{at}"),
                 Is::Refused(words) => {
                     assert!(code == 1 || code == 2, "{at}");
-                    assert!(said.contains(words) && said.contains("hint: name "), "{at}");
+                    assert!(said.contains(words) && said.contains("hint: give "), "{at}");
                 }
             }
         }

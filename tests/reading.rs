@@ -452,7 +452,7 @@ fn files_that_are_not_bags_are_reported_with_advice() {
         (b"PK\x03\x04", "zip"),
         (&[0; 600], "zeros"),
         (b"#ROSRECORD V1.2\n", "V1.2"),
-        (b"hello", "another kind"),
+        (b"hello", "unrecognized format"),
     ];
     for (bytes, word) in cases {
         let (_dir, path) = placed("x.bag", bytes);
