@@ -1,6 +1,7 @@
 //! Compares the phases of real missions with the times at which their scripts changed the running nodes.
 
 use std::path::Path;
+use std::process::Command;
 
 use bagreel::internals::base::time::Period;
 use bagreel::internals::graph::window::Length;
@@ -68,4 +69,44 @@ fn phases_are_the_same_without_the_log_and_with_merged_connections() {
             "{file}: {found:?}"
         );
     }
+}
+
+/// The phases in the strip below a frame, and the one that is emphasized.
+fn strip(bag: &Path, period: &str, window: usize) -> (Vec<String>, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("{n}.svg");
+    let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args(["render", "-q", "--view", "graph", "--period", period, "-o"])
+        .args([&file, bag])
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{done:?}");
+    let svg = std::fs::read_to_string(folder.path().join(format!("{window}.svg"))).unwrap();
+    let texts = |group: &str| -> Vec<String> {
+        let (_, rest) = svg.split_once(&format!("<g class=\"{group}\"")).unwrap();
+        let (inside, _) = rest.split_once("</g>").unwrap();
+        let texts = inside.split("<text ").skip(1);
+        let words =
+            texts.map(|t| t[t.find('>').unwrap() + 1..t.find("</text>").unwrap()].to_owned());
+        words.collect()
+    };
+    (texts("phases"), texts("past").pop().unwrap())
+}
+
+#[test]
+fn the_phase_of_a_window_is_the_one_with_most_of_it() {
+    let (_, now) = strip(&example(), "60", 4);
+    assert!(now.starts_with("+ mission_executor_2"), "{now}");
+    let (_, now) = strip(&example(), "60", 5);
+    assert_eq!(now, "+ dock_controller");
+}
+
+#[test]
+fn phases_of_the_same_nodes_are_one_below_a_frame() {
+    let bag = support::shared("data/bags/fibonacci/fibonacci_namespaces.bag");
+    let Some(bag) = bag else { return };
+    let (all, _) = strip(&bag, "20", 4);
+    assert!(all.len() > 1, "{all:?}");
+    let is_number = |name: &&String| name.chars().all(|c| c.is_ascii_digit());
+    assert_eq!(all.iter().skip(1).find(is_number), None, "{all:?}");
 }

@@ -14,7 +14,7 @@ mod legend;
 mod lines;
 pub(crate) use legend::{LegendSign, signs};
 mod measured;
-mod options;
+pub(crate) mod options;
 pub(crate) mod page;
 mod replicas;
 mod room;

@@ -168,6 +168,27 @@ impl Anchor {
     }
 }
 
+impl Text {
+    /// A text whose letters are as far above as below a point.
+    pub(crate) fn centred(
+        anchor: Anchor,
+        on: Point,
+        (size, weight): (f64, Weight),
+        color: Color,
+        text: impl Into<String>,
+    ) -> Self {
+        Self {
+            at: Point::new(on.x, on.y + size * 0.36),
+            anchor,
+            size,
+            weight,
+            color,
+            halo: None,
+            text: text.into(),
+        }
+    }
+}
+
 impl Shape {
     /// A shape without a line around.
     pub fn filled(form: Form, fill: Color) -> Self {

@@ -56,24 +56,19 @@ fn largest(
     let mut groups: BTreeMap<(bool, usize, usize), Vec<NamePlace>> = BTreeMap::new();
     // The first phrase about edges that appear, and about those that vanish.
     let mut edges: BTreeMap<char, usize> = BTreeMap::new();
-    for (at, phrase) in frame.caption.iter().enumerate() {
-        for (name, event) in phrase.events.iter().enumerate() {
-            if *event == FOLDED {
-                continue;
-            }
-            let kind = match noun(mission, *event) {
-                EDGES => *edges.entry(phrase.sign).or_insert(at),
-                _ => at,
-            };
-            let around = around(view, subject(mission, *event));
-            // The whole graph comes after all namespaces.
-            let outermost = around.first().copied().unwrap_or(usize::MAX);
-            if outermost < usize::MAX {
-                let group = groups.entry((true, kind, outermost)).or_default();
-                group.push((at, name));
-            }
-            let group = groups.entry((false, kind, usize::MAX)).or_default();
-            group.push((at, name));
+    let phrases = frame.caption.iter().zip(0..);
+    let names =
+        phrases.flat_map(|(phrase, at)| phrase.events.iter().zip(0..).map(move |e| (at, e)));
+    for (at, (event, name)) in names.filter(|(_, (event, _))| **event != FOLDED) {
+        let kind = match noun(mission, *event) {
+            EDGES => *edges.entry(frame.caption[at].sign).or_insert(at),
+            _ => at,
+        };
+        let outermost = around(view, subject(mission, *event)).first().copied();
+        // The whole graph comes after all namespaces.
+        let framed = outermost.map(|space| (true, kind, space));
+        for key in framed.into_iter().chain([(false, kind, usize::MAX)]) {
+            groups.entry(key).or_default().push((at, name));
         }
     }
     groups.retain(|_, names| names.len() > 1);

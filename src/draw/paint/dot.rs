@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 
 use crate::base::geometry::Size;
 use crate::base::words;
+use crate::draw::picture::options;
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Evidence;
@@ -118,11 +119,7 @@ impl<'a> DotView<'a> {
 
     /// The colour of a change; `None` for an unchanged element.
     fn colour(&self, shown: &Shown) -> Option<String> {
-        let change = match shown.mark? {
-            Mark::Added => &self.style.added,
-            Mark::Removed | Mark::Away => &self.style.removed,
-            _ => &self.style.changed,
-        };
+        let change = options::change(&self.style, shown.mark?);
         Some(change.color.to_string().to_lowercase())
     }
 }

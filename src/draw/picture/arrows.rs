@@ -385,22 +385,13 @@ impl Arrows<'_> {
             return;
         }
         let edge = place.middle(style.halo_width * self.fit.scale);
+        let (weight, color) = match shown.mark {
+            Some(_) => (Weight::SemiBold, look.stroke.color),
+            None => (Weight::Regular, look.text),
+        };
         group.text(Text {
-            at: Point::new(edge.x, edge.y + size * 0.36),
-            anchor: place.side,
-            size,
-            weight: if shown.mark.is_some() {
-                Weight::SemiBold
-            } else {
-                Weight::Regular
-            },
-            color: if shown.mark.is_some() {
-                look.stroke.color
-            } else {
-                look.text
-            },
             halo: Some((style.halo, style.halo_width * self.fit.scale)),
-            text: text.into_owned(),
+            ..Text::centred(place.side, edge, (size, weight), color, text)
         });
     }
 }

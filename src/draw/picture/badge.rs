@@ -126,13 +126,6 @@ pub(crate) fn pill(
     let area = Rect::around(centre, Size::new(pill_width(fonts, text, size), height));
     let form = Form::Rect(area, height / 2.0);
     group.shape(Shape::filled(form, paint.0));
-    group.text(Text {
-        at: Point::new(centre.x, centre.y + size * 0.36),
-        anchor: Anchor::Middle,
-        size,
-        weight: Weight::SemiBold,
-        color: paint.1,
-        halo: None,
-        text: text.to_owned(),
-    });
+    let font = (size, Weight::SemiBold);
+    group.text(Text::centred(Anchor::Middle, centre, font, paint.1, text));
 }

@@ -216,14 +216,10 @@ impl Boxes<'_> {
     /// The text of the rate label of a box, without its outline.
     pub(crate) fn rate_label_text(&self, place: Rect, text: &str) -> Text {
         let (below, size) = self.below(place);
+        let (font, color) = ((size, Weight::SemiBold), self.style.changed.color);
         Text {
-            at: Point::new(below.x, below.y + size * 0.36),
-            anchor: Anchor::Middle,
-            size,
-            weight: Weight::SemiBold,
-            color: self.style.changed.color,
             halo: Some((self.style.edge.halo, self.style.edge.halo_width)),
-            text: text.to_owned(),
+            ..Text::centred(Anchor::Middle, below, font, color, text)
         }
     }
 

@@ -207,31 +207,14 @@ impl Boxes<'_> {
         }
         let (weight, quiet) = look.small;
         let is_there = |at: usize| view.calm_at(&view.rows[at].shown, k).is_some();
-        let words = |x: f64, anchor: Anchor, (size, color): (f64, _), text: String| Text {
-            at: Point::new(x, middle + size * 0.36),
-            anchor,
-            size,
-            weight,
-            color,
-            halo: None,
-            text,
-        };
-        let left = place.x + PAD * size;
-        group.text(words(
-            left,
-            Anchor::Start,
-            (size, look.text),
-            line.words(is_there),
-        ));
+        let left = Point::new(place.x + PAD * size, middle);
+        let (font, words) = ((size, weight), line.words(is_there));
+        group.text(Text::centred(Anchor::Start, left, font, look.text, words));
         let rate = rate(shown).filter(|_| seen.len() == 1 && !shown.is_ghost());
         let small = style.topic.small * self.fit.scale;
-        let right = place.right() - PAD * size;
-        group.text(words(
-            right,
-            Anchor::End,
-            (small, quiet),
-            rate.unwrap_or_default(),
-        ));
+        let right = Point::new(place.right() - PAD * size, middle);
+        let (font, rate) = ((small, weight), rate.unwrap_or_default());
+        group.text(Text::centred(Anchor::End, right, font, quiet, rate));
         Some(group)
     }
 }

@@ -215,15 +215,14 @@ impl CourseStrip<'_> {
         if wide(&text) > room {
             return;
         }
-        group.text(Text {
-            at: Point::new(place.centre().x, place.centre().y + size * 0.36),
-            anchor: Anchor::Middle,
-            size,
-            weight,
+        let font = (size, weight);
+        group.text(Text::centred(
+            Anchor::Middle,
+            place.centre(),
+            font,
             color,
-            halo: None,
             text,
-        });
+        ));
     }
 
     fn name(&self, group: &mut Group, (k, row): (usize, &CourseRow), color: Color, weight: Weight) {
@@ -233,15 +232,8 @@ impl CourseStrip<'_> {
         let text = label(row, |text| wide(&self.fonts.shown(text)) <= room);
         let text = self.fonts.shown(&text);
         let text = self.fonts.fit(&text, size, Weight::SemiBold, room);
-        group.text(Text {
-            at: Point::new(self.plot.x - GAP, self.y(k) + size * 0.36),
-            anchor: Anchor::End,
-            size,
-            weight,
-            color,
-            halo: None,
-            text: text.into_owned(),
-        });
+        let at = Point::new(self.plot.x - GAP, self.y(k));
+        group.text(Text::centred(Anchor::End, at, (size, weight), color, text));
     }
 
     /// The lifetimes of a row as one shape.

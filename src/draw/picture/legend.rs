@@ -174,15 +174,9 @@ pub(crate) fn legend(
                 Rect::new(*x, y - 6.0 * unit, SIGN * unit, 12.0 * unit),
                 unit,
             );
-            group.text(Text {
-                at: Point::new(x + (SIGN + GAP) * unit, y + size * 0.36),
-                anchor: Anchor::Start,
-                size,
-                weight: Weight::Regular,
-                color: style.legend.text,
-                halo: None,
-                text: words.clone(),
-            });
+            let at = Point::new(x + (SIGN + GAP) * unit, y);
+            let (font, color) = ((size, Weight::Regular), style.legend.text);
+            group.text(Text::centred(Anchor::Start, at, font, color, words));
         }
     }
     group
@@ -219,18 +213,16 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
                 });
             }
         }
-        LegendSign::Row => group.text(Text {
-            at: Point::new(
-                place.centre().x,
-                place.centre().y + style.legend.size * unit * 0.36,
-            ),
-            anchor: Anchor::Middle,
-            size: style.legend.size * unit,
-            weight: Weight::SemiBold,
-            color: style.page.text,
-            halo: None,
-            text: "→".to_owned(),
-        }),
+        LegendSign::Row => {
+            let (at, font) = (place.centre(), (style.legend.size * unit, Weight::SemiBold));
+            group.text(Text::centred(
+                Anchor::Middle,
+                at,
+                font,
+                style.page.text,
+                "→",
+            ));
+        }
         LegendSign::Change(mark) => {
             let stroke = arrow_of(ArrowKind::Publish, Confidence::Measured, Some(*mark));
             group.shape(Shape::line(across(place), stroke));

@@ -157,14 +157,13 @@ impl Boxes<'_> {
             stroke: stroke.scaled(self.fit.pen),
         });
         let letters = style.cluster.size * CHIP_TEXT * scale;
-        group.text(Text {
-            at: Point::new(area.centre().x, area.centre().y + letters * 0.36),
-            anchor: Anchor::Middle,
-            size: letters,
-            weight: Weight::SemiBold,
-            color: text,
-            halo: None,
-            text: index.to_owned(),
-        });
+        let font = (letters, Weight::SemiBold);
+        group.text(Text::centred(
+            Anchor::Middle,
+            area.centre(),
+            font,
+            text,
+            index,
+        ));
     }
 }

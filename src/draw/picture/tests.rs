@@ -395,3 +395,28 @@ fn one_topic_to_several_readers_has_one_label() {
         ["/p > /q: u 2 Hz", "/s > /p: scan 9 Hz", "/s > /q:"]
     );
 }
+
+#[test]
+fn a_line_outside_of_a_frame_keeps_its_label_only_if_that_is_beside_it() {
+    // Into the frame, out of it at the bottom, where its label is, and into it again.
+    let corners = [(150.0, 20.0), (150.0, 90.0), (190.0, 90.0), (190.0, 20.0)];
+    let corners = corners.map(|(x, y)| Point::new(x, y));
+    let frame = Rect::new(100.0, 0.0, 100.0, 50.0);
+    let outside = |label: Point| {
+        let route = layout::Route {
+            start: Point::new(0.0, 20.0),
+            curves: corners.map(|p| [p; 3]).to_vec(),
+            label: Some(label),
+        };
+        let fit = GraphFit {
+            scale: 1.0,
+            pen: 1.0,
+            origin: Point::default(),
+        };
+        let room = Some(Size::new(30.0, 10.0));
+        let path = ArrowPath::new(String::new(), Default::default(), &route, room, fit);
+        path.outside(frame, false).is_some()
+    };
+    assert!(outside(Point::new(50.0, 20.0)));
+    assert!(!outside(Point::new(170.0, 84.0)));
+}
