@@ -8,7 +8,7 @@ use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
 use bagreel::internals::mission::info::info;
 use bagreel::{Mission, Reading, read};
 
-use crate::edges::log1;
+use crate::edges::{log1, text1};
 use crate::pairs::LOG;
 use crate::support::rosbag1::{Pack, write};
 use crate::support::{ORIGIN, Recording};
@@ -112,6 +112,27 @@ fn the_end_of_an_input_does_not_end_its_relay() {
     let text = shown(&bag);
     assert!(text.contains("/camera stopped"), "{text}");
     assert!(!text.contains("/relay stopped"), "{text}");
+}
+
+#[test]
+fn a_mux_that_reports_another_input_hands_over() {
+    let mut bag = minute(&[]);
+    for (node, topic) in [
+        ("/nav", "/cmd_nav"),
+        ("/teleop", "/cmd_teleop"),
+        ("/mux", "/cmd_vel"),
+    ] {
+        let twist = bag.publisher(node, topic, "geometry_msgs/Twist");
+        bag.send(twist, (0, 60_000), 100, &[1; 48]);
+    }
+    let selected = bag.publisher("/mux", "/mux/selected", "std_msgs/String");
+    bag.publishers[selected].latching = true;
+    for (second, topic) in [(0, "/cmd_nav"), (30, "/cmd_teleop")] {
+        at(&mut bag, selected, second, text1(topic));
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let text = shown(&bag);
+    assert!(text.contains("/cmd_vel handed over: /nav → /teleop"), "{text}");
 }
 
 #[test]

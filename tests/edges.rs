@@ -115,7 +115,7 @@ impl Recording {
     }
 }
 
-fn text1(text: &str) -> Vec<u8> {
+pub(crate) fn text1(text: &str) -> Vec<u8> {
     let length = u32::try_from(text.len()).unwrap();
     [&length.to_le_bytes(), text.as_bytes()].concat()
 }
