@@ -21,7 +21,7 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
 use crate::graph::history::Sending;
-use crate::graph::{Elements, Graph, Graphs, NodeId};
+use crate::graph::{Element, Elements, Graph, Graphs, NodeId};
 
 pub(crate) use event_log::EventId;
 pub use event_log::EventLog;
@@ -112,30 +112,27 @@ impl Mission {
     /// The skew of each topic: the coefficient of variation of its rate over the windows, 0 for one that is always the
     /// same; `None` without two whole windows or without messages. A partial window at the end does not count.
     pub(crate) fn skews(&self) -> Vec<Option<f64>> {
-        // The sums of the rates and of their squares.
-        let mut sums = vec![(0.0, 0.0); self.elements.topics.len()];
-        let mut many = 0.0;
-        for (window, graph) in self.each().filter(|(window, _)| !window.partial) {
-            many += 1.0;
-            for topic in &graph.topics {
-                let hz = topic.count as f64 * 1e9 / window.span.nanos().max(1) as f64;
-                let sum = &mut sums[topic.id as usize];
-                *sum = (sum.0 + hz, sum.1 + hz * hz);
+        let many = self.windows.iter().filter(|w| !w.partial).count() as f64;
+        let skew = |topic| {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for (at, row) in self.graphs.rows(Element::Topic(topic)) {
+                if let Some(window) = self.windows.get(at).filter(|w| !w.partial) {
+                    let nanos = window.span.nanos().max(1);
+                    let hz = row.count.unwrap_or(0) as f64 * 1e9 / nanos as f64;
+                    (sum, squares) = (sum + hz, squares + hz * hz);
+                }
             }
-        }
-        let skew = |(sum, squares): (f64, f64)| {
             let mean = sum / many;
             let spread = libm::sqrt((squares / many - mean * mean).max(0.0));
             (many > 1.0 && mean > 0.0).then(|| spread / mean)
         };
-        sums.into_iter().map(skew).collect()
+        let topics = (0..).zip(&self.elements.topics);
+        topics.map(|(id, _)| skew(id)).collect()
     }
 
     /// Determines the changes from each window to the next, by the event log.
     pub(crate) fn explain(&mut self) {
-        let spans = self.windows.iter().map(|w| w.span);
-        let windows = spans.zip(&self.graphs);
-        let reported = event_log::explain(windows, &self.elements, &self.log);
+        let reported = event_log::explain(&self.graphs, &self.elements, &self.log);
         for (window, (changes, events)) in self.windows.iter_mut().zip(reported) {
             (window.changes, window.events) = (changes, events);
         }

@@ -132,7 +132,10 @@ fn a_mux_that_reports_another_input_hands_over() {
     }
     bag.messages.sort_by_key(|m| m.1);
     let text = shown(&bag);
-    assert!(text.contains("/cmd_vel handed over: /nav → /teleop"), "{text}");
+    assert!(
+        text.contains("/cmd_vel handed over: /nav → /teleop"),
+        "{text}"
+    );
 }
 
 #[test]

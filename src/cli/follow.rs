@@ -19,10 +19,11 @@ use crate::pipeline::Render;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
 use crate::pipeline::live::Live;
 
-/// The number of newest messages in which events are detected: a tenth of a second of work.
-const MOST: u64 = 1_000_000;
-/// The pause between two analyses as a multiple of their duration: three percent of a core.
-const REST: f64 = 33.0;
+/// The number of newest messages in which events are detected: less than a tenth of a second of work, and minutes of
+/// most robots.
+const MOST: u64 = 500_000;
+/// The pause between two analyses as a multiple of their duration: with the reading, three percent of a core.
+const REST: f64 = 45.0;
 /// The shortest pause in seconds between two analyses: in general, and after something new appeared, when
 /// people are waiting for the output.
 const LEAST: f64 = 1.0;

@@ -340,6 +340,7 @@ impl Collector {
                     .to_owned(),
             });
         }
+        self.facts.seal();
         self.texts.sort();
         let mut all = Recorded {
             texts: self.texts,

@@ -362,6 +362,11 @@ impl Observations {
         }
     }
 
+    /// Ends the adding of observations.
+    pub(crate) fn seal(&mut self) {
+        self.places = HashMap::new();
+    }
+
     /// Numbers all names in the order of their texts; returns the new number of each old one.
     pub(crate) fn renumber(&mut self) -> Vec<Name> {
         let mut order: Vec<usize> = (0..self.texts.len()).collect();
@@ -387,11 +392,6 @@ impl Observations {
             measured.publisher = measured.publisher.map(to);
             measured.subscriber = measured.subscriber.map(to);
         }
-        let keys = self
-            .list
-            .iter()
-            .map(|f| (f.observation, f.source, f.snapshot));
-        self.places = keys.zip(0..).collect();
         new
     }
 

@@ -54,6 +54,9 @@ impl OpenSeries {
     fn hold(&mut self, block: StampBlock) {
         let (from, to) = self.bounds.unwrap_or((block.first, block.last));
         self.bounds = Some((from.min(block.first), to.max(block.last)));
+        // Most sequences of a mission with very many names are one block.
+        self.blocks
+            .reserve_exact(usize::from(self.blocks.is_empty()));
         self.blocks.push(block);
     }
 }
@@ -186,6 +189,7 @@ impl Stamps {
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.close_all();
         for series in &mut self.series {
+            series.open = Vec::new();
             series.blocks.sort_by_key(|b| (b.first, b.last, b.at));
         }
         self.failed.take().map_or(Ok(()), Err)

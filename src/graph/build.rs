@@ -60,9 +60,9 @@ pub fn build(
     options: &conclude::ConcludeOptions,
     grace: usize,
 ) -> Result<Built> {
-    let findings = conclude(recorded, options)?;
+    let mut findings = conclude(recorded, options)?;
     let traffic = traffic(recorded, &findings)?;
-    let history = made(recorded, &findings, &traffic)?;
+    let history = made(recorded, &mut findings, &traffic)?;
     let windowed = graphs(recorded, &findings, &history, windows, grace)?;
     Ok(Built {
         lives: PerElement::new(&history.elements, |what| {

@@ -67,6 +67,24 @@ impl Graphs {
         (0..self.spans.len()).filter_map(row)
     }
 
+    /// The places of the windows from which on an element exists (`true`), and of those from which on it does not.
+    pub(crate) fn turns(&self, what: Element) -> Vec<(usize, bool)> {
+        let mut found = Vec::new();
+        let Some(mut cursor) = self.columns.of(what).map(Column::cursor) else {
+            return found;
+        };
+        let (mut at, mut exists) = (0, false);
+        while at < self.spans.len() {
+            let (row, stays) = cursor.next_run();
+            if row.is_some() != exists {
+                exists = !exists;
+                found.push((at, exists));
+            }
+            at = at.saturating_add(usize::try_from(stays).unwrap_or(usize::MAX));
+        }
+        found
+    }
+
     /// The strongest confidence to which each element is known in any window.
     pub(crate) fn confidences(&self, elements: &Elements) -> PerElement<Confidence> {
         PerElement::new(elements, |what| {

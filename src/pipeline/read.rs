@@ -155,11 +155,11 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
     let verified = reading.verify.then(|| verify(&collected, reading, watch));
     let verified = verified.transpose()?;
     watch.stage(Stage::Graphs);
-    let findings = concluded(&collected, reading)?;
+    let mut findings = concluded(&collected, reading)?;
     let traffic = traffic(&collected.recorded, &findings)?;
     let passed_over = unread(&collected.recorded, &findings, &traffic)?;
     probe(reading, &mut collected, &passed_over)?;
-    let history = made(&collected.recorded, &findings, &traffic)?;
+    let history = made(&collected.recorded, &mut findings, &traffic)?;
     let mission = mission(&collected, &findings, history, verified, reading)?;
     Ok((mission, findings.lines))
 }
@@ -202,9 +202,9 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
 /// As [`read`].
 #[cfg(feature = "cli")]
 pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission> {
-    let findings = concluded(collected, reading)?;
+    let mut findings = concluded(collected, reading)?;
     let traffic = traffic(&collected.recorded, &findings)?;
-    let history = made(&collected.recorded, &findings, &traffic)?;
+    let history = made(&collected.recorded, &mut findings, &traffic)?;
     mission(collected, &findings, history, None, reading)
 }
 
@@ -409,8 +409,7 @@ fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result
 
 /// The windows, and the changes from each to the next.
 fn list(windows: &Windows, windowed: &Windowed, history: &History, log: &EventLog) -> Vec<Window> {
-    let graphs = windows.spans.iter().copied().zip(&windowed.graphs);
-    let changes = event_log::explain(graphs, &history.elements, log);
+    let changes = event_log::explain(&windowed.graphs, &history.elements, log);
     let window = |(index, (messages, (changes, events)))| Window {
         index,
         span: windows.spans[index],

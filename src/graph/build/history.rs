@@ -87,7 +87,7 @@ impl Record {
             confidence: track.confidence,
             lives: known(track, mission),
             fixed,
-            needs_messages: track.senders.0 == 0,
+            needs_messages: !track.has_senders(),
             silences,
         }
     }
@@ -126,21 +126,24 @@ impl Record {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn made(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> Result<History> {
+pub(crate) fn made(
+    recorded: &Recorded,
+    findings: &mut Findings,
+    traffic: &Traffic,
+) -> Result<History> {
     of_elements(recorded, findings, traffic).map_err(spool_error)
 }
 
-fn of_elements(recorded: &Recorded, findings: &Findings, traffic: &Traffic) -> io::Result<History> {
+fn of_elements(
+    recorded: &Recorded,
+    findings: &mut Findings,
+    traffic: &Traffic,
+) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let mut tracks = tracks(recorded, findings, traffic, &restarts)?;
+    let (mut tracks, likes) = tracks(recorded, findings, traffic, &restarts)?;
     fall_silent(&mut tracks, traffic, findings);
-    compute_lifetimes(
-        &mut tracks,
-        &findings.inferences,
-        &restarts,
-        findings.mission,
-    );
+    compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);
     let mut pauses = pauses(traffic, &restarts, &findings.streams);
     pauses.extend(unseen(recorded, &findings.streams)?);
     Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
@@ -424,7 +427,7 @@ fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
         latest: bound.latest.min(mission.1),
         ..bound
     };
-    let lives = spans(track).into_iter().zip(&track.lives);
+    let lives = spans(track).into_iter().zip(track.lives.iter());
     let life = |(span, life): (Span, &Lifetime)| Life {
         span,
         began: life.began.map(within),

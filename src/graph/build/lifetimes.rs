@@ -2,12 +2,14 @@
 //! both.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
-use super::liveness::{Lifetime, Liveness};
+use super::liveness::Lifetime;
 use super::restarts::Restarts;
+use super::tracks::Tracks;
 use crate::base::time::Stamp;
 use crate::evidence::Confidence;
-use crate::evidence::inference::{ElementKey, Inference, Validity};
+use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
 
 /// No edge has a smaller key: nodes and topics come before.
@@ -15,18 +17,17 @@ const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
 
 /// Computes all lifetimes; `mission` contains the first and last moments.
 pub(crate) fn compute_lifetimes(
-    tracks: &mut BTreeMap<ElementKey, Liveness>,
-    inferences: &[Inference],
+    tracks: &mut Tracks,
+    likes: &[(ElementKey, ElementKey)],
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     // An edge that exists as long as its node is evidence for its topic, but not for the node.
-    let followers: BTreeSet<ElementKey> = inferences
+    let of_nodes = likes
         .iter()
-        .filter(|inference| matches!(inference.when, Validity::Like(ElementKey::Node(_))))
-        .map(|inference| inference.what)
-        .collect();
+        .filter(|(_, other)| matches!(other, ElementKey::Node(_)));
+    let followers: BTreeSet<ElementKey> = of_nodes.map(|(what, _)| *what).collect();
     let mut edges = tracks.split_off(&FIRST_EDGE);
     for (what, track) in &edges {
         let [Some(node), Some(topic)] = what.ends() else {
@@ -70,18 +71,16 @@ pub(crate) fn compute_lifetimes(
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
-        let around = tracks
-            .get(&ElementKey::Node(node))
-            .map_or(&[][..], |t| &t.lives);
-        track.live_within(around);
-        of_topics.entry(topic).or_default().extend(&track.lives);
+        let around = tracks.get(&ElementKey::Node(node));
+        track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
+        add(of_topics.entry(topic).or_default(), &track.lives);
     }
     tracks.append(&mut edges);
-    for (what, lives) in live_like(tracks, inferences, false) {
+    live_like(tracks, likes, false, |what, lives| {
         if let [_, Some(topic)] = what.ends() {
-            of_topics.entry(topic).or_default().extend(lives);
+            add(of_topics.entry(topic).or_default(), lives);
         }
-    }
+    });
     for (what, track) in tracks.iter_mut() {
         if let ElementKey::Topic(topic) = what {
             let edges = of_topics.remove(topic).unwrap_or_default();
@@ -89,26 +88,33 @@ pub(crate) fn compute_lifetimes(
             track.live_with(edges);
         }
     }
-    live_like(tracks, inferences, true);
+    live_like(tracks, likes, true, |_, _| {});
 }
 
-/// Adds to elements the lifetimes of others, either topics or not; returns the changed ones.
-fn live_like(
-    tracks: &mut BTreeMap<ElementKey, Liveness>,
-    inferences: &[Inference],
-    topics: bool,
-) -> Vec<(ElementKey, Vec<Lifetime>)> {
-    let mut done = Vec::new();
-    for inference in inferences {
-        if let Validity::Like(other) = inference.when
-            && matches!(other, ElementKey::Topic(_)) == topics
-            && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
-            && let Some(track) = tracks.get_mut(&inference.what)
-            && track.signs.is_empty()
-        {
-            track.lives.clone_from(&lives);
-            done.push((inference.what, lives));
+/// Adds the lives of an edge to those of its topic's edges, of which very many may be the same.
+fn add(all: &mut Vec<Lifetime>, lives: &[Lifetime]) {
+    for life in lives {
+        if all.last() != Some(life) {
+            all.push(*life);
         }
     }
-    done
+}
+
+/// Gives elements the lifetimes of others, either topics or not.
+fn live_like(
+    tracks: &mut Tracks,
+    likes: &[(ElementKey, ElementKey)],
+    topics: bool,
+    mut given: impl FnMut(ElementKey, &[Lifetime]),
+) {
+    for (what, other) in likes {
+        if matches!(other, ElementKey::Topic(_)) == topics
+            && let Some(lives) = tracks.get(other).map(|t| Rc::clone(&t.lives))
+            && let Some(track) = tracks.get_mut(what)
+            && track.signs.is_empty()
+        {
+            given(*what, &lives);
+            track.lives = lives;
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! The lifetimes of elements: from the first sign to the last, extended by latched messages, ended by
 //! evidence of an end.
 
+use std::rc::Rc;
+
 use super::restarts::Restart;
 use crate::base::rhythm::{
     ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, GONE_NS, REGISTRATION_NS,
@@ -103,12 +105,8 @@ pub(crate) struct Liveness {
     pub(crate) begins: Vec<Stamp>,
     /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) last_sign: Option<Stamp>,
-    /// The rhythms of its messages.
-    pub(crate) pulses: Vec<Pulse>,
-    /// The first and the last moment of the recordings of its messages; `None` for the whole mission.
-    pub(crate) recording: Option<(Stamp, Stamp)>,
-    /// The number of senders whose messages show it, and the number of those that are latched.
-    pub(crate) senders: (u32, u32),
+    /// Its messages; boxed, since very many elements may be known without any.
+    messages: Option<Box<Messages>>,
     /// Whether there is more evidence than latched messages.
     pub(crate) speaks: bool,
     /// Whether there is more evidence than single moments.
@@ -117,7 +115,19 @@ pub(crate) struct Liveness {
     pub(crate) unending: bool,
     /// Whether it exists for the whole mission.
     pub(crate) extent: Extent,
-    pub(crate) lives: Vec<Lifetime>,
+    /// Shared by all edges of a node that exist as long as it does.
+    pub(crate) lives: Rc<Vec<Lifetime>>,
+}
+
+/// The messages of an element.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Messages {
+    /// Their rhythms.
+    pub(crate) pulses: Vec<Pulse>,
+    /// The first and the last moment of their recordings; `None` for the whole mission.
+    pub(crate) recording: Option<(Stamp, Stamp)>,
+    /// The number of their senders, and of those that are latched.
+    pub(crate) senders: (u32, u32),
 }
 
 impl Default for Liveness {
@@ -132,19 +142,46 @@ impl Default for Liveness {
             ends: Vec::new(),
             begins: Vec::new(),
             last_sign: None,
-            pulses: Vec::new(),
-            recording: None,
-            senders: (0, 0),
+            messages: None,
             speaks: false,
             lasts: false,
             unending: false,
             extent: Extent::Signs,
-            lives: Vec::new(),
+            lives: Rc::default(),
+        }
+    }
+}
+
+impl Messages {
+    /// Widens the time of the recordings by that of another one.
+    pub(crate) fn reach(&mut self, recording: Option<(Stamp, Stamp)>) {
+        if let Some((from, to)) = recording {
+            let all = self.recording.get_or_insert((from, to));
+            *all = (all.0.min(from), all.1.max(to));
         }
     }
 }
 
 impl Liveness {
+    /// Its messages, to add to them.
+    pub(crate) fn messages(&mut self) -> &mut Messages {
+        self.messages.get_or_insert_default()
+    }
+
+    fn pulses(&self) -> &[Pulse] {
+        self.messages.as_ref().map_or(&[], |m| &m.pulses)
+    }
+
+    /// The number of senders whose messages prove it, and of those that are latched.
+    fn senders(&self) -> (u32, u32) {
+        self.messages.as_ref().map_or((0, 0), |m| m.senders)
+    }
+
+    /// Whether there are messages whose senders prove it.
+    pub(crate) fn has_senders(&self) -> bool {
+        self.senders().0 > 0
+    }
+
     /// Adds signs, sorted, of a fact that may have begun before; of those with no end between them only the outer two
     /// are kept.
     pub(crate) fn sign_all(&mut self, signs: &[Stamp], ends: &[Stamp]) {
@@ -171,21 +208,16 @@ impl Liveness {
         self.signs.extend(&other.signs);
         self.begins.extend(&other.begins);
         self.last_sign = self.last_sign.max(other.last_sign);
-        self.pulses.extend(&other.pulses);
-        self.reach(other.recording);
-        self.senders.0 += other.senders.0;
-        self.senders.1 += other.senders.1;
+        if let Some(others) = &other.messages {
+            let own = self.messages();
+            own.pulses.extend(&others.pulses);
+            own.reach(others.recording);
+            own.senders.0 += others.senders.0;
+            own.senders.1 += others.senders.1;
+        }
         self.speaks |= other.speaks;
         self.lasts |= other.lasts;
         self.extent = self.extent.max(other.extent.min(Extent::Whole));
-    }
-
-    /// Widens the time of the recordings by that of another one.
-    pub(crate) fn reach(&mut self, recording: Option<(Stamp, Stamp)>) {
-        if let Some((from, to)) = recording {
-            let all = self.recording.get_or_insert((from, to));
-            *all = (all.0.min(from), all.1.max(to));
-        }
     }
 
     /// Computes the lifetimes from the signs alone. A lifetime without a known end continues: missing
@@ -196,21 +228,20 @@ impl Liveness {
         self.ends.sort_unstable();
         self.ends.dedup();
         if self.is_whole() {
-            self.lives = vec![whole(mission)];
+            self.lives = vec![whole(mission)].into();
             return;
         }
-        self.lives = lives(&self.signs, &self.ends);
-        let (start, recorded) = self.recording.unwrap_or(mission);
+        let mut lives = lives(&self.signs, &self.ends);
+        let recording = self.messages.as_ref().and_then(|m| m.recording);
+        let (start, recorded) = recording.unwrap_or(mission);
         let end = self.end(recorded.min(mission.1), is_node);
-        if let Some(life) = self.lives.last_mut().filter(|life| life.ended.is_none()) {
+        if let Some(life) = lives.last_mut().filter(|life| life.ended.is_none()) {
             life.ended = end.filter(|end| end.time >= life.from);
             life.to = life.ended.map_or(mission.1, |end| end.time);
         }
-        if let Some(life) = self.lives.first_mut() {
-            let rhythm = self
-                .pulses
-                .iter()
-                .filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
+        if let Some(life) = lives.first_mut() {
+            let pulses = self.pulses().iter();
+            let rhythm = pulses.filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
             let period = rhythm.map(|p| p.period).min();
             let is_absent = |began: Bound| began.earliest > Stamp::MIN;
             let is_near = |begin: &Stamp| begin.since(life.sign).abs() <= ADVERTISED_NS;
@@ -220,13 +251,14 @@ impl Liveness {
                 || self.begins.iter().any(is_near);
             life.begin(mission.0, start.max(mission.0), period, is_proved);
         }
+        self.lives = Rc::new(lives);
     }
 
     /// Sets the possible times of a restart: the node still existed for a period after its last message, and again
     /// before its first.
     pub(crate) fn restart(&mut self, restart: &Restart) {
-        let period = self.pulses.iter().map(|p| p.period).min().unwrap_or(0);
-        for life in &mut self.lives {
+        let period = self.pulses().iter().map(|p| p.period).min().unwrap_or(0);
+        for life in Rc::make_mut(&mut self.lives) {
             if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
                 let latest = restart.death.plus(period.max(SHUTDOWN_NS));
                 ended.latest = latest.min(restart.birth);
@@ -250,11 +282,12 @@ impl Liveness {
 
     /// Joins the lifetimes of a topic with those of its edges, which may overlap.
     pub(crate) fn live_with(&mut self, edges: Vec<Lifetime>) {
-        let mut all = std::mem::take(&mut self.lives);
+        let mut all = std::mem::take(Rc::make_mut(&mut self.lives));
+        let joined = Rc::make_mut(&mut self.lives);
         all.extend(edges);
         all.sort_by_key(|life| (life.from, life.to));
         for life in all {
-            match self.lives.last_mut() {
+            match joined.last_mut() {
                 Some(last) if life.from <= last.to.plus(1) => {
                     if life.to > last.to {
                         (last.to, last.ended) = (life.to, life.ended);
@@ -262,7 +295,7 @@ impl Liveness {
                         last.ended = None;
                     }
                 }
-                _ => self.lives.push(life),
+                _ => joined.push(life),
             }
         }
     }
@@ -279,7 +312,7 @@ impl Liveness {
         }
         let last_sign = self.last_sign.filter(|_| !self.unending)?;
         let silence = mission.since(last_sign);
-        let broken = self.pulses.iter().filter(|p| {
+        let broken = self.pulses().iter().filter(|p| {
             // A rhythm that ended long before the last sign does not explain the silence after it.
             let ends = last_sign.since(p.last) <= p.patience() && silence > p.patience();
             ends && (is_node || p.is_even)
@@ -296,21 +329,21 @@ impl Liveness {
     /// Computes the lifetimes of an edge inside those of its node: a node that has advertised or subscribed
     /// to a topic does so until it ends, unless the contrary is known. A stated fact was true before the
     /// statement, unless its absence is known; a first message, in contrast, is a beginning.
-    pub(crate) fn live_within(&mut self, node: &[Lifetime]) {
+    pub(crate) fn live_within(&mut self, node: &Rc<Vec<Lifetime>>) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
         self.ends.dedup();
         self.stated.sort_unstable();
         if self.is_whole() || self.signs.is_empty() {
             self.lives = if self.is_whole() {
-                node.to_vec()
+                Rc::clone(node)
             } else {
-                Vec::new()
+                Rc::default()
             };
             return;
         }
-        self.lives.clear();
-        for around in node {
+        let mut own = Vec::new();
+        for around in node.iter() {
             let from = self.signs.partition_point(|s| *s < around.from);
             let to = self.signs.partition_point(|s| *s <= around.to);
             let mut inside = lives(&self.signs[from..to], &self.ends);
@@ -327,8 +360,13 @@ impl Liveness {
                 last.to = end.map_or(around.to, |end| end.time.max(last.to));
                 last.ended = end.or(around.ended);
             }
-            self.lives.extend(inside);
+            if own.is_empty() {
+                own = inside;
+            } else {
+                own.extend(inside);
+            }
         }
+        self.lives = Rc::new(own);
     }
 
     /// The end of the last of several edges: this one, and others that ended at `last`; `None` if nothing
@@ -344,7 +382,7 @@ impl Liveness {
 
     /// Whether it is shown by messages that are all latched.
     pub(crate) fn is_latched(&self) -> bool {
-        self.senders.0 > 0 && self.senders.0 == self.senders.1
+        self.has_senders() && self.senders().0 == self.senders().1
     }
 
     /// Whether it is known from a header or a file only.
@@ -472,6 +510,7 @@ fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
     if let (Some(life), Some(end)) = (lives.last_mut(), ends.next()) {
         life.close(end);
     }
+    lives.shrink_to_fit();
     lives
 }
 
@@ -502,7 +541,7 @@ mod tests {
             // A list without it at 10 s, statistics at 30 s, a list with it at 60 s.
             edge.sign_all(&[stamp(30), stamp(60)], &[stamp(10)]);
             edge.counted = counted;
-            edge.live_within(&[whole((stamp(0), stamp(90)))]);
+            edge.live_within(&vec![whole((stamp(0), stamp(90)))].into());
             edge.lives[0].from
         };
         assert_eq!(began(Vec::new()), stamp(10).plus(1));

@@ -4,8 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use super::liveness::{Liveness, Pulse};
+use super::liveness::Pulse;
 use super::senders::{Sender, Traffic};
+use super::tracks::Tracks;
 use crate::base::role::{role, start};
 use crate::base::time::Stamp;
 use crate::evidence::conclude::Findings;
@@ -15,11 +16,7 @@ use crate::graph::history::{Stretch, begins_steadily};
 
 /// Adds the rhythms that stopped for good to the tracks of their only publishers. A rhythm that continues
 /// shows nothing: another node may have taken over the topic.
-pub(crate) fn fall_silent(
-    tracks: &mut BTreeMap<ElementKey, Liveness>,
-    traffic: &Traffic,
-    findings: &Findings,
-) {
+pub(crate) fn fall_silent(tracks: &mut Tracks, traffic: &Traffic, findings: &Findings) {
     for (topic, nodes) in publishers(tracks) {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
@@ -36,14 +33,14 @@ pub(crate) fn fall_silent(
             if let Some(pulse) = pulse {
                 track.signs.push(pulse.last());
                 track.last_sign = track.last_sign.max(Some(pulse.last()));
-                track.pulses.push(pulse);
+                track.messages().pulses.push(pulse);
             }
         }
     }
 }
 
 /// The known publishers of each topic.
-fn publishers(tracks: &BTreeMap<ElementKey, Liveness>) -> BTreeMap<Name, Vec<Name>> {
+fn publishers(tracks: &Tracks) -> BTreeMap<Name, Vec<Name>> {
     let mut all: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
     for what in tracks.keys() {
         if let ElementKey::Publish(node, topic) = what {

@@ -98,14 +98,14 @@ fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) ->
     let whole = times[n].since(times[0]) as f64;
     let scatter = scatter(times, step);
     let cost = |count: f64, nanos: f64| count * libm::log(nanos.max(1.0) / count);
+    let unsplit = cost(n as f64, whole);
     let (mut found, mut most) = (None, GAIN * scatter);
     for at in range.step_by(step) {
         if at < FEWEST_INTERVALS || n - at < FEWEST_INTERVALS {
             continue;
         }
         let left = times[at].since(times[0]) as f64;
-        let gain =
-            cost(n as f64, whole) - cost(at as f64, left) - cost((n - at) as f64, whole - left);
+        let gain = unsplit - cost(at as f64, left) - cost((n - at) as f64, whole - left);
         if gain > most {
             (found, most) = (Some(at), gain);
         }

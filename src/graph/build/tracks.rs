@@ -16,19 +16,28 @@ use crate::evidence::{Confidence, Evidence, SOURCES};
 use crate::graph::history::begins_steadily;
 
 /// The track of every element.
-pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
+///
+/// Boxed, since the tree has much room that it does not use.
+pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
 
-/// Adds the signs of all evidence to the track of its element.
+/// The elements that exist as long as others, each with its other.
+pub(crate) type Likes = Vec<(ElementKey, ElementKey)>;
+
+/// Adds the signs of all evidence to the track of its element. Takes the inferences out of the findings, of which
+/// there may be very many.
 pub(crate) fn tracks(
     recorded: &Recorded,
-    findings: &Findings,
+    findings: &mut Findings,
     traffic: &Traffic,
     restarts: &Restarts,
-) -> io::Result<Tracks> {
+) -> io::Result<(Tracks, Likes)> {
     let mut tracks = Tracks::new();
+    let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
     let starved = starved(findings, traffic);
-    for inference in &findings.inferences {
+    let inferences = std::mem::take(&mut findings.inferences);
+    let findings = &*findings;
+    for inference in inferences {
         let [node, _] = inference.what.ends();
         let own = node.and_then(|node| restarts.get(&node));
         let own = own.map_or(&[][..], Vec::as_slice);
@@ -38,7 +47,7 @@ pub(crate) fn tracks(
         track.evidence = track.evidence.and(Evidence::row(inference.source));
         track.confidence = track
             .confidence
-            .min(confidence(inference, findings, traffic));
+            .min(confidence(&inference, findings, traffic));
         match &inference.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
@@ -88,7 +97,7 @@ pub(crate) fn tracks(
             }
             Validity::Moments(signs) => track.bound_all(signs, &deaths),
             Validity::Unending => track.unending = true,
-            Validity::Like(_) => {}
+            Validity::Like(other) => likes.push((inference.what, *other)),
             Validity::Whole => track.extent = track.extent.max(Extent::Whole),
             Validity::Always => track.extent = Extent::Always,
         }
@@ -100,7 +109,7 @@ pub(crate) fn tracks(
             track.ends.push(restart.death);
         }
     }
-    Ok(tracks)
+    Ok((tracks, likes))
 }
 
 /// The publications, as node and topic, that forward the messages of others and end with these: their end
@@ -201,8 +210,9 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
     };
     let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
     let latched = sender.latched && count <= LATCHED;
-    track.senders.0 += 1;
-    track.senders.1 += u32::from(latched);
+    let messages = track.messages();
+    messages.senders.0 += 1;
+    messages.senders.1 += u32::from(latched);
     if what.known {
         track.seen.extend([first, last]);
         return;
@@ -213,9 +223,9 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
         track.begins.push(first);
     }
     track.last_sign = track.last_sign.max(Some(last));
-    track.reach(Some(sender.recording));
+    let messages = track.messages();
+    messages.reach(Some(sender.recording));
     let pulse = Pulse::of(&sender.stretches, what.restarts);
-    track
-        .pulses
-        .extend(pulse.filter(|_| what.beats && !latched));
+    let pulse = pulse.filter(|_| what.beats && !latched);
+    messages.pulses.extend(pulse);
 }

@@ -4,30 +4,41 @@ use std::collections::BTreeMap;
 
 use super::{Detail, Event, EventId, EventLog, Kind, described};
 use crate::base::time::{Span, Stamp};
-use crate::graph::diff::{Change, ValueKind, diff};
-use crate::graph::{Element, Elements, Graph};
+use crate::graph::diff::{Change, ValueKind};
+use crate::graph::{Element, Elements, Graphs};
 use crate::mission::Window;
 
 /// The changes of each window since the previous one, with the ids of the events that explain them.
 pub(crate) fn explain(
-    windows: impl Iterator<Item = (Span, Graph)>,
+    graphs: &Graphs,
     elements: &Elements,
     log: &EventLog,
 ) -> Vec<(Vec<Change>, Vec<EventId>)> {
     let turns = EventTurns::new(log, elements);
-    let mut before: Option<(Span, Graph)> = None;
-    let mut all = Vec::new();
-    for (span, graph) in windows {
-        let mut list = Vec::new();
-        if let Some((old_span, old)) = &before {
-            structure(old, &graph, span, elements, &turns, &mut list);
-            let news = Span::new(old_span.end.max(span.start), span.end);
-            list.extend(values(log, news));
+    let spans = graphs.spans();
+    let mut differ = vec![Turned::default(); spans.len()];
+    for what in elements.all() {
+        for (at, exists) in graphs.turns(what) {
+            let Turned { added, removed } = &mut differ[at];
+            if exists { added } else { removed }.push(what);
         }
+    }
+    let mut all = vec![(Vec::new(), Vec::new()); differ.len().min(1)];
+    for (differ, pair) in differ.iter().skip(1).zip(spans.windows(2)) {
+        let mut list = Vec::new();
+        structure(differ, pair[1], elements, &turns, &mut list);
+        let news = Span::new(pair[0].end.max(pair[1].start), pair[1].end);
+        list.extend(values(log, news));
         all.push(list.into_iter().unzip());
-        before = Some((span, graph));
     }
     all
+}
+
+/// The elements that a window has and the one before has not, and the other way round.
+#[derive(Clone, Default)]
+struct Turned {
+    added: Vec<Element>,
+    removed: Vec<Element>,
 }
 
 /// The times at which elements begin or end according to events, sorted.
@@ -94,22 +105,20 @@ fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
 }
 
 fn structure(
-    old: &Graph,
-    new: &Graph,
+    differ: &Turned,
     span: Span,
     elements: &Elements,
     turns: &EventTurns,
     list: &mut Vec<(Change, EventId)>,
 ) {
-    let diff = diff(old, new);
-    for what in diff.added() {
+    for what in differ.added.iter().copied() {
         let time = elements.life(what).0.filter(|t| span.contains(*t));
         if let Some((at, id)) = turns.find(&turns.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));
         }
     }
-    for what in diff.removed() {
+    for what in differ.removed.iter().copied() {
         if let Some((at, id)) = turns.find(&turns.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
             list.push((Change::Removed { what, time }, id));
