@@ -60,7 +60,7 @@ fn a_flapping_connection_is_one_line() {
     bag.messages.sort_by_key(|m| m.1);
     let text = shown(&bag);
     assert!(
-        text.contains("/beat → /view comes and goes 4 times"),
+        text.contains("/beat → /view appears and vanishes 4 times"),
         "{text}"
     );
     assert_eq!(text.lines().count(), 1, "{text}");

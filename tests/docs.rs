@@ -197,7 +197,7 @@ fn gallery_shows_what_its_commands_draw() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{command}: {said}");
         let drawn = fs::read(dir.path().join("images").join(name)).unwrap();
-        let is_text = Path::new(name).extension().is_some_and(|e| e == "svg");
+        let is_text = is_svg(name);
         if is_new {
             fs::write(images.join(name), &drawn).unwrap();
         } else if is_text || cfg!(target_arch = "x86_64") {
@@ -217,6 +217,31 @@ fn gallery_shows_what_its_commands_draw() {
         .map(|file| file.unwrap().metadata().unwrap().len())
         .sum();
     assert!(bytes <= MOST_BYTES, "{bytes} bytes of pictures");
+}
+
+fn is_svg(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|e| e == "svg")
+}
+
+/// Only the SVG pictures: the page is a screenshot (`tests/browser/page.py`).
+#[test]
+fn readme_pictures_are_drawn_by_the_commands_below_them() {
+    let (dir, mut shown) = (folder(), 0);
+    for part in README.split("<img src=\"docs/src/images/").skip(1) {
+        let (name, rest) = part.split_once('"').unwrap();
+        let command = commands(rest)[0];
+        if is_svg(name) {
+            let output = run(command, dir.path());
+            assert!(output.status.success(), "{command}: {output:?}");
+            let outputs = words(command);
+            let drawn = outputs.iter().find(|word| is_svg(word)).unwrap();
+            let expected = fs::read(root().join("docs/src/images").join(name)).unwrap();
+            let drawn = fs::read(dir.path().join(drawn)).unwrap();
+            assert!(drawn == expected, "{name} differs from `{command}`");
+            shown += 1;
+        }
+    }
+    assert_eq!(shown, 2);
 }
 
 /// The anchor that mdBook and GitHub give to a heading.

@@ -1,5 +1,5 @@
 # The Homebrew formula, for a tap or homebrew-core. `.ci/release` fills in version and checksum.
-# Not tried: Homebrew itself; only the syntax was checked, and `cargo install` as below on Linux.
+# Not tested with Homebrew itself; only the syntax was checked, and `cargo install` as below on Linux.
 class Bagreel < Formula
   desc "See how a robot's software reconfigures during a mission, from its bag files"
   homepage "https://github.com/bagreel/bagreel"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs bagreel @VERSION@ on Linux: fetches the archive for this machine, compares its checksum with the one that stands here, and
+# Installs bagreel @VERSION@ on Linux: fetches the archive for this machine, compares its checksum with the one below, and
 # copies the command, its manual pages and completions below ~/.local, or below PREFIX. Needs no root, and changes nothing else.
 # Not tried: the address of the releases, for which a local server stood in; BAGREEL_FROM is another one.
 set -eu

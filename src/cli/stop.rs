@@ -77,7 +77,10 @@ fn end(signal: u8, report: fn()) {
         thread::sleep(REPORT_LIMIT / 10);
         waited += REPORT_LIMIT / 10;
     }
-    #[expect(clippy::exit, reason = "the work may hang where it cannot on_signal")]
+    #[expect(
+        clippy::exit,
+        reason = "the work may hang at a point where it does not check for signals"
+    )]
     std::process::exit(i32::from(BY_SIGNAL + signal));
 }
 

@@ -55,7 +55,7 @@ impl Terminal {
     /// The width of the terminal on which results are printed; `None` if they go elsewhere.
     #[expect(
         clippy::unused_self,
-        reason = "whoever holds the terminal may measure it"
+        reason = "only code with access to the terminal may measure it"
     )]
     pub(crate) fn width(&self) -> Option<usize> {
         let size = terminal_size::terminal_size_of(io::stdout());
@@ -222,7 +222,7 @@ impl Terminal {
     /// Waits before checking a file again.
     #[expect(
         clippy::unused_self,
-        reason = "whoever holds the terminal may print and wait"
+        reason = "only code with access to the terminal may print and wait"
     )]
     pub(crate) fn wait(&self) {
         std::thread::sleep(Duration::from_millis(200));

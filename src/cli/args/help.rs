@@ -41,7 +41,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
         "
   bagreel render run.bag                              an animation of the mission, out/run.gif
   bagreel render run/ -o run.html --period 10         a page to step through, ten seconds per window
-  bagreel render run.mcap --for readme -o run.gif     as wide and legible as a README needs it",
+  bagreel render run.mcap --for readme -o run.gif     wide and legible enough for a README",
     ),
     (
         "figure",

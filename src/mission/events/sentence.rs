@@ -58,7 +58,7 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
         }
         (Detail::Count(many), Kind::Appeared) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
-            format!("comes and goes {many} times{over}")
+            format!("appears and vanishes {many} times{over}")
         }
         (Detail::Count(many), _) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
