@@ -19,8 +19,8 @@ use crate::pipeline::Render;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
 use crate::pipeline::live::Live;
 
-/// The number of newest messages in which events are detected: less than a tenth of a second of work, and minutes of
-/// most robots.
+/// The number of newest messages in which events are detected: less than a tenth of a second of work, and
+/// several minutes for most robots.
 const MOST: u64 = 500_000;
 /// The pause between two analyses as a multiple of their duration: with the reading, three percent of a core.
 const REST: f64 = 45.0;

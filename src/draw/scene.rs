@@ -169,7 +169,7 @@ impl Anchor {
 }
 
 impl Text {
-    /// A text whose letters are as far above as below a point.
+    /// A text that is vertically centred on a point.
     pub(crate) fn centred(
         anchor: Anchor,
         on: Point,

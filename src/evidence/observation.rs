@@ -362,7 +362,7 @@ impl Observations {
         }
     }
 
-    /// Ends the adding of observations.
+    /// Finishes adding observations.
     pub(crate) fn seal(&mut self) {
         self.places = HashMap::new();
     }

@@ -67,7 +67,7 @@ impl Graphs {
         (0..self.spans.len()).filter_map(row)
     }
 
-    /// The places of the windows from which on an element exists (`true`), and of those from which on it does not.
+    /// The indices of the windows from which an element exists (`true`) or no longer exists.
     pub(crate) fn turns(&self, what: Element) -> Vec<(usize, bool)> {
         let mut found = Vec::new();
         let Some(mut cursor) = self.columns.of(what).map(Column::cursor) else {

@@ -91,7 +91,7 @@ pub(crate) fn compute_lifetimes(
     live_like(tracks, likes, true, |_, _| {});
 }
 
-/// Adds the lives of an edge to those of its topic's edges, of which very many may be the same.
+/// Adds the lifetimes of an edge to those of its topic's edges, very many of which may be equal.
 fn add(all: &mut Vec<Lifetime>, lives: &[Lifetime]) {
     for life in lives {
         if all.last() != Some(life) {

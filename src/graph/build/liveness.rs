@@ -153,7 +153,7 @@ impl Default for Liveness {
 }
 
 impl Messages {
-    /// Widens the time of the recordings by that of another one.
+    /// Extends the time of the recordings by that of another one.
     pub(crate) fn reach(&mut self, recording: Option<(Stamp, Stamp)>) {
         if let Some((from, to)) = recording {
             let all = self.recording.get_or_insert((from, to));
@@ -172,12 +172,12 @@ impl Liveness {
         self.messages.as_ref().map_or(&[], |m| &m.pulses)
     }
 
-    /// The number of senders whose messages prove it, and of those that are latched.
+    /// The number of senders whose messages show it, and the number of those that are latched.
     fn senders(&self) -> (u32, u32) {
         self.messages.as_ref().map_or((0, 0), |m| m.senders)
     }
 
-    /// Whether there are messages whose senders prove it.
+    /// Whether there are messages whose senders show it.
     pub(crate) fn has_senders(&self) -> bool {
         self.senders().0 > 0
     }

@@ -17,7 +17,7 @@ use crate::graph::history::begins_steadily;
 
 /// The track of every element.
 ///
-/// Boxed, since the tree has much room that it does not use.
+/// Boxed, since the tree reserves much unused memory.
 pub(crate) type Tracks = BTreeMap<ElementKey, Box<Liveness>>;
 
 /// The elements that exist as long as others, each with its other.

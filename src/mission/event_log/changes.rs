@@ -34,7 +34,7 @@ pub(crate) fn explain(
     all
 }
 
-/// The elements that a window has and the one before has not, and the other way round.
+/// The elements that only this window has, and those that only the previous one has.
 #[derive(Clone, Default)]
 struct Turned {
     added: Vec<Element>,
