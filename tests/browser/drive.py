@@ -316,9 +316,11 @@ def elsewhere(url, page):
         outer.write_text(f'<!doctype html><iframe sandbox="allow-scripts" width="1000" height="700" srcdoc="{html.escape(page)}"></iframe>')
         b.open(outer.as_uri())
         b.frame(0)
+        # Before its script has run, the slider is at 0.
+        until(b, "!!document.getElementById('seek').ariaValueText")
         before = window(b)
         b.click("[data-key=',']")
-        assert window(b) == before - 1
+        until(b, "+document.getElementById('seek').value", before - 1)
         b.click("#toside")
         b.click("#told a")
         assert window(b) >= 0 and b.js("return location.href") == "about:srcdoc", "a link left the frame"
