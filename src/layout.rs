@@ -166,7 +166,8 @@ pub struct Layout {
 pub trait Engine {
     /// Places every box and routes every edge.
     ///
-    /// # Errors The engine does not support the plan; the caller may then use another.
+    /// # Errors
+    /// The engine does not support the plan; the caller may then use another.
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout>;
 }
 
@@ -185,7 +186,8 @@ pub(crate) const RING: usize = ring::MOST;
 
 /// The engine with this name.
 ///
-/// # Errors [`Error::Usage`] for an unknown name.
+/// # Errors
+/// [`Error::Usage`] for an unknown name.
 pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
     let found = ENGINES.iter().find(|(name, _)| *name == word);
     found.map(|(_, engine)| *engine).ok_or_else(|| {

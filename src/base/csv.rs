@@ -181,7 +181,8 @@ pub(crate) type CsvRow = (usize, Vec<String>);
 /// Every row of a text, including the header, with its line, ≥ 1; rows may differ in length, and empty lines are
 /// skipped.
 ///
-/// # Errors The line, and the mistake in it.
+/// # Errors
+/// The line, and the mistake in it.
 pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
     each_record(text).collect()
 }

@@ -188,7 +188,8 @@ impl Body {
 impl Style {
     /// The built-in style of this name.
     ///
-    /// # Errors [`Error::Usage`] if there is none; the hint lists them.
+    /// # Errors
+    /// [`Error::Usage`] if there is none; the hint lists them.
     pub fn builtin(name: &str) -> Result<Self> {
         Self::from_toml(builtin_text(name)?, Path::new(name))
     }
@@ -255,7 +256,8 @@ const HINT: &str = "print a complete style with every key explained: `bagreel st
 
 /// The text of the built-in style of this name.
 ///
-/// # Errors [`Error::Usage`] if there is none; the hint lists them.
+/// # Errors
+/// [`Error::Usage`] if there is none; the hint lists them.
 pub fn builtin_text(name: &str) -> Result<&'static str> {
     let found = BUILTIN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text).ok_or_else(|| {

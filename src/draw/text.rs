@@ -96,7 +96,8 @@ impl Fonts {
 
     /// The fonts with one more for characters that the previous ones lack.
     ///
-    /// # Errors [`Error::BadFile`] if `data`, read from `path`, is not a TrueType or OpenType font.
+    /// # Errors
+    /// [`Error::BadFile`] if `data`, read from `path`, is not a TrueType or OpenType font.
     pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
         let face = Face::read(Cow::Owned(data));
         let face = face.ok_or_else(|| Error::BadFile {

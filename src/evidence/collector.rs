@@ -320,7 +320,8 @@ impl Collector {
 
     /// Finishes collecting.
     ///
-    /// # Errors If times had to be written to a temporary file and that failed.
+    /// # Errors
+    /// If times had to be written to a temporary file and that failed.
     pub fn finish(mut self) -> Result<Recorded> {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;

@@ -104,7 +104,8 @@ impl Windows {
 
 /// The part of `bag` that a division requests.
 ///
-/// # Errors [`Error::Usage`] if it contains nothing of the bag.
+/// # Errors
+/// [`Error::Usage`] if it contains nothing of the bag.
 pub fn range(division: &Division, bag: Span) -> Result<Span> {
     let start = division
         .start

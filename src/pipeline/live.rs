@@ -299,7 +299,8 @@ impl LiveGraph {
         }
     }
 
-    /// # Errors If there are implausibly many names; each end counts once.
+    /// # Errors
+    /// If there are implausibly many names; each end counts once.
     fn check(&self) -> io::Result<()> {
         let ends = self
             .ends

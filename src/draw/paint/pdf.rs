@@ -31,7 +31,8 @@ pub(crate) struct PdfPage {
 /// The document as a file's bytes. Pages are drawn as they arrive, so that only their vectors are kept in
 /// memory.
 ///
-/// # Errors The reason why a font cannot be embedded.
+/// # Errors
+/// The reason why a font cannot be embedded.
 pub(crate) fn write(
     pages: impl Iterator<Item = PdfPage>,
     fonts: &Fonts,

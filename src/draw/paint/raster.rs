@@ -111,8 +111,9 @@ impl Painter {
 
     /// The scene in pixels, `scale` times as large.
     ///
-    /// # Errors [`Error::Usage`] if the picture would have no pixels, a side of more than 65,535, or more
-    /// than 64 million pixels.
+    /// # Errors
+    /// [`Error::Usage`] if the picture would have no pixels, a side of more than 65,535, or more than 64
+    /// million pixels.
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
         Ok(PixelSheet::covered(self, scene, scale)?.0.pixels)
     }

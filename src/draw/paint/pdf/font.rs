@@ -173,7 +173,8 @@ impl<'a> PdfFont<'a> {
 
     /// Writes the font with the glyphs in use as five objects, the first of which is `first`.
     ///
-    /// # Errors The reason why its glyphs cannot be extracted.
+    /// # Errors
+    /// The reason why its glyphs cannot be extracted.
     pub(super) fn write(&self, pdf: &mut Pdf, first: Ref) -> Result<(), String> {
         let [whole, cid, described, stream, cmap] =
             [0, 1, 2, 3, 4].map(|next| Ref::new(first.get() + next));
