@@ -30,11 +30,22 @@ impl Tree {
 
 /// The deepest nesting of elements; deeper ones are hostile.
 pub(super) const DEEPEST: usize = 64;
+/// The most attributes of an element, whose parsing takes the square of their number.
+const MOST_ATTRIBUTES: usize = 2000;
 const XML_HINT: &str = "a launch file begins with `<launch>`";
 const YAML_HINT: &str = "a launch file begins with `launch:` and a list";
 
 /// The tree of a launch file in XML.
 pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
+    let mut line = 1;
+    for tag in text.split('<') {
+        let is_element = tag.starts_with(char::is_alphabetic);
+        if is_element && tag.matches('=').nth(MOST_ATTRIBUTES).is_some() {
+            let what = format!("an element has more than {MOST_ATTRIBUTES} attributes");
+            return Err(bad(path, line, what, XML_HINT));
+        }
+        line += tag.matches('\n').count();
+    }
     let options = ParsingOptions {
         nodes_limit: 4_000_000,
         ..ParsingOptions::default()

@@ -159,6 +159,19 @@ fn an_undecided_condition_is_reported() {
 }
 
 #[test]
+fn an_element_with_very_many_attributes_is_refused_before_it_is_parsed() {
+    let attributes = |many| (0..many).map(|k| format!(" a{k}=\"\"")).collect::<String>();
+    let text = |many| format!("<launch>\n<node{}/>\n</launch>", attributes(many));
+    let read = |many| tree::of_xml(Path::new("x.launch"), &text(many));
+    assert!(read(2000).is_ok());
+    let error = read(2001).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "`x.launch` line 2: an element has more than 2000 attributes"
+    );
+}
+
+#[test]
 fn errors_have_their_line() {
     let error = tree::of_xml(Path::new("x.launch"), "<launch>\n<node>\n</launch>").unwrap_err();
     assert!(error.to_string().contains("line 3"), "{error}");
