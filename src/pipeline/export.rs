@@ -238,7 +238,7 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
-    let opened = unfolded::opened(&mission, &drawing, &job.outputs);
+    let opened = unfolded::opened(&mission, &drawing, Some(&view), &job.outputs)?;
     let opened_picture = opened
         .as_ref()
         .and_then(|view| unfolded::drawn(view, &drawing, &job.outputs));
@@ -388,7 +388,7 @@ fn show_board(
     // Each topic has its own row.
     let mut each = drawing.clone();
     each.view.group = Grouping::parse("none")?;
-    let opened = unfolded::opened(&mission, &each, &job.outputs);
+    let opened = unfolded::opened(&mission, &each, None, &job.outputs)?;
     let sequence = Sequence {
         mission: &mission,
         data: viewed.as_ref().unwrap_or(&mission),

@@ -1,6 +1,7 @@
 //! The view with all elements expanded, on a page of a screen's shape, for pages and reports.
 
 use super::Drawing;
+use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::draw::picture::{Course, Measured, PageOptions, Picture};
 use crate::export::Output;
@@ -10,10 +11,38 @@ use crate::view::{View, view};
 /// The part of a screen that the graph of a page has: 3 : 2.
 const SCREEN: Size = Size::new(1200.0, 800.0);
 
-/// The view with everything expanded; `None` if no output needs it.
-pub(super) fn opened(mission: &Mission, drawing: &Drawing, outputs: &[Output]) -> Option<View> {
-    let is_asked = outputs.iter().any(|o| o.format.is_unfolded);
-    is_asked.then(|| view(mission, &drawing.view.opened(&mission.elements)).0)
+/// The most boxes and arrows of a page: with four kilobytes each, half a gigabyte; browsers are slow long before.
+const MOST_DRAWN: usize = 120_000;
+
+/// The view with everything expanded; `None` if no output needs it. `picture` is the view of the picture, if that is a
+/// graph.
+///
+/// # Errors
+/// [`Error::Usage`] if a page would have more than [`MOST_DRAWN`] boxes and arrows.
+pub(super) fn opened(
+    mission: &Mission,
+    drawing: &Drawing,
+    picture: Option<&View>,
+    outputs: &[Output],
+) -> Result<Option<View>> {
+    if !outputs.iter().any(|o| o.format.is_unfolded) {
+        return Ok(None);
+    }
+    let opened = view(mission, &drawing.view.opened(&mission.elements)).0;
+    let folded = picture.filter(|view| view.is_folded());
+    let views = folded.into_iter().chain([&opened]);
+    let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
+    if picture.is_some() && drawn > MOST_DRAWN && outputs.iter().any(is_page) {
+        return Err(Error::usage(
+            format!("a page of {drawn} boxes and arrows is too large; the limit is {MOST_DRAWN}"),
+            "omit some with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
+        ));
+    }
+    Ok(Some(opened))
+}
+
+fn is_page(output: &Output) -> bool {
+    output.format.word == "html"
 }
 
 /// The picture of that view; `None` if no output is a page.
@@ -22,7 +51,6 @@ pub(super) fn drawn<'a>(
     drawing: &'a Drawing,
     outputs: &[Output],
 ) -> Option<Picture<'a>> {
-    let is_page = |o: &Output| o.format.word == "html";
     if !outputs.iter().any(is_page) {
         return None;
     }

@@ -1,6 +1,5 @@
 //! The encoder of the page.
 
-use crate::base::error::Error;
 use crate::draw::picture::Union;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::html::{HtmlPage, PageGraph};
@@ -9,23 +8,12 @@ use crate::export::target::Target;
 use crate::export::{Started, one_text};
 use crate::view::View;
 
-/// The most boxes and arrows of a page: with four kilobytes each, half a gigabyte; browsers are slow long before.
-const MOST_DRAWN: usize = 120_000;
-
 /// Begins the page.
 ///
 /// # Errors
-/// [`Error::Usage`] if it would have more than [`MOST_DRAWN`] boxes and arrows; as [`one_text`].
+/// As [`one_text`].
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     let graphs = graphs(sequence);
-    let views = graphs.iter().flatten().map(|(view, _)| view);
-    let drawn: usize = views.map(|v| v.items.len() + v.arrows.len()).sum();
-    if drawn > MOST_DRAWN {
-        return Err(Error::usage(
-            format!("a page of {drawn} boxes and arrows is too large; the limit is {MOST_DRAWN}"),
-            "omit some with `--ns-filter`, `--hide dead,leaf` or `--mode nodes`",
-        ));
-    }
     let style = Style::builtin(BUILTIN[0].0)?;
     one_text(target, move || page(sequence, graphs, &style))
 }
