@@ -28,6 +28,8 @@ const REST: f64 = 45.0;
 /// people are waiting for the output.
 const LEAST: f64 = 1.0;
 const LEAST_NEW: f64 = 0.2;
+/// The seconds from the first sign of something new to its analysis: a first message alone does not show a rhythm.
+const SETTLED: f64 = 0.5;
 
 /// A recurring task, and the next time at which it may run.
 struct Pace {
@@ -133,7 +135,7 @@ fn server(at: std::net::SocketAddr, args: &FollowArgs, terminal: &mut Terminal) 
 impl Follower<'_> {
     fn run(mut self, terminal: &mut Terminal) -> Result<u8> {
         terminal.note_signals(true);
-        let (mut grew, mut known) = (terminal.seconds(), 0);
+        let (mut grew, mut known, mut appeared) = (terminal.seconds(), 0, None);
         let (mut is_behind, mut is_page_behind) = (false, false);
         let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
         loop {
@@ -144,11 +146,17 @@ impl Follower<'_> {
             if growth == Growth::More {
                 (grew, is_behind, is_page_behind) = (now, true, true);
             }
+            if self.follow.known() > known {
+                known = self.follow.known();
+                appeared.get_or_insert(now);
+            }
             let is_idle = idle.is_some_and(|idle| now - grew >= idle);
             let is_over = growth == Growth::Ended || is_idle || terminal.take_signal();
-            let is_new = self.follow.known() > known && now >= self.events.due_new;
+            let is_settled = appeared.is_some_and(|at| now >= at + SETTLED);
+            let is_new = is_settled && now >= self.events.due_new;
             if is_behind && (is_over || is_new || now >= self.events.due) {
-                (known, is_behind) = (self.follow.known(), false);
+                is_behind = false;
+                appeared = appeared.filter(|_| !is_settled);
                 if !self.print_events(terminal)? {
                     break;
                 }

@@ -208,17 +208,16 @@ impl Drawn {
     /// Combines the two arrows of a box that both publishes and subscribes to a topic into one line, with a
     /// head at each end that is used.
     pub(super) fn join_twins(&mut self) {
-        let place = |arrows: &[Arrow], from: u32, to: u32| {
-            arrows
-                .iter()
-                .position(|arrow| (arrow.from, arrow.to) == (from, to))
-        };
+        let mut places = BTreeMap::new();
+        for (at, arrow) in self.arrows.iter().enumerate() {
+            places.entry((arrow.from, arrow.to)).or_insert(at);
+        }
         let mut gone = BTreeSet::new();
         for there in 0..self.arrows.len() {
             let (from, to) = (self.arrows[there].from, self.arrows[there].to);
             let is_publish = self.arrows[there].kind == ArrowKind::Publish;
-            let Some(back) = place(&self.arrows, to, from).filter(|_| is_publish && from != to)
-            else {
+            let back = places.get(&(to, from)).copied();
+            let Some(back) = back.filter(|_| is_publish && from != to) else {
                 continue;
             };
             gone.insert(back);
