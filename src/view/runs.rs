@@ -113,6 +113,8 @@ struct LookClass {
     state: State,
     confidence: Confidence,
     mark: Option<Mark>,
+    /// Whether the receiver gets nothing.
+    is_starved: bool,
     /// The step of an arrow's thickness, 0..=[`STEPS`]; 0 for items.
     step: u8,
 }
@@ -123,6 +125,7 @@ impl LookClass {
             state: shown.state,
             confidence: shown.confidence,
             mark: shown.mark,
+            is_starved: shown.is_starved,
             step: arrow.map_or(0, |arrow| width_step(arrow.flow(shown))),
         }
     }
@@ -135,6 +138,9 @@ impl LookClass {
         if let Some(mark) = self.mark {
             words.push(mark.class().to_owned());
             words.extend((mark.class() == "changed").then(|| word(mark).to_owned()));
+        }
+        if self.is_starved {
+            words.push("starved".to_owned());
         }
         if self.step > 0 {
             words.push(format!("w{}", self.step));

@@ -100,23 +100,22 @@ impl<'a> Classes<'a> {
         xml.close().raw("\n");
     }
 
-    /// Writes shapes and texts; for an element, with its latch before its first text, and its live text last.
+    /// Writes shapes and texts; for an element, with its bar after its shapes, and its live text last.
     fn pieces(xml: &mut Xml, group: &Group, element: Option<(&UnionElement, &dyn ElementLook)>) {
         let is_text = |p: &&Piece| matches!(p, Piece::Text(_));
         let texts = group.pieces.iter().filter(is_text).count();
         let mut seen = 0;
         for piece in &group.pieces {
-            let text = match piece {
-                Piece::Shape(shape) => {
-                    Self::form(xml, &shape.form, None);
-                    continue;
-                }
-                Piece::Text(text) => text,
-            };
-            seen += 1;
-            if let Some((Some(latch), 1)) = element.map(|(part, _)| (&part.latch, seen)) {
-                Self::form(xml, latch, Some("l"));
+            if let Piece::Shape(shape) = piece {
+                Self::form(xml, &shape.form, None);
             }
+        }
+        if let Some(bar) = element.and_then(|(part, _)| part.bar.as_ref()) {
+            Self::form(xml, bar, Some("l"));
+        }
+        for piece in &group.pieces {
+            let Piece::Text(text) = piece else { continue };
+            seen += 1;
             let place = (whole(text.at.x), whole(text.at.y));
             if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
                 look.live(xml, place, part.shows_changes);
@@ -136,13 +135,17 @@ impl<'a> Classes<'a> {
     }
 
     fn form(xml: &mut Xml, form: &Form, class: Option<&str>) {
+        xml.open(match form {
+            Form::Rect(..) => "rect",
+            Form::Ellipse(_) => "ellipse",
+            Form::Path(_) => "path",
+        });
+        if let Some(class) = class {
+            xml.attribute("class", class);
+        }
         match form {
             Form::Rect(r, radius) => {
                 // Coordinates of edges are rounded, not lengths, so that adjacent shapes stay adjacent.
-                xml.open("rect");
-                if let Some(class) = class {
-                    xml.attribute("class", class);
-                }
                 xml.attribute("x", tenth(r.x))
                     .attribute("y", tenth(r.y))
                     .attribute("width", tenth(r.right() - r.x))
@@ -153,14 +156,13 @@ impl<'a> Classes<'a> {
             }
             Form::Ellipse(r) => {
                 let c = r.centre();
-                xml.open("ellipse")
-                    .attribute("cx", tenth(c.x))
+                xml.attribute("cx", tenth(c.x))
                     .attribute("cy", tenth(c.y))
                     .attribute("rx", tenth(r.w / 2.0))
                     .attribute("ry", tenth(r.h / 2.0));
             }
             Form::Path(steps) => {
-                xml.open("path").attribute("d", path(steps, 10));
+                xml.attribute("d", path(steps, 10));
             }
         }
         xml.close_empty();

@@ -191,6 +191,15 @@ impl ArrowPath {
             .collect();
     }
 
+    /// Its end, and the direction in which it arrives there.
+    fn tip(&self) -> (Point, Point) {
+        let Some([first, second, end]) = self.curves.last().copied() else {
+            return (self.start, direction(&[], self.start));
+        };
+        let before = self.curves.iter().nth_back(1).map_or(self.start, |c| c[2]);
+        (end, direction(&[before, first, second], end))
+    }
+
     /// Points along it, close enough to be joined by straight lines.
     pub(super) fn points(&self) -> Vec<Point> {
         polyline(self.start, &self.curves, PIECES)
@@ -261,6 +270,13 @@ impl Arrows<'_> {
         (group, over)
     }
 
+    /// The bar at the end of a line of ordinary width through which nothing arrives.
+    pub(super) fn stop(&self, track: &ArrowPath) -> Form {
+        let edge = &self.style.edge;
+        let (tip, along) = track.tip();
+        Tip::Stop.form(tip, along, (edge.arrow + edge.width) * self.fit.pen)
+    }
+
     /// The line with a head at its end and at its start, according to `heads`.
     fn line(
         &self,
@@ -269,16 +285,12 @@ impl Arrows<'_> {
         look: &ArrowLook,
         (kind, heads): (Tip, [bool; 2]),
     ) {
-        let (Some(first), Some(last)) = (track.curves.first(), track.curves.last()) else {
+        let Some(first) = track.curves.first() else {
             return;
         };
         let scale = self.fit.pen;
         let stroke = look.stroke.scaled(scale);
-        let before = match track.curves.len() {
-            1 => track.start,
-            n => track.curves[n - 2][2],
-        };
-        let along = direction(&[before, last[0], last[1]], last[2]);
+        let (end, along) = track.tip();
         let against = direction(&[first[2], first[1], first[0]], track.start);
         let head = (self.style.edge.arrow + look.stroke.width) * scale;
         // The line ends inside the head, so that its blunt end is not visible beside the tip, and always at
@@ -308,7 +320,7 @@ impl Arrows<'_> {
             group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));
-        let tips = [(last[2], along), (track.start, against)];
+        let tips = [(end, along), (track.start, against)];
         for (tip, along) in tips
             .into_iter()
             .zip(heads)

@@ -43,8 +43,8 @@ pub struct UnionElement {
     pub rect: Rect,
     /// Its name if the drawing's font lacks some characters, for viewers with more fonts.
     pub name: Option<String>,
-    /// The bar at its left for a latched last message, if any.
-    pub latch: Option<Form>,
+    /// A shape of some windows only: a box's bar for a latched last message, an arrow's end where nothing arrives.
+    pub bar: Option<Form>,
     /// The middle of its badge.
     pub badge: Point,
     /// The marks for which it has a badge in some window.
@@ -139,7 +139,7 @@ impl Picture<'_> {
                     shows_changes,
                     rect: card.place,
                     name: label.unshown.clone(),
-                    latch: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
+                    bar: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
                     badge: card.badge,
                     marks,
                 }
@@ -171,18 +171,15 @@ impl Picture<'_> {
         let parts = arrows_shown.zip(tracks).zip(&plan.links).zip(marks);
         parts
             .map(|((((arrow, showing), track), link), marks)| {
-                let is_starved = showing.looks().iter().all(|look| look.is_starved);
-                let shown = Shown {
-                    is_starved,
-                    ..plain(link.label.map(|_| 1.0))
-                };
+                let shown = plain(link.label.map(|_| 1.0));
+                let is_starved = showing.looks().iter().any(|look| look.is_starved);
                 UnionElement {
                     group: arrows.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),
                     shows_changes: false,
                     rect: Rect::default(),
                     name: None,
-                    latch: None,
+                    bar: is_starved.then(|| arrows.stop(&track)),
                     badge: track.badge,
                     marks,
                 }

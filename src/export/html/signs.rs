@@ -129,7 +129,7 @@ fn picture(sign: &LegendSign) -> String {
         LegendSign::Service => group("topic", "<path d=\"M3 10l6 -6h18l6 6l-6 6h-18z\"/>"),
         LegendSign::Starved => group(
             "edge active stated",
-            "<path d=\"M3 10h24\"/><path d=\"M29 4V16\"/>",
+            "<path d=\"M3 10h24\"/><path d=\"M27 4h3v12h-3z\"/>",
         ),
         LegendSign::Width => group("edge active w5", LINE),
     }

@@ -69,8 +69,11 @@ fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     }
     let badges = MARKS.iter().filter(|word| words.contains(*word));
     let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
-    shown.push(":is(.faster,.slower)>.c,.latched:not(.removed)>.l".to_owned());
+    shown.push(":is(.faster,.slower)>.c,.latched:not(.removed,.edge)>.l,.starved>.l".to_owned());
     let _ = write!(out, "{}{{visibility:inherit}}", shown.join(","));
+    if words.contains("starved") {
+        out.push_str(".edge.starved path+path:not(.l){visibility:hidden}");
+    }
     out
 }
 

@@ -48,7 +48,7 @@ class Graph {
 		// The meaning of a class: its mark, whether the element exists, and the class without marks.
 		this.marks = classes.map(c => KINDS.findIndex(k => c.split(' ').includes(k)));
 		this.there = classes.map((c, k) => k > 0 && this.marks[k] != 1);
-		this.plain = classes.map(c => c.split(' ').filter((word, k) => !k || /^(stated|inferred|declared|w\d)$/.test(word)).join(' '));
+		this.plain = classes.map(c => c.split(' ').filter((word, k) => !k || /^(stated|inferred|declared|starved|w\d)$/.test(word)).join(' '));
 		this.neighbours = names.map(() => []);
 		arrows.forEach(([a, b], k) => { this.neighbours[a].push(this.N + k); if (a != b) this.neighbours[b].push(this.N + k); });
 		this.keys = new Map();

@@ -80,7 +80,7 @@ const DEGREES = { stated: 'stated by a log, graph or file', inferred: 'inferred 
 function explain(g, i, w) {
 	const [state, ...rest] = g.classes[g.class(i, w)].split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
 	const told = g.turn(i, w) || g.rate(i, w), sign = g.marks[g.class(i, w)], lifecycle = g.lifecycle(i, w);
-	const now = [sign == 1 ? 'ended in this window' : STATES[state], sign == 0 && 'began in this window', told && (g.turn(i, w) ? 'rate ' + told : told + ' in this window'), lifecycle && 'state ' + lifecycle, state != 'off' && degree];
+	const now = [sign == 1 ? 'ended in this window' : STATES[state], sign == 0 && 'began in this window', told && (g.turn(i, w) ? 'rate ' + told : told + ' in this window'), lifecycle && 'state ' + lifecycle, rest.includes('starved') && 'gets nothing (quality of service)', state != 'off' && degree];
 	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, now.filter(Boolean).join(' · '), ...g.facts[i]];
 }
 function card() {
