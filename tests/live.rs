@@ -163,6 +163,22 @@ fn rates_are_refused_without_messages() {
     assert_eq!(done.status.code(), Some(2));
 }
 
+#[test]
+fn what_is_not_an_address_is_refused() {
+    let folder = TempDir::new().unwrap();
+    for address in [
+        "ros1://",
+        "ros1://robot",
+        "ros1://:11311",
+        "ros1://robot:99999",
+    ] {
+        let done = follow(folder.path(), &[address]);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(2), "{address}: {said}");
+        assert!(said.contains("ros1://localhost:11311"), "{said}");
+    }
+}
+
 #[cfg(feature = "live")]
 mod bridge {
     use std::net::{TcpListener, TcpStream};

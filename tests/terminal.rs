@@ -241,12 +241,20 @@ fn results_fit_the_terminal() {
             "events W",
             "events W --parts",
             "events C",
+            "follow W",
+            "check W --expect expected.yaml",
+            "render W -o x.svg",
         ] {
-            let written = typed(folder.path(), &words(line), On::Output, columns, true);
+            // Messages are one line each; a terminal of 80 columns has room for those about a whole run.
+            let on = match columns {
+                80.. if line.starts_with("render") => On::Errors,
+                _ => On::Output,
+            };
+            let written = typed(folder.path(), &words(line), on, columns, true);
             let widest = screen(&written, 1000)
                 .into_iter()
                 .max_by_key(|line| line.chars().count())
-                .unwrap();
+                .unwrap_or_default();
             let is_one_word = !widest.trim().contains(' ');
             assert!(
                 is_one_word || widest.chars().count() <= usize::from(columns),

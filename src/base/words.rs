@@ -158,6 +158,7 @@ pub fn bytes(n: u64) -> String {
     let units = [(1_000_000_000_u64, "GB"), (1_000_000, "MB"), (1000, "kB")];
     match units.iter().find(|(unit, _)| n >= *unit) {
         Some((unit, word)) => format!("{:.1} {word}", n as f64 / *unit as f64),
+        None if n == 1 => "1 byte".to_owned(),
         None => format!("{n} bytes"),
     }
 }
@@ -377,6 +378,7 @@ mod tests {
             (count(2, "switch"), "2 switches"),
             (percent(0.25), "25"),
             (bytes(12), "12 bytes"),
+            (bytes(1), "1 byte"),
             (bytes(6_881_622), "6.9 MB"),
             (period(90 * SECOND), "90 s"),
             (period(2 * minute), "2 min"),

@@ -77,7 +77,7 @@ impl From<Location> for YamlPlace {
 }
 
 /// The parser's messages and what a user can do about them. Messages about Rust or parser options are never shown.
-const MISTAKES: [(&str, &str); 12] = [
+const MISTAKES: [(&str, &str); 13] = [
     (
         "budget",
         "it contains too many values, or they are nested too deeply",
@@ -85,6 +85,10 @@ const MISTAKES: [(&str, &str); 12] = [
     (
         "tabs disallowed",
         "a tab indents the line; YAML only allows spaces",
+    ),
+    (
+        "found a tab",
+        "a tab indents a line after it; YAML only allows spaces",
     ),
     (
         "did not find expected key",

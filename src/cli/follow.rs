@@ -184,7 +184,7 @@ impl Follower<'_> {
             let known = follow.so_far(MOST, Length::All)?;
             Ok(known.map_or_else(Vec::new, |known| feed.news(&known, format)))
         });
-        terminal.lines(&lines?)
+        terminal.lines(&lines?, format)
     }
 
     /// Prints new findings and updates the page.
@@ -218,7 +218,7 @@ impl Follower<'_> {
             }
             Ok(judged.unwrap_or_default())
         });
-        terminal.lines(&lines?).map(drop)
+        terminal.lines(&lines?, format).map(drop)
     }
 
     /// Checks the recording as it is now and writes the outputs.

@@ -14,7 +14,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words::{self, visible};
 use crate::mission::event_log::Kind;
-use crate::mission::events::LogLine;
+use crate::mission::events::{LogFormat, LogLine};
 use crate::pipeline::{Stage, Watch};
 use progress::Progress;
 
@@ -150,16 +150,20 @@ impl Terminal {
         }
     }
 
-    /// Prints lines on standard output; false if it was closed.
+    /// Prints lines on standard output, those for people as [`Terminal::fitted`]; false if it was closed.
     ///
     /// # Errors
     /// As [`Terminal::results`].
-    pub(crate) fn lines(&mut self, lines: &[String]) -> Result<bool> {
+    pub(crate) fn lines(&mut self, lines: &[String], format: LogFormat) -> Result<bool> {
         self.progress.end();
         let text = lines
             .iter()
             .flat_map(|line| [line.as_str(), "\n"])
             .collect::<String>();
+        let text = match self.width().filter(|_| format == LogFormat::Text) {
+            Some(width) => fitted(&text, width),
+            None => text,
+        };
         print(printable(&text).as_bytes())
     }
 
@@ -273,7 +277,7 @@ fn summary(notices: &[Notice]) -> String {
     let hidden = usize::try_from(hidden).unwrap_or(usize::MAX);
     let parts = [
         (hidden, "element", " left out or collapsed"),
-        (of(NoticeKind::Chosen).count(), "setting", " chosen for you"),
+        (of(NoticeKind::Chosen).count(), "setting", " chosen"),
         (
             of(NoticeKind::Glyph).count(),
             "font",

@@ -118,7 +118,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     Err(Error::usage(
         format!(
             "`--start` and `--end` select nothing of this bag's {}",
-            words::period(bag.nanos())
+            words::duration(bag.nanos())
         ),
         format!("the bag covers {} to {}", bag.start, bag.end),
     ))
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(cut(Some("30"), Some("-30s")).unwrap(), secs(130, 170));
         assert_eq!(
             cut(None, Some("0")).unwrap_err().to_string(),
-            "`--start` and `--end` select nothing of this bag's 100 s"
+            "`--start` and `--end` select nothing of this bag's 1 min 40 s"
         );
     }
 }

@@ -78,6 +78,17 @@ impl Live {
             hint: "build with the feature `live`: `cargo install bagreel --features live`"
                 .to_owned(),
         })?;
+        let host = place.split('/').next().unwrap_or_default();
+        let is_address = match host.rsplit_once(':') {
+            Some((host, port)) => !host.is_empty() && port.parse::<u16>().is_ok(),
+            None => !host.is_empty() && text.starts_with("ws://"),
+        };
+        if !is_address {
+            return Err(Error::usage(
+                format!("`{text}` is not the address of a system"),
+                "name host and port: `ros1://localhost:11311`, `ws://localhost:8765`",
+            ));
+        }
         let folder = Temporary::new()?;
         let path = folder.path().join("live.mcap");
         let file = File::create(&path).map_err(Error::io("write", &path))?;

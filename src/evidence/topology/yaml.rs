@@ -102,14 +102,18 @@ impl<'a> TopologyYaml<'a> {
         bad(self.path, self.line(key), reason.to_owned(), HINT)
     }
 
-    /// The first line that begins with a key; 0 if none does.
+    /// The first line that begins with a key, or contains it; 0 if none does.
     fn line(&self, key: &str) -> usize {
         // Lines with the same prefix are contiguous in this order.
         let from = self.lines.range(key..);
         let own = from
             .take_while(|(line, _)| line.starts_with(key))
             .take(MOST_ALIKE);
-        own.map(|(_, number)| *number).min().unwrap_or(0)
+        let inside = || self.lines.iter().filter(|(line, _)| line.contains(key));
+        let first = own.map(|(_, number)| *number).min();
+        first
+            .or_else(|| inside().map(|(_, number)| *number).min())
+            .unwrap_or(0)
     }
 
     fn node(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
@@ -277,11 +281,15 @@ mod tests {
 
     #[test]
     fn errors_have_their_line() {
-        let text = "nodes:\n  /a:\n    publishs: [x]\n";
-        let error = read(Path::new("t.yaml"), text).unwrap_err().to_string();
-        assert!(
-            error.contains("line 3") && error.contains("publishs"),
-            "{error}"
-        );
+        for (text, line) in [
+            ("nodes:\n  /a:\n    publishs: [x]\n", "line 3"),
+            ("nodes:\n  /a: {publishs: [x]}\n", "line 2"),
+        ] {
+            let error = read(Path::new("t.yaml"), text).unwrap_err().to_string();
+            assert!(
+                error.contains(line) && error.contains("publishs"),
+                "{error}"
+            );
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Progress, Steps, pass};
 use crate::base::error::{Error, Result};
+use crate::base::words;
 use crate::export::sequence::{Sequence, SequenceOptions};
 use crate::export::{Output, Written};
 
@@ -36,7 +37,10 @@ pub(crate) fn fit(
     let most = sequence.options.max_bytes.unwrap_or(0);
     Err(Error::Output {
         path: output.target.path().to_owned(),
-        reason: format!("it does not fit in {most} bytes, even small and with changes only"),
+        reason: format!(
+            "it does not fit in {}, even small and with changes only",
+            words::bytes(most)
+        ),
         hint: "raise `--max-bytes`, or show less: a longer `--period`, `--ns-filter`".to_owned(),
     })
 }
