@@ -1,8 +1,8 @@
 //! How much a mission reconfigures: changes per minute, lifetimes of nodes, and the distance between the graphs of
 //! consecutive windows.
 //!
-//! Only the robot counts: recorders, housekeeping, and elements that are only inferred or declared are left
-//! out.
+//! Only the robot counts: recorders, housekeeping and mere guesses ([`is_guess`](crate::evidence::Evidence::is_guess))
+//! are left out.
 
 use std::collections::BTreeSet;
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{BagInfo, Info, NodeInfo, info};
+use super::{BagInfo, Info, NodeInfo, TopicInfo, info};
 use crate::base::columns::{Cell, Column, WHOLE, hang, table};
 use crate::base::name::{is_player, is_recorder};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
@@ -87,8 +87,10 @@ fn is_named(node: &NodeInfo) -> bool {
 }
 
 fn unknown_publishers(info: &Info) -> TableCell<'_> {
-    let topics = info.topics.iter();
-    TableCell::count(topics.filter_map(|t| t.unknown_publishers).sum::<u32>())
+    // Messages of which no publisher is known have at least one.
+    let least = |topic: &TopicInfo| u32::from(topic.count > 0 && topic.publishers.is_empty());
+    let of = |topic: &TopicInfo| topic.unknown_publishers.unwrap_or(0).max(least(topic));
+    TableCell::count(info.topics.iter().map(of).sum::<u32>())
 }
 
 fn evidence(info: &Info) -> String {
