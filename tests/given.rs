@@ -8,6 +8,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::support::browser::drive;
 use crate::support::cdr::Cdr;
 use crate::support::{ORIGIN, Recording, mcap};
 
@@ -175,6 +176,15 @@ fn a_starved_subscription_ends_in_a_bar_and_a_graph_has_qualities_and_parameters
             svg.contains("gets nothing (quality of service)"),
             "no legend: {svg}"
         );
+        let page = done(folder, "render r.mcap -p all -o - --format html");
+        let line = page
+            .split("<g ")
+            .find(|g| g.starts_with("class=\"edge") && g.contains("data-to=\"/slam\""));
+        let (line, _) = line.unwrap().split_once("</g>").unwrap();
+        assert!(line.contains("<path class=\"l\""), "no bar: {line}");
+        let others = page.matches("<path class=\"l\"").count();
+        assert!(others == 1 && page.contains(" starved"), "{others}");
+        assert!(page.contains("gets nothing (quality of service)</span>"));
         let why = done(folder, "info r.mcap --why /slam /scan");
         assert!(why.contains("(reliable volatile depth 10)"), "{why}");
         let why = done(folder, "info r.mcap --why /lidar");
@@ -255,6 +265,41 @@ fn metrics_of_a_subscriber_are_those_of_its_only_topic() {
         .unwrap();
     let near = |key: &str, truth: f64| (slam[key].as_f64().unwrap() - truth).abs() < truth * 0.01;
     assert!(near("age_s", 0.07) && near("jitter_s", 0.02), "{slam}");
+}
+
+#[test]
+fn rolling_statistics_count_each_message_once() {
+    let mut bag = graphs(0);
+    let kind = "rosgraph_monitor_msgs/msg/TopicStatistics";
+    let place = bag.publisher("", "/topic_statistics", kind);
+    // The lidar sends 10 messages per second, of which 8 arrive, 70 ms old; means are of the last 50 at most.
+    for second in 1..=10_u32 {
+        let one = |cdr: Cdr, kind, node, many: u32, mean: u32| {
+            let cdr = cdr.u8(kind).text(node).text("/scan").u32(many.min(50));
+            let cdr = cdr.u32(0).u32(mean * 1_000_000);
+            (0..4).fold(cdr, |cdr, _| cdr.u32(0))
+        };
+        let cdr = Cdr::default().time(ORIGIN).u32(3);
+        let cdr = one(cdr, 0, "/lidar", 10 * second, 100);
+        let cdr = one(cdr, 1, "/slam", 8 * second, 125);
+        let cdr = one(cdr, 2, "/slam", 8 * second, 70);
+        let at = ORIGIN + i64::from(second) * SECOND - 1;
+        bag.messages.push((place, at, cdr.done()));
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = folder(&bag, &ros2());
+    let json = done(folder.path(), "render r.mcap -p 5 -o - --format json");
+    let mission: Value = serde_json::from_str(&json).unwrap();
+    for window in mission["windows"].as_array().unwrap() {
+        let edges = window["subscribes"].as_array().unwrap();
+        let slam = edges.iter().find(|e| e["node"] == "/slam").unwrap();
+        let near =
+            |key: &str, truth: f64| (slam[key].as_f64().unwrap() - truth).abs() <= truth * 0.01;
+        assert!(
+            near("count", 40.0) && near("hz", 8.0) && near("age_s", 0.07),
+            "{slam}"
+        );
+    }
 }
 
 #[test]
@@ -364,60 +409,71 @@ fn a_bundle_is_the_same_twice_and_its_numbers_follow_from_the_windows() {
     ] {
         assert!(a.contains_key(name), "{name}: {:?}", a.keys());
     }
-    // Computed again from the windows of the mission's JSON.
-    let json = done(
+    // Every number, computed again from the mission's JSON and the event log by other code.
+    done(
         folder,
-        "render runs/w.bag -p 10 -o - --format json --json windows",
+        "render runs/w.bag -p 10 -o mission.json --json windows",
     );
-    let mission: Value = serde_json::from_str(&json).unwrap();
-    let name = |value: &Value, key: &str| value[key].as_str().unwrap().to_owned();
-    let is_tool = |name: &str| name.starts_with("/record_") || name == "/rosout";
-    let is_quiet = |topic: &str| {
-        ["/rosout", "/rosout_agg", "/clock", "/statistics"].contains(&topic)
-            || topic.ends_with("/parameter_updates")
-            || topic.ends_with("/parameter_descriptions")
-    };
-    let sets = mission["windows"].as_array().unwrap().iter().map(|window| {
-        let mut set = BTreeSet::new();
-        for node in window["nodes"].as_array().unwrap() {
-            set.insert((name(node, "name"), String::new()));
-        }
-        for list in ["publishes", "subscribes"] {
-            for edge in window[list].as_array().unwrap() {
-                set.insert((
-                    name(edge, "node"),
-                    format!("{list} {}", name(edge, "topic")),
-                ));
-            }
-        }
-        set.retain(|(node, edge)| {
-            !is_tool(node) && !is_quiet(edge.split(' ').nth(1).unwrap_or_default())
-        });
-        set
-    });
-    let sets: Vec<BTreeSet<(String, String)>> = sets.collect();
-    let distances = sets
-        .windows(2)
-        .map(|two| two[0].symmetric_difference(&two[1]).count());
-    let distances: Vec<String> = distances.map(|n| n.to_string()).collect();
-    let table = String::from_utf8(a["windows.csv"].clone()).unwrap();
-    let written: Vec<&str> = table
-        .lines()
-        .skip(2)
-        .map(|row| row.split(',').nth(10).unwrap())
-        .collect();
-    assert_eq!(written, distances);
     let log = done(folder, "events runs/w.bag --format csv");
-    let summary = String::from_utf8(a["reconfiguration.csv"].clone()).unwrap();
-    let row: Vec<&str> = summary.lines().nth(1).unwrap().split(',').collect();
-    let (span, changes): (f64, f64) = (row[1].parse().unwrap(), row[4].parse().unwrap());
-    assert!(
-        (row[5].parse::<f64>().unwrap() - changes / span * 60.0).abs() < 1e-9,
-        "{row:?}"
-    );
-    assert_eq!(
-        log.lines().count() - 1,
-        row[4].parse::<usize>().unwrap(),
-        "{log}"
-    );
+    fs::write(folder.join("events.csv"), log).unwrap();
+    let files = ["mission.json", "events.csv", "a"].map(|name| folder.join(name));
+    drive("../exchange/reconfiguration.py", files);
+}
+
+#[test]
+fn one_query_counts_bags_without_nodes_and_with_nodes_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |name: &str, bag: &Recording, options: &mcap::Options| {
+        fs::write(folder.join(name), mcap::write(bag, options)).unwrap();
+    };
+    let unnamed = mcap::Options {
+        publisher_key: None,
+        ..ros2()
+    };
+    fs::create_dir(folder.join("bags")).unwrap();
+    write("bags/whole.mcap", &lidar(), &ros2());
+    // The recorder counts publishers that it does not name: alone, and beside a node that logs.
+    let mut bag = lidar();
+    "- reliability: reliable\n  durability: volatile\n  history: keep_last\n  depth: 10\n"
+        .clone_into(&mut bag.publishers[0].qos);
+    write("bags/without.mcap", &bag, &unnamed);
+    write("bags/without_2.mcap", &bag, &unnamed);
+    let rosout = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
+    let record = Cdr::default().time(ORIGIN).u8(20).text("planner");
+    let record = record.text("ready").text("planner.cpp").text("run").u32(1);
+    bag.messages.insert(0, (rosout, ORIGIN, record.done()));
+    write("bags/missing.mcap", &bag, &unnamed);
+    bag.publishers[0].qos.clear();
+    write("bags/missing_uncounted.mcap", &bag, &unnamed);
+    fs::write(folder.join("bags/broken.mcap"), b"\x89MCAP0\r\nbroken").unwrap();
+    let (_, survey, _) = bagreel(folder, "info bags --format csv");
+    let mut rows = survey.lines().map(|row| row.split(','));
+    let heads = rows.next().unwrap().collect::<Vec<_>>();
+    let db = rusqlite::Connection::open_in_memory().unwrap();
+    db.execute(
+        &format!("CREATE TABLE \"survey.csv\" ({})", heads.join(" NUMERIC, ")),
+        [],
+    )
+    .unwrap();
+    for row in rows {
+        // An empty cell is `NULL`.
+        let cells = row.map(|cell| Some(cell).filter(|cell| !cell.is_empty()));
+        let places = vec!["?"; heads.len()].join(", ");
+        db.execute(
+            &format!("INSERT INTO \"survey.csv\" VALUES ({places})"),
+            rusqlite::params_from_iter(cells.take(heads.len())),
+        )
+        .unwrap();
+    }
+    let docs = include_str!("../docs/src/bundle.md");
+    let query = docs
+        .split("```sql\n")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let counts = db.query_row(query, [], |row| Ok((row.get(0)?, row.get(1)?)));
+    assert_eq!(counts, Ok((2, 2)), "{survey}");
 }

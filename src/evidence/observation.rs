@@ -105,6 +105,8 @@ observations! {
     Duplicate(node),
     /// The recorder lost so many messages of this topic.
     Lost(topic, many),
+    /// So many publishers of this topic have no known name.
+    Unnamed(topic, many),
     /// A snapshot was taken: observations that the source made in an earlier snapshot of the same name and not in this one
     /// have ended.
     Snapshot(name),
@@ -164,6 +166,10 @@ pub(crate) struct Measurement {
     pub(crate) subscriber: Option<Name>,
     /// The interval, half-open.
     pub(crate) span: Span,
+    /// Whether the interval overlaps that of the report before: only its new part counts.
+    pub(crate) is_rolling: bool,
+    /// The number of messages over the connection, or at this end; `None` if another report counts them.
+    pub(crate) delivered: Option<u64>,
     /// The number of messages from which jitter and age are computed.
     pub(crate) count: u64,
     pub(crate) drops: Option<u64>,

@@ -1,8 +1,8 @@
 //! The graph over time for other tools: an MCAP file with `/rosgraph` (`rosgraph_msgs/msg/Graph`, a message per
 //! change) and the event log on `/bagreel/events` (`foxglove_msgs/msg/Log`), both CDR with their definitions.
 //!
-//! Reading it yields the same elements in every window. Topics of unknown publishers belong to the node
-//! [`UNKNOWN_NODE`]; the reader treats them as topics only.
+//! Reading it yields the same elements in every window. The node [`UNKNOWN_NODE`] publishes every topic without a known
+//! end, and those of publishers that the recorder counts but does not name, once per publisher.
 
 mod cdr;
 mod definitions;
@@ -15,6 +15,7 @@ pub(crate) use self::graph_file::{GRAPH, GraphEnd, GraphFile, GraphNode, LOG, gr
 use super::{Sequence, Started, one_file};
 use crate::base::name::UNKNOWN_NODE;
 use crate::base::time::Stamp;
+use crate::evidence::unknown::unnamed as boxed;
 use crate::export::target::Target;
 use crate::graph::{Edge, Element, Topic};
 use crate::mission::Mission;
@@ -61,10 +62,12 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
 struct Ends<'a> {
     /// By node: publications and subscriptions.
     of: BTreeMap<u32, [Vec<(Element, &'a Edge)>; 2]>,
+    /// The publications of unnamed nodes, with the number of those.
+    unnamed: Vec<(Element, &'a Edge, usize)>,
 }
 
 impl<'a> Ends<'a> {
-    /// Excludes inferences from source code and placeholders for unnamed nodes.
+    /// Excludes inferences from source code, and the names of boxes for unnamed nodes.
     fn new(mission: &'a Mission) -> Self {
         let all = &mission.elements;
         let is_known = |what| !all.evidence(what).is_guess();
@@ -75,13 +78,21 @@ impl<'a> Ends<'a> {
         {
             of.insert(id, Default::default());
         }
-        for (what, edge) in all.edges().filter(|(what, _)| is_known(*what)) {
+        let mut unnamed = Vec::new();
+        for (what, edge) in all.edges() {
+            if !is_known(what) {
+                let is_source = all.evidence(what).words().any(|word| word == "source_only");
+                let is_box = !is_source && matches!(what, Element::Publish(_));
+                let node = all.nodes.get(edge.node as usize).filter(|_| is_box);
+                unnamed.extend(node.map(|node| (what, edge, boxed(node.name.as_str()))));
+                continue;
+            }
             let side = usize::from(matches!(what, Element::Subscribe(_)));
             if let Some(ends) = of.get_mut(&edge.node) {
                 ends[side].push((what, edge));
             }
         }
-        Self { of }
+        Self { of, unnamed }
     }
 
     /// The times at which the graph changes, from the mission's start on.
@@ -123,11 +134,18 @@ impl<'a> Ends<'a> {
             }
             there.push(node);
         }
-        if !alone.is_empty() {
-            let mut node = GraphNode::new(UNKNOWN_NODE);
-            for topic in alone.into_iter().filter_map(topic) {
-                node.ends[2 * usize::from(topic.is_service())].push(end(topic));
-            }
+        let mut node = GraphNode::new(UNKNOWN_NODE);
+        for (_, edge, many) in self.unnamed.iter().filter(|(what, ..)| is_there(*what)) {
+            alone.remove(&edge.topic);
+            let ends = topic(edge.topic).into_iter().map(end);
+            node.ends[0].extend(ends.cycle().take(*many));
+        }
+        // Without a quality of service: there may be no publisher.
+        for topic in alone.into_iter().filter_map(topic) {
+            let qos = None;
+            node.ends[2 * usize::from(topic.is_service())].push(GraphEnd { qos, ..end(topic) });
+        }
+        if node.ends.iter().any(|ends| !ends.is_empty()) {
             there.push(node);
         }
         graph(&there)

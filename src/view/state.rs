@@ -179,9 +179,11 @@ impl<'a> Now<'a> {
     /// The state of an element, `None` if it does not exist; [`One::WITHOUT_MESSAGES`] if it exists without messages.
     fn one(&self, what: Element) -> Option<One> {
         let (alive, paused) = &self.lives;
+        // Few bags count what subscribers get, so that lines to all of them look alike.
+        let counted = !matches!(what, Element::Subscribe(_));
         let known = |row: &Row| One {
-            hz: row.hz(self.span),
-            count: row.count,
+            hz: row.hz(self.span).filter(|_| counted),
+            count: row.count.filter(|_| counted),
             ..One::new(row.state, row.confidence)
         };
         alive.is(what).then(|| {

@@ -192,10 +192,12 @@ impl Owners {
         Some(format!("{space}/{}", row.node))
     }
 
-    /// The recorded topics that the owner of a type, with this name, also publishes (true) and subscribes to.
+    /// The recorded topics of matching types that the owner of a type, with this name, also publishes (true) and
+    /// subscribes to.
     pub(crate) fn others(
         &self,
         known: &Conclusions<'_>,
+        kind_of: &impl Fn(&Conclusions<'_>, Name) -> String,
         kind: &str,
         node: &str,
     ) -> Vec<(bool, Name)> {
@@ -207,7 +209,7 @@ impl Owners {
         };
         let recorded = |row: &Contract| {
             let topic = known.facts.known(&resolved(&row.topic, node));
-            let topic = topic.filter(|topic| known.kind(*topic) == row.kind)?;
+            let topic = topic.filter(|topic| kind_of(known, *topic) == row.kind)?;
             Some((row.publishes, topic))
         };
         self.0

@@ -63,6 +63,8 @@ pub(crate) fn read(
             publisher: None,
             subscriber: Some(name),
             span,
+            is_rolling: false,
+            delivered: Some(count).filter(|_| metric == "message_period"),
             count,
             drops: None,
             bytes: None,

@@ -5,7 +5,7 @@
 //! is parsed by the definition in the bag, or by the built-in one that it matches exactly.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -209,12 +209,22 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             continue;
         }
         if name == UNKNOWN_NODE {
-            for (_, topic, kind, _) in ends(node) {
+            let mut unnamed: BTreeMap<Name, usize> = BTreeMap::new();
+            for (is_sent, topic, kind, qos) in ends(node) {
                 let (of, kind) = (context.name(&topic), context.name(kind));
+                // A recorder that knows the quality of service has counted the publishers.
+                if let Some(quality) = qos.and_then(quality).filter(|_| is_sent) {
+                    *unnamed.entry(of).or_default() += 1;
+                    offer(context, of, &quality);
+                }
                 context.observe(now(Observation::Topic(of)), || {
                     format!("{topic} is in the graph")
                 });
                 context.observe(now(Observation::Type(of, kind)), String::new);
+            }
+            for (topic, many) in unnamed {
+                let observation = Observation::Unnamed(topic, context.name(&many.to_string()));
+                context.observation(observation, Confidence::Declared, String::new);
             }
             continue;
         }
@@ -241,10 +251,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
                 format!("{name} {verb} {topic}{quality}")
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
-                let observation = Observation::Quality(of, context.name(&quality));
-                context.observation(observation, Confidence::Stated, || {
-                    format!("offered as {quality}")
-                });
+                offer(context, of, &quality);
             }
             if !context.facts.text(kind).is_empty() {
                 context.observe(now(Observation::Type(of, kind)), String::new);
@@ -275,6 +282,14 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         Confidence::Stated,
         String::new,
     );
+}
+
+/// Adds the quality of service that a topic is offered with.
+fn offer(context: &mut SourceContext<'_>, topic: Name, quality: &str) {
+    let observation = Observation::Quality(topic, context.name(quality));
+    context.observation(observation, Confidence::Stated, || {
+        format!("offered as {quality}")
+    });
 }
 
 /// An endpoint in a message: whether it publishes, the topic, its type and its quality of service.

@@ -46,6 +46,8 @@ pub(crate) fn read(
         publisher: from,
         subscriber: to,
         span: Span::new(start, end),
+        is_rolling: false,
+        delivered: count(delivered),
         count: count(delivered).unwrap_or(0),
         drops: count(dropped),
         bytes: count(traffic),

@@ -1,12 +1,14 @@
 //! `/topic_statistics` of graph-monitor: the publishers and subscribers of a topic of ROS 2, measured in its
-//! middleware.
+//! middleware. Its means are rolling: each is of the last messages (50 by default), reported once a second.
+
+use std::collections::BTreeMap;
 
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
-use crate::evidence::observation::{Confidence, Measurement, Observation};
+use crate::evidence::observation::{Confidence, Measurement, Name, Observation};
 
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
@@ -25,9 +27,10 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     ],
 };
 
-/// The kind of statistic that a publisher measures; all others are a subscriber's.
+/// The kinds of statistics: the period of a publisher, that of a subscriber, and the time from publishing to taking.
 const PUBLISHED_PERIOD: u8 = 0;
-/// The kind for the time from publishing to receiving.
+/// The kind for the period between received messages.
+const RECEIVED_PERIOD: u8 = 1;
 const AGE: u8 = 2;
 
 pub(crate) fn read(
@@ -45,25 +48,23 @@ pub(crate) fn read(
         all.push((kind, node, topic, count, mean));
     }
     payload.finish()?;
+    // By the end of a topic: the number of periods with their mean, and that of ages; 0 without any.
+    let mut ends: BTreeMap<(Name, Name, bool), [(u64, i64); 2]> = BTreeMap::new();
     for (kind, node, topic, count, mean) in all {
         let (name, of) = (context.name(node), context.name(topic));
-        let (verb, observation) = match kind {
-            PUBLISHED_PERIOD => ("publishes", Observation::Publish(name, of)),
-            _ => ("receives", Observation::Subscribe(name, of)),
+        let is_sent = kind == PUBLISHED_PERIOD;
+        let (verb, observation) = if is_sent {
+            ("publishes", Observation::Publish(name, of))
+        } else {
+            ("receives", Observation::Subscribe(name, of))
         };
-        if kind == AGE && count > 0 {
-            context.measure(Measurement {
-                topic: Some(of),
-                publisher: None,
-                subscriber: Some(name),
-                // The collector reports once a second.
-                span: Span::new(Stamp(0), Stamp(1_000_000_000)),
-                count: u64::try_from(count).unwrap_or(0),
-                drops: None,
-                bytes: None,
-                jitter_ns: None,
-                age_ns: Some(mean),
-            });
+        let numbers = ends.entry((of, name, is_sent)).or_default();
+        match kind {
+            PUBLISHED_PERIOD | RECEIVED_PERIOD => {
+                numbers[0] = (u64::try_from(count).unwrap_or(0), mean);
+            }
+            AGE => numbers[1] = (u64::try_from(count).unwrap_or(0), mean),
+            _ => {}
         }
         // A statistic over no messages only shows that the endpoint exists.
         let confidence = if count > 0 {
@@ -73,6 +74,26 @@ pub(crate) fn read(
         };
         context.observation(observation, confidence, || {
             format!("{node} {verb} {topic}: {count} messages counted")
+        });
+    }
+    for ((topic, node, is_sent), [(periods, period), (ages, age)]) in ends {
+        let nanos = i64::try_from(periods).map_or(0, |many| period.saturating_mul(many));
+        context.measure(Measurement {
+            topic: Some(topic),
+            publisher: Some(node).filter(|_| is_sent),
+            subscriber: Some(node).filter(|_| !is_sent),
+            // Without periods: the collector reports once a second.
+            span: Span::new(
+                Stamp(0),
+                Stamp(if nanos > 0 { nanos } else { 1_000_000_000 }),
+            ),
+            is_rolling: true,
+            delivered: Some(periods).filter(|_| nanos > 0),
+            count: ages,
+            drops: None,
+            bytes: None,
+            jitter_ns: None,
+            age_ns: Some(age).filter(|_| ages > 0),
         });
     }
     Ok(())

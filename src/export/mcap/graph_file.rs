@@ -115,6 +115,7 @@ impl<'a> GraphNode<'a> {
 }
 
 /// A topic or service at a node.
+#[derive(Clone, Copy)]
 pub(crate) struct GraphEnd<'a> {
     pub(crate) name: &'a str,
     /// Its type; empty if unknown.

@@ -213,14 +213,15 @@ impl GraphAssembly<'_> {
                     continue;
                 }
                 let what = Element::Publish(id);
-                let (bytes, measures) = (self.measures.bytes(what, at), self.measures.of(what, at));
+                let (delivered, bytes) = self.measures.counted(what, at);
+                let measures = self.measures.of(what, at);
                 let jitter = own.and_then(|row| row.jitter.value());
                 let state = EdgeState {
                     id,
                     state: record.state(*window, count.is_some_and(|n| n > 0)),
                     confidence: degree_in(record, edge.first, *window),
-                    count,
-                    hz: count.and_then(|n| per_second(n, *window)),
+                    count: count.or(delivered),
+                    hz: count.or(delivered).and_then(|n| per_second(n, *window)),
                     bytes: own.and_then(|row| row.bytes).or(bytes),
                     measures: Measures {
                         jitter_s: jitter.or(measures.jitter_s),
@@ -251,13 +252,15 @@ impl GraphAssembly<'_> {
                     None => State::Silent,
                 };
                 let what = Element::Subscribe(id);
+                let (count, bytes) = self.measures.counted(what, at);
                 let state = EdgeState {
                     id,
                     state,
                     confidence: degree_in(record, edge.first, *window),
-                    bytes: self.measures.bytes(what, at),
+                    count,
+                    hz: count.and_then(|n| per_second(n, *window)),
+                    bytes,
                     measures: self.measures.of(what, at),
-                    ..EdgeState::default()
                 };
                 self.graphs.edge(what, at, &state);
             }

@@ -9,7 +9,7 @@ use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::cast;
 use crate::base::name::is_quiet;
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::{Measurement, age_of};
@@ -18,6 +18,7 @@ use crate::graph::{Element, Measures, NodeId, TopicId};
 /// Sums of one element in one window. A report belongs to windows by the share of its interval in each.
 #[derive(Clone, Copy, Debug, Default)]
 struct MeasureSum {
+    delivered: Option<f64>,
     drops: Option<f64>,
     bytes: Option<f64>,
     /// Squares of the deviation, by messages, and the messages.
@@ -45,8 +46,16 @@ impl WindowMeasures {
     ) -> io::Result<Self> {
         let mut all = Self::default();
         let only = only_topics(findings, history);
+        // The ends of rolling reports, by what they are about.
+        let mut ends: BTreeMap<_, Stamp> = BTreeMap::new();
         for measured in &findings.measured {
-            all.report(measured, &only, history, windows);
+            let mut span = measured.span;
+            if measured.is_rolling {
+                let about = (measured.topic, measured.publisher, measured.subscriber);
+                let before = ends.insert(about, span.end);
+                span.start = span.start.max(before.unwrap_or(span.start)).min(span.end);
+            }
+            all.report(measured, span, &only, history, windows);
         }
         for (topic, streams) in &history.streams {
             let Some(id) = history.topic_ids.get(topic) else {
@@ -74,10 +83,11 @@ impl WindowMeasures {
         Ok(all)
     }
 
-    /// Adds a report to its topic and to the edges that it is about.
+    /// Adds the part of a report that is new to its topic and to the edges that it is about.
     fn report(
         &mut self,
         of: &Measurement,
+        new: Span,
         only: &BTreeMap<NodeId, Option<TopicId>>,
         history: &History,
         windows: &SortedWindows<'_>,
@@ -100,9 +110,9 @@ impl WindowMeasures {
         let to = to.and_then(|node| elements.subscription(topic, node));
         let ends = [from.map(Element::Publish), to.map(Element::Subscribe)];
         let whole = of.span.nanos().max(1) as f64;
-        for at in windows.over(of.span.start, of.span.end.plus(-1)) {
+        for at in windows.over(new.start, new.end.plus(-1)) {
             let window = windows.0[at];
-            let shared = Span::new(of.span.start.max(window.start), of.span.end.min(window.end));
+            let shared = Span::new(new.start.max(window.start), new.end.min(window.end));
             let share = shared.nanos().max(0) as f64 / whole;
             for what in ends.into_iter().flatten().chain([Element::Topic(topic)]) {
                 self.0.entry((what, at)).or_default().take(of, share);
@@ -124,9 +134,10 @@ impl WindowMeasures {
         }
     }
 
-    /// The bytes over an edge in a window, as statistics count them.
-    pub(crate) fn bytes(&self, what: Element, at: usize) -> Option<u64> {
-        self.0.get(&(what, at))?.bytes.map(whole)
+    /// The messages over an edge in a window and their bytes, as statistics count them.
+    pub(crate) fn counted(&self, what: Element, at: usize) -> (Option<u64>, Option<u64>) {
+        let sum = self.0.get(&(what, at)).copied().unwrap_or_default();
+        (sum.delivered.map(whole), sum.bytes.map(whole))
     }
 }
 
@@ -156,6 +167,7 @@ impl MeasureSum {
                 *sum = Some(sum.unwrap_or(0.0) + more as f64 * share);
             }
         };
+        counted(&mut self.delivered, of.delivered);
         counted(&mut self.drops, of.drops);
         counted(&mut self.bytes, of.bytes);
         let weight = of.count as f64 * share;
