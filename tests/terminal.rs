@@ -242,7 +242,6 @@ fn results_fit_the_terminal() {
             "events W --parts",
             "events C",
             "follow W",
-            "check W --expect expected.yaml",
             "render W -o x.svg",
         ] {
             // Messages are one line each; a terminal of 80 columns has room for those about a whole run.
