@@ -141,8 +141,8 @@ const STATISTICS: &str = "string topic\nstring node_pub\nstring node_sub\ntime w
     int32 delivered_msgs\nint32 dropped_msgs\nint32 traffic\nduration period_mean\nduration period_stddev\n\
     duration period_max\nduration stamp_age_mean\nduration stamp_age_stddev\nduration stamp_age_max\n";
 
-/// 40 s of a lidar at 10 Hz: 800 to 1200 bytes a scan, stamped 40 to 60 ms before, every other one 20 ms late; two of each
-/// second scans are lost on the way to the mapper, where they are 70 ms old.
+/// 40 s of a lidar at 10 Hz: 800 to 1200 bytes a scan, stamped 40 to 60 ms before, every other one 20 ms late; two
+/// scans per second are lost on the way to the mapper, where they are 70 ms old.
 fn measured() -> Recording {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");

@@ -29,7 +29,6 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 
 /// The kinds of statistics: the period of a publisher, that of a subscriber, and the time from publishing to taking.
 const PUBLISHED_PERIOD: u8 = 0;
-/// The kind for the period between received messages.
 const RECEIVED_PERIOD: u8 = 1;
 const AGE: u8 = 2;
 
