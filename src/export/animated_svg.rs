@@ -32,6 +32,6 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
 fn remark(view: &View) -> Option<String> {
     let elements = view.items.len() + view.arrows.len();
     (elements > MANY).then(|| {
-        format!("an animated SVG of {elements} elements is slow in browsers; a GIF shows the same at a tenth of the cost")
+        format!("an animated SVG of {elements} elements is slow in browsers; prefer a GIF")
     })
 }
