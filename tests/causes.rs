@@ -116,15 +116,11 @@ fn the_end_of_an_input_does_not_end_its_relay() {
 
 #[test]
 fn a_mux_that_reports_another_input_hands_over() {
-    let mut bag = minute(&[]);
-    for (node, topic) in [
-        ("/nav", "/cmd_nav"),
-        ("/teleop", "/cmd_teleop"),
-        ("/mux", "/cmd_vel"),
-    ] {
-        let twist = bag.publisher(node, topic, "geometry_msgs/Twist");
-        bag.send(twist, (0, 60_000), 100, &[1; 48]);
-    }
+    let mut bag = minute(&[
+        ("/nav", "/cmd_nav", 0, 60),
+        ("/teleop", "/cmd_teleop", 0, 60),
+        ("/mux", "/cmd_vel", 0, 60),
+    ]);
     let selected = bag.publisher("/mux", "/mux/selected", "std_msgs/String");
     bag.publishers[selected].latching = true;
     for (second, topic) in [(0, "/cmd_nav"), (30, "/cmd_teleop")] {

@@ -171,6 +171,10 @@ fn what_is_not_an_address_is_refused() {
         "ros1://robot",
         "ros1://:11311",
         "ros1://robot:99999",
+        #[cfg(feature = "live")]
+        "ws://robot",
+        #[cfg(feature = "live")]
+        "ws://[::1]",
     ] {
         let done = follow(folder.path(), &[address]);
         let said = String::from_utf8_lossy(&done.stderr).into_owned();

@@ -42,8 +42,12 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     topics.sort_by_key(|topic| known.text(*topic));
     topics.dedup();
     let owners = Owners::new(known);
+    let kind_of = |known: &Conclusions<'_>, topic| match kinds.get(&topic) {
+        Some(kind) => kind.clone(),
+        None => known.kind(topic),
+    };
     for topic in &topics {
-        owned(known, &owners, &kinds, *topic);
+        owned(known, &owners, &kind_of, *topic);
     }
     for topic in topics {
         let named = known.publishers(topic).count();
@@ -87,13 +91,9 @@ pub(crate) fn unnamed(name: &str) -> usize {
 fn owned(
     known: &mut Conclusions<'_>,
     owners: &Owners,
-    kinds: &BTreeMap<Name, String>,
+    kind_of: &impl Fn(&Conclusions<'_>, Name) -> String,
     topic: Name,
 ) {
-    let kind_of = |known: &Conclusions<'_>, topic| match kinds.get(&topic) {
-        Some(kind) => kind.clone(),
-        None => known.kind(topic),
-    };
     let (text, kind) = (known.text(topic), kind_of(known, topic));
     let Some(owner) = owners.node(&kind, &text) else {
         return;
@@ -111,7 +111,7 @@ fn owned(
         ElementKey::Publish(node, topic),
         &|| why.clone(),
     );
-    for (publishes, other) in owners.others(known, &kind_of, &kind, &owner) {
+    for (publishes, other) in owners.others(known, kind_of, &kind, &owner) {
         let (verb, edge) = if publishes {
             ("publishes", ElementKey::Publish(node, other))
         } else {

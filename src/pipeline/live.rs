@@ -79,11 +79,8 @@ impl Live {
                 .to_owned(),
         })?;
         let host = place.split('/').next().unwrap_or_default();
-        let is_address = match host.rsplit_once(':') {
-            Some((host, port)) => !host.is_empty() && port.parse::<u16>().is_ok(),
-            None => !host.is_empty() && text.starts_with("ws://"),
-        };
-        if !is_address {
+        let parts = host.rsplit_once(':');
+        if !parts.is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok()) {
             return Err(Error::usage(
                 format!("`{text}` is not the address of a system"),
                 "name host and port: `ros1://localhost:11311`, `ws://localhost:8765`",

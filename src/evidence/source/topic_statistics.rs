@@ -58,11 +58,10 @@ pub(crate) fn read(
             ("receives", Observation::Subscribe(name, of))
         };
         let numbers = ends.entry((of, name, is_sent)).or_default();
+        let measured = (u64::try_from(count).unwrap_or(0), mean);
         match kind {
-            PUBLISHED_PERIOD | RECEIVED_PERIOD => {
-                numbers[0] = (u64::try_from(count).unwrap_or(0), mean);
-            }
-            AGE => numbers[1] = (u64::try_from(count).unwrap_or(0), mean),
+            PUBLISHED_PERIOD | RECEIVED_PERIOD => numbers[0] = measured,
+            AGE => numbers[1] = measured,
             _ => {}
         }
         // A statistic over no messages only shows that the endpoint exists.

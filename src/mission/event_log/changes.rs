@@ -23,15 +23,17 @@ pub(crate) fn explain(
             if exists { added } else { removed }.push(what);
         }
     }
-    let mut all = vec![(Vec::new(), Vec::new()); differ.len().min(1)];
-    for (differ, pair) in differ.iter().skip(1).zip(spans.windows(2)) {
+    let window = |(at, differ): (usize, &Turned)| {
         let mut list = Vec::new();
-        structure(differ, pair[1], elements, &turns, &mut list);
-        let news = Span::new(pair[0].end.max(pair[1].start), pair[1].end);
-        list.extend(values(log, news));
-        all.push(list.into_iter().unzip());
-    }
-    all
+        if let Some(old) = at.checked_sub(1).map(|old| spans[old]) {
+            let span = spans[at];
+            structure(differ, span, elements, &turns, &mut list);
+            let news = Span::new(old.end.max(span.start), span.end);
+            list.extend(values(log, news));
+        }
+        list.into_iter().unzip()
+    };
+    differ.iter().enumerate().map(window).collect()
 }
 
 /// The elements that only this window has, and those that only the previous one has.
