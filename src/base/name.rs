@@ -11,6 +11,14 @@ pub(crate) const HEARTBEAT: &str = "/_bagreel/connected";
 /// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
 pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
 
+/// A message type in the form of ROS 1, without `/msg`.
+pub(crate) fn plain_type(type_name: &str) -> Cow<'_, str> {
+    match type_name.split_once("/msg/") {
+        Some((package, name)) => Cow::Owned(format!("{package}/{name}")),
+        None => Cow::Borrowed(type_name),
+    }
+}
+
 /// The type of a service of unknown type.
 pub(crate) const SERVICE: &str = "service";
 

@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
+use std::sync::Arc;
 
 use super::clock::{Belief, believed};
 
-use crate::bag::straight::ClockFall;
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::in_space;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::message::cursor::PayloadCursor;
@@ -18,8 +18,11 @@ use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::numbers::{Numbers, is_numbered};
 use crate::evidence::observation::{Observations, SourceId};
 use crate::evidence::publishers;
+use crate::evidence::source::equal_stamps::FirstHeader;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
+
+pub use recorded::Recorded;
 
 /// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,25 +99,32 @@ const LONGEST_TEXT: usize = 200;
 /// The cost of a payload besides its bytes, in bytes: its hash is kept.
 const PAYLOAD_ENTRY: u64 = 64;
 
+/// How the messages of a stream are read.
+#[derive(Debug)]
+struct StreamLayout {
+    /// The sources that read them.
+    readers: Vec<(SourceId, Read)>,
+    /// Their first header, whose stamp is their age.
+    header: Option<FirstHeader>,
+    /// The schema for parsing them, if they contain words or numbers that are compared.
+    schema: Option<Arc<MessageSchema>>,
+    /// Whether they are texts that are kept.
+    is_text: bool,
+}
+
 /// A collector of bags, one after another.
 #[derive(Debug, Default)]
 pub struct Collector {
     options: CollectOptions,
     streams: Vec<Stream>,
-    /// The sources that read the messages of each stream.
-    readers: Vec<Vec<(SourceId, Read)>>,
-    /// Whether the header stamps of each stream are wanted.
-    stamped: Vec<bool>,
-    /// Whether the messages of each stream begin with a header, so that they have an age.
-    aged: Vec<bool>,
-    /// The schema for parsing the messages of each stream, if they contain words or numbers.
-    schemas: Vec<Option<MessageSchema>>,
+    /// How the messages of each stream are read.
+    layouts: Vec<StreamLayout>,
+    /// The schemas of all definitions.
+    schemas: BTreeMap<Arc<str>, Arc<MessageSchema>>,
     /// The numbers in the headers of streams that have any, by index.
     numbers: BTreeMap<usize, Numbers>,
     /// The number of payload bytes compared so far.
     compared: u64,
-    /// Whether the messages of each stream are texts that are kept.
-    stated: Vec<bool>,
     texts: Vec<(Stamp, String)>,
     messages: Stamps,
     facts: Observations,
@@ -201,6 +211,14 @@ impl Collector {
         self.streams.len() + self.facts.list.len()
     }
 
+    /// The schema of a connection's definition, which is parsed once for all connections of its type.
+    fn schema(&mut self, connection: &Connection) -> Arc<MessageSchema> {
+        let definition = connection.definition.clone().unwrap_or_default();
+        let parse = |text: &Arc<str>| Arc::new(MessageSchema::of_text(text));
+        let known = self.schemas.entry(definition);
+        Arc::clone(known.or_insert_with_key(parse))
+    }
+
     /// Passes the announcement of the newest stream to every source.
     fn announced(&mut self) {
         let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
@@ -226,7 +244,9 @@ impl Collector {
             numbers.add(message.time, message.data);
         }
         let stream = &self.streams[place];
-        if self.stamped[place] {
+        if let Some(header) = self.layouts[place].header
+            && self.options.infer_stamps
+        {
             let mut context = SourceContext {
                 facts: &mut self.facts,
                 space: &self.space,
@@ -235,12 +255,12 @@ impl Collector {
                 source: 0,
                 time: Some(message.time),
             };
-            equal_stamps::collect(&mut context, message.data);
+            equal_stamps::collect(&mut context, header, message.data);
         }
         self.compare(place, message);
         self.keep_text(place, message);
         let stream = &self.streams[place];
-        for (source, read) in &self.readers[place] {
+        for (source, read) in &self.layouts[place].readers {
             let mut context = SourceContext {
                 facts: &mut self.facts,
                 space: &self.space,
@@ -260,7 +280,7 @@ impl Collector {
 
     /// Keeps the text of a message, if those of its topic were requested.
     fn keep_text(&mut self, place: usize, message: &Message<'_>) {
-        if !self.stated[place] || self.texts.len() >= MOST_TEXTS {
+        if !self.layouts[place].is_text || self.texts.len() >= MOST_TEXTS {
             return;
         }
         let encoding = &self.streams[place].connection.encoding;
@@ -296,10 +316,11 @@ impl Collector {
         };
         let compared = beginning.get(own..).unwrap_or_default();
         payload::collect(&mut context, compared, message.size);
-        if self.aged[place] {
-            equal_stamps::age(&mut context, beginning);
+        let layout = &self.layouts[place];
+        if let Some(header) = layout.header {
+            equal_stamps::age(&mut context, header, beginning);
         }
-        if let Some(schema) = &self.schemas[place]
+        if let Some(schema) = &layout.schema
             && beginning.len() == message.size as usize
         {
             echo::keep(&mut context, schema, beginning);
@@ -418,7 +439,8 @@ impl Sink for BagSink<'_> {
             is_outside: false,
             times: all.messages.series(),
         };
-        let (mut readers, foreign) = source::readers(&stream);
+        let schema = all.schema(connection);
+        let (mut readers, foreign) = source::readers(&stream, &schema);
         // It repeats the records of `/rosout` up to half a minute later, so that lists of topics would be out
         // of order.
         let own = all.bags.get(self.bag).into_iter().flatten();
@@ -431,35 +453,34 @@ impl Sink for BagSink<'_> {
             "/rosout_agg" if !of("/rosout").is_empty() => readers.clear(),
             "/rosout" => of("/rosout_agg")
                 .into_iter()
-                .for_each(|at| all.readers[at].clear()),
+                .for_each(|at| all.layouts[at].readers.clear()),
             _ => {}
         }
         if foreign {
             all.notices
                 .add(undecodable(&stream, "its definition is not the known one"));
         }
-        let aged = equal_stamps::is_stamped(connection);
-        let stamped = all.options.infer_stamps && aged;
+        let header = equal_stamps::first_header(connection, &schema);
+        let stamped = all.options.infer_stamps && header.is_some();
         let compared = all.options.payload_bytes > 0;
-        let stated = all.options.keeps_texts_of(connection);
-        let want = all.options.want(!readers.is_empty() || stated, stamped);
+        let is_text = all.options.keeps_texts_of(connection);
+        let want = all.options.want(!readers.is_empty() || is_text, stamped);
         if want == Want::Payload || stamped {
             all.read.insert(self.bag);
         }
-        if is_numbered(connection) {
+        if is_numbered(connection, &schema) {
             all.numbers.insert(all.streams.len(), Numbers::default());
         }
         if let Some(streams) = all.bags.get_mut(self.bag) {
             streams.push(all.streams.len());
         }
         all.streams.push(stream);
-        all.readers.push(readers);
-        all.stamped.push(stamped);
-        all.aged.push(aged);
-        all.stated.push(stated);
-        let definition = connection.definition.as_deref();
-        let schema = echo::schema(&connection.type_name, definition);
-        all.schemas.push(schema.filter(|_| compared));
+        all.layouts.push(StreamLayout {
+            readers,
+            header,
+            schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
+            is_text,
+        });
         all.announced();
         want
     }
@@ -486,81 +507,7 @@ impl Sink for BagSink<'_> {
     }
 }
 
-/// Everything that the bags of a mission contain about its graph.
-#[derive(Debug)]
-pub struct Recorded {
-    pub(crate) streams: Vec<Stream>,
-    pub(crate) messages: Stamps,
-    /// The numbers in the headers of streams, by index, as far as they were read.
-    pub(crate) numbers: BTreeMap<usize, Numbers>,
-    pub(crate) facts: Observations,
-    /// The texts of the requested topic, sorted by time.
-    pub texts: Vec<(Stamp, String)>,
-    /// Problems that did not stop the reading.
-    pub notices: Notices,
-    /// The points at which a recorder's clock went back, sorted by time.
-    pub(crate) falls: Vec<ClockFall>,
-    /// The credible times; `None` if all of them are.
-    pub(crate) believed: Option<Span>,
-    /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
-    /// no message.
-    pub span: Option<Span>,
-}
-
-impl Recorded {
-    /// Whether a time is credible.
-    pub(crate) fn believes(&self, time: Stamp) -> bool {
-        self.believed.is_none_or(|span| span.contains(time))
-    }
-
-    /// Marks the streams without a message in the part of the recording that was read. In a part from the
-    /// beginning on, they have no latched message yet.
-    pub(crate) fn mark_outside(&mut self, is_first: bool) {
-        for stream in &mut self.streams {
-            stream.is_outside = self.messages.bounds(stream.times).is_none();
-            stream.latched &= !(stream.is_outside && is_first);
-        }
-    }
-
-    /// Finds the span of all messages at credible times, and counts the others.
-    fn measure(&mut self) -> io::Result<Option<Span>> {
-        let mut span: Option<Span> = None;
-        let mut aside = 0;
-        for at in 0..self.streams.len() {
-            let id = self.streams[at].times;
-            let Some(bounds) = self.messages.bounds(id) else {
-                continue;
-            };
-            if self.believes(bounds.0) && self.believes(bounds.1) {
-                widen(&mut span, bounds);
-                continue;
-            }
-            let believed = self.believed;
-            self.messages.merge(&[id], |t| {
-                if believed.is_none_or(|span| span.contains(t.time)) {
-                    widen(&mut span, (t.time, t.time));
-                } else {
-                    aside += 1;
-                }
-            })?;
-        }
-        if aside > 0 {
-            self.notices.add(Notice {
-                kind: NoticeKind::ImpossibleTime,
-                count: aside,
-                text: "message at an impossible time, set aside".to_owned(),
-            });
-        }
-        Ok(span)
-    }
-}
-
-fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
-    let all = span.get_or_insert(Span::new(first, last.plus(1)));
-    all.start = all.start.min(first);
-    all.end = all.end.max(last.plus(1));
-}
-
+mod recorded;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

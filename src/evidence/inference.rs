@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
-use crate::base::name::OWN_NODE;
+use crate::base::name::{OWN_NODE, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::closed::Closed;
@@ -325,8 +325,7 @@ impl<'a> Conclusions<'a> {
     pub(crate) fn kind(&self, topic: Name) -> String {
         let first = self.recorded.get(&topic).and_then(|all| all.first());
         first.map_or_else(String::new, |at| {
-            let kind = &self.streams[*at].connection.type_name;
-            kind.replacen("/msg/", "/", 1)
+            plain_type(&self.streams[*at].connection.type_name).into_owned()
         })
     }
 

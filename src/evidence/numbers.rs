@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use crate::bag::{Connection, Encoding};
 use crate::base::rhythm::{BEGUN_AGAIN, GAP_NS};
 use crate::base::time::Stamp;
-use crate::evidence::message::definition::outline;
+use crate::evidence::message::dynamic::MessageSchema;
 
 /// The number of bytes from a payload's start to the end of its header's stamp.
 pub(crate) const HEAD: usize = 12;
@@ -106,12 +106,8 @@ impl Numbers {
 }
 
 /// Whether the messages of a connection begin with a header with a sequence number, according to its definition.
-pub(crate) fn is_numbered(connection: &Connection) -> bool {
-    let definition = connection.definition.as_deref().unwrap_or_default();
-    connection.encoding == Encoding::Ros1
-        && outline(definition)
-            .first()
-            .is_some_and(|(_, fields)| fields.starts_with("Header "))
+pub(crate) fn is_numbered(connection: &Connection, schema: &MessageSchema) -> bool {
+    connection.encoding == Encoding::Ros1 && schema.has_header()
 }
 
 #[cfg(test)]

@@ -36,12 +36,13 @@ pub(crate) mod statistics;
 pub(crate) mod tf_pair;
 pub(crate) mod topic_statistics;
 
-use crate::base::name::in_space;
+use crate::base::name::{in_space, plain_type};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, Stream};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{LayoutFit, MessageLayout};
+use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::observation::{
     Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
 };
@@ -142,14 +143,15 @@ pub(crate) type Read =
 
 /// The sources that read a connection's messages, with their readers; and whether some source knows its type by another
 /// layout.
-pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
+pub(crate) fn readers(stream: &Stream, schema: &MessageSchema) -> (Vec<(SourceId, Read)>, bool) {
+    let type_name = plain_type(&stream.connection.type_name);
     let mut readers = Vec::new();
     let mut foreign = false;
     for (id, source) in SOURCES.iter().enumerate() {
-        let fits = source
-            .reads
-            .iter()
-            .map(|(shape, read)| (read, shape.fit(&stream.connection)));
+        let fits = source.reads.iter().map(|(shape, read)| {
+            let fit = shape.fit(&stream.connection, &type_name, schema.outline());
+            (read, fit)
+        });
         let known: Vec<_> = fits
             .filter(|(_, fit)| *fit != LayoutFit::OtherType)
             .collect();

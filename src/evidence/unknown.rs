@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::name::is_quiet;
+use crate::base::name::{is_quiet, plain_type};
 use crate::base::words::count;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -29,7 +29,7 @@ pub(crate) fn conclude(known: &mut Conclusions<'_>) {
         if let Observation::Type(topic, kind) = fact.observation
             && unnamed.contains_key(&topic)
         {
-            kinds.insert(topic, known.text(kind).replacen("/msg/", "/", 1));
+            kinds.insert(topic, plain_type(&known.text(kind)).into_owned());
         }
     }
     let is_shown = |topic: &Name| {

@@ -3,6 +3,7 @@
 
 pub(crate) mod assemble;
 pub(crate) mod history;
+pub(crate) mod lifetime;
 pub(crate) mod lifetimes;
 pub(crate) mod liveness;
 pub(crate) mod measures;

@@ -69,9 +69,14 @@ pub(crate) const LOG2: MessageLayout = MessageLayout {
 };
 
 impl MessageLayout {
-    /// Whether the messages of a connection can be read.
-    pub(crate) fn fit(&self, connection: &Connection) -> LayoutFit {
-        let type_name = connection.type_name.replacen("/msg/", "/", 1);
+    /// Whether the messages of a connection, whose type is this one without `/msg`, can be read; `outline` is that of its
+    /// definition.
+    pub(crate) fn fit(
+        &self,
+        connection: &Connection,
+        type_name: &str,
+        outline: &[(String, String)],
+    ) -> LayoutFit {
         let named = match self.type_name.strip_prefix('*') {
             Some(end) => type_name.ends_with(end),
             None => type_name == self.type_name,
@@ -88,7 +93,7 @@ impl MessageLayout {
             // There is nothing to compare; a payload that is not consumed exactly is still refused.
             self.md5.is_empty() || ["", "*", self.md5].contains(&hash)
         } else {
-            self.matches(definition)
+            self.matches(outline)
         };
         if same {
             LayoutFit::Same
@@ -98,17 +103,14 @@ impl MessageLayout {
     }
 
     /// The message itself must have the fields; nested messages are compared if the definition contains them.
-    fn matches(&self, definition: &str) -> bool {
-        outline(definition)
-            .iter()
-            .enumerate()
-            .all(|(at, (name, fields))| {
-                let name = if at == 0 { "" } else { name.as_str() };
-                match self.fields.iter().find(|(known, _)| *known == name) {
-                    Some((_, known)) => fields == known,
-                    None => at != 0,
-                }
-            })
+    fn matches(&self, outline: &[(String, String)]) -> bool {
+        outline.iter().enumerate().all(|(at, (name, fields))| {
+            let name = if at == 0 { "" } else { name.as_str() };
+            match self.fields.iter().find(|(known, _)| *known == name) {
+                Some((_, known)) => fields == known,
+                None => at != 0,
+            }
+        })
     }
 }
 

@@ -61,18 +61,30 @@ impl MessageSchema {
         Self(outline(definition))
     }
 
-    /// The schema of a definition's text, if the message itself contains strings or integers.
-    pub(crate) fn of_words(definition: &str) -> Option<Self> {
+    /// The messages in it, as [`outline`] lists them.
+    pub(crate) fn outline(&self) -> &[(String, String)] {
+        &self.0
+    }
+
+    /// The fields of the message itself.
+    fn own(&self) -> &str {
+        self.0.first().map_or("", |(_, fields)| fields)
+    }
+
+    /// Whether the message begins with a header.
+    pub(crate) fn has_header(&self) -> bool {
+        self.own().starts_with("Header ")
+    }
+
+    /// Whether the message itself contains strings or integers.
+    pub(crate) fn has_words(&self) -> bool {
         const KINDS: [&str; 7] = [
             "string", "int16", "uint16", "int32", "uint32", "int64", "uint64",
         ];
-        let schema = Self::of_text(definition);
-        let (_, own) = schema.0.first()?;
-        let holds = own.split(';').any(|field| {
+        self.own().split(';').any(|field| {
             let kind = field.split(' ').next().unwrap_or_default();
             KINDS.contains(&kind)
-        });
-        holds.then_some(schema)
+        })
     }
 
     /// A built-in schema: the message's fields under the empty name, then those of the messages inside it.
@@ -99,8 +111,7 @@ impl MessageSchema {
         &self,
         payload: &mut PayloadCursor<'_>,
     ) -> PayloadResult<MessageValue> {
-        let fields = self.0.first().map_or("", |(_, fields)| fields);
-        self.fields(payload, fields, 0)
+        self.fields(payload, self.own(), 0)
     }
 
     fn fields(

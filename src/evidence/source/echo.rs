@@ -3,9 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::SourceContext;
-use crate::base::name::in_space;
+use crate::base::name::{in_space, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
@@ -70,10 +71,10 @@ pub(crate) fn keep(context: &mut SourceContext<'_>, schema: &MessageSchema, payl
     }
 }
 
-/// The schema for parsing the messages of a connection; `None` for those without words or numbers of their
-/// own.
-pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<MessageSchema> {
-    let plain = type_name.replacen("/msg/", "/", 1);
+/// The schema for parsing the messages of a type, whose definition has this one; `None` for those without words or numbers of
+/// their own.
+pub(crate) fn schema(type_name: &str, defined: &Arc<MessageSchema>) -> Option<Arc<MessageSchema>> {
+    let plain = plain_type(type_name);
     if [
         "rosgraph_msgs/",
         "rcl_interfaces/",
@@ -87,14 +88,14 @@ pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<Messag
     {
         return None;
     }
-    let known = match plain.as_str() {
+    let known = match &*plain {
         "std_msgs/String" => "string data",
         "std_msgs/Int32" => "int32 data",
         "std_msgs/Int64" | "example_interfaces/Int64" => "int64 data",
         "std_msgs/UInt32" => "uint32 data",
-        _ => return MessageSchema::of_words(definition?),
+        _ => return defined.has_words().then(|| Arc::clone(defined)),
     };
-    Some(MessageSchema::of_fields(&[("", known)]))
+    Some(Arc::new(MessageSchema::of_fields(&[("", known)])))
 }
 
 /// The words and whole numbers directly in a message.

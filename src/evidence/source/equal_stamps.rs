@@ -9,11 +9,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
 use crate::bag::{Connection, Encoding};
+use crate::base::name::plain_type;
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::PayloadCursor;
-use crate::evidence::message::definition::outline;
+use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::observation::{Name, Observation, ObservationRecord, SourceId};
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
@@ -45,33 +46,37 @@ const LISTS: [&str; 3] = [
     "visualization_msgs/MarkerArray",
 ];
 
-/// Whether a connection's messages begin with a header, or with a list of such elements, as far as known.
-pub(crate) fn is_stamped(connection: &Connection) -> bool {
-    if LOGS.contains(&connection.topic.as_str()) {
-        return false;
-    }
-    let definition = connection.definition.as_deref().unwrap_or_default();
-    if definition.trim().is_empty() || is_list(connection) {
-        let kind = &connection.type_name;
-        return kind.starts_with("sensor_msgs/")
-            || kind.ends_with("Stamped")
-            || is_list(connection);
-    }
-    let fields = outline(definition);
-    fields
-        .first()
-        .is_some_and(|(_, fields)| fields.starts_with("Header "))
+/// The place of the first header in a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FirstHeader {
+    /// The message begins with it.
+    Own,
+    /// The first element of the list at the beginning of the message begins with it.
+    OfList,
 }
 
-fn is_list(connection: &Connection) -> bool {
-    LISTS.contains(&connection.type_name.replacen("/msg/", "/", 1).as_str())
+/// Where the messages of a connection have their first header, as far as known; `None` if they do not begin with one.
+pub(crate) fn first_header(connection: &Connection, schema: &MessageSchema) -> Option<FirstHeader> {
+    if LOGS.contains(&connection.topic.as_str()) {
+        return None;
+    }
+    let type_name = &*connection.type_name;
+    if LISTS.contains(&&*plain_type(type_name)) {
+        return Some(FirstHeader::OfList);
+    }
+    let definition = connection.definition.as_deref().unwrap_or_default();
+    let has_header = if definition.trim().is_empty() {
+        type_name.starts_with("sensor_msgs/") || type_name.ends_with("Stamped")
+    } else {
+        schema.has_header()
+    };
+    has_header.then_some(FirstHeader::Own)
 }
 
 /// The stamp at the beginning of a message; `None` for an empty list and for 0.
-fn stamp(connection: &Connection, first_bytes: &[u8]) -> Option<Stamp> {
-    let encoding = &connection.encoding;
+fn stamp(encoding: &Encoding, header: FirstHeader, first_bytes: &[u8]) -> Option<Stamp> {
     let stamp = PayloadCursor::new(encoding, first_bytes).and_then(|mut payload| {
-        if is_list(connection) && payload.u32()? == 0 {
+        if header == FirstHeader::OfList && payload.u32()? == 0 {
             return Ok(Stamp(0));
         }
         if *encoding == Encoding::Ros1 {
@@ -83,19 +88,17 @@ fn stamp(connection: &Connection, first_bytes: &[u8]) -> Option<Stamp> {
 }
 
 /// Keeps the age of a message by its stamp.
-pub(crate) fn age(context: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    if let (Some(stamp), Some(time)) =
-        (stamp(&context.stream.connection, first_bytes), context.time)
-    {
+pub(crate) fn age(context: &mut SourceContext<'_>, header: FirstHeader, first_bytes: &[u8]) {
+    let encoding = &context.stream.connection.encoding;
+    if let (Some(stamp), Some(time)) = (stamp(encoding, header, first_bytes), context.time) {
         context.facts.age(context.place, time, stamp);
     }
 }
 
 /// Keeps the stamp of a message, together with its log time.
-pub(crate) fn collect(context: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    if let (Some(stamp), Some(time)) =
-        (stamp(&context.stream.connection, first_bytes), context.time)
-    {
+pub(crate) fn collect(context: &mut SourceContext<'_>, header: FirstHeader, first_bytes: &[u8]) {
+    let encoding = &context.stream.connection.encoding;
+    if let (Some(stamp), Some(time)) = (stamp(encoding, header, first_bytes), context.time) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

@@ -2,6 +2,7 @@
 
 use super::node::limited;
 use super::{Judge, absence};
+use crate::base::name::plain_type;
 use crate::base::words;
 use crate::evidence::Confidence;
 use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
@@ -173,8 +174,11 @@ impl Judge<'_> {
     fn kind(&self, topic: TopicId, kinds: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
         let types = &self.facts.mission.elements.topics[topic as usize].types;
         let expected: Vec<&str> = kinds.value.iter().map(|k| k.value.as_str()).collect();
-        let plain = |text: &str| text.replace("/msg/", "/");
-        let is_other = |t: &&str| expected.iter().all(|kind| plain(kind) != plain(t));
+        let is_other = |t: &&str| {
+            expected
+                .iter()
+                .all(|kind| plain_type(kind) != plain_type(t))
+        };
         let other: Vec<&str> = types.iter().map(|t| &**t).filter(is_other).collect();
         let name = self.facts.topic(topic);
         let expected = words::some_of(&expected, NAMED);

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
+use super::lifetime::Lifetime;
 use super::lifetimes::compute_lifetimes;
-use super::liveness::{Lifetime, Liveness};
+use super::liveness::Liveness;
 use super::merged::fall_silent;
 use super::recordings::{doubled, hide, pauses, unseen};
 use super::restarts::restarts;

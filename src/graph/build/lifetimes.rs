@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use super::liveness::Lifetime;
+use super::lifetime::Lifetime;
 use super::restarts::Restarts;
 use super::tracks::Tracks;
 use crate::base::time::Stamp;

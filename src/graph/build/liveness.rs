@@ -3,10 +3,10 @@
 
 use std::rc::Rc;
 
+use super::lifetime::{Lifetime, lives};
 use super::restarts::Restart;
 use crate::base::rhythm::{
-    ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, GONE_NS, REGISTRATION_NS,
-    SHUTDOWN_NS, UNUSUAL,
+    ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, GONE_NS, SHUTDOWN_NS, UNUSUAL,
 };
 use crate::base::time::Stamp;
 use crate::evidence::{Confidence, Evidence};
@@ -21,17 +21,6 @@ pub(crate) enum Extent {
     Whole,
     /// The whole mission, regardless of signs.
     Always,
-}
-
-/// A period of existence, both ends included.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Lifetime {
-    pub(crate) from: Stamp,
-    pub(crate) to: Stamp,
-    /// The first sign of it.
-    pub(crate) sign: Stamp,
-    pub(crate) began: Option<Bound>,
-    pub(crate) ended: Option<Bound>,
 }
 
 /// The rhythm of an element's messages in the last stretch.
@@ -228,7 +217,7 @@ impl Liveness {
         self.ends.sort_unstable();
         self.ends.dedup();
         if self.is_whole() {
-            self.lives = vec![whole(mission)].into();
+            self.lives = vec![Lifetime::whole(mission)].into();
             return;
         }
         let mut lives = lives(&self.signs, &self.ends);
@@ -406,129 +395,9 @@ impl Liveness {
     }
 }
 
-/// A lifetime of the whole mission.
-pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {
-    Lifetime {
-        from: mission.0,
-        to: mission.1,
-        sign: mission.0,
-        began: None,
-        ended: None,
-    }
-}
-
-impl Lifetime {
-    fn at(sign: Stamp) -> Self {
-        Self {
-            from: sign,
-            to: sign,
-            sign,
-            began: Some(Bound {
-                time: sign,
-                earliest: Stamp::MIN,
-                latest: sign,
-            }),
-            ended: None,
-        }
-    }
-
-    /// Ends the lifetime because of evidence.
-    fn close(&mut self, end: Stamp) {
-        let last = self.to;
-        self.to = end.max(last);
-        self.ended = Some(Bound {
-            time: self.to,
-            earliest: last,
-            latest: self.to,
-        });
-    }
-
-    /// Sets the beginning of a first lifetime: with a rhythm it began shortly before its first sign.
-    /// `recording` is the start of its own recording, one of several; without evidence it began before.
-    fn begin(&mut self, mission: Stamp, recording: Stamp, period: Option<i64>, is_proved: bool) {
-        let late = period.unwrap_or(0);
-        if !is_proved || self.from.since(recording) <= FOUND_NS.saturating_add(late) {
-            (self.from, self.began) = (mission, None);
-        } else if let Some(began) = &mut self.began {
-            let sooner = DISCOVERY_NS.saturating_add(late);
-            began.earliest = period.map_or(mission, |_| self.from.plus(-sooner));
-        }
-    }
-
-    /// Sets the beginning of an edge's first lifetime inside its node's; `absent` is the first moment at
-    /// which it may exist, if known.
-    fn begin_within(&mut self, around: &Self, absent: Option<Stamp>, stated: bool) {
-        let registered = around.from.plus(REGISTRATION_NS);
-        match absent {
-            Some(absent) => {
-                if stated {
-                    self.from = absent.max(registered).min(self.from);
-                }
-                if let Some(began) = &mut self.began {
-                    began.earliest = absent;
-                }
-            }
-            None if stated || self.from.since(around.sign) <= ADVERTISED_NS => {
-                (self.from, self.began) = (around.from, around.began);
-            }
-            None => {
-                if let Some(began) = &mut self.began {
-                    began.earliest = around.from;
-                }
-            }
-        }
-    }
-}
-
-/// Lifetimes between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it.
-/// The true end lies between the evidence and the sign before, the true beginning between the sign and the
-/// end before.
-fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
-    let mut lives: Vec<Lifetime> = Vec::new();
-    let mut ends = ends.iter().copied().peekable();
-    let (mut open, mut gone) = (false, Stamp::MIN);
-    for sign in signs {
-        while let Some(end) = ends.next_if(|end| end < sign) {
-            if let Some(life) = lives.last_mut().filter(|_| open) {
-                life.close(end);
-            }
-            (open, gone) = (false, end);
-        }
-        match lives.last_mut() {
-            Some(life) if open => life.to = *sign,
-            _ => {
-                let mut life = Lifetime::at(*sign);
-                life.began = life.began.map(|b| Bound {
-                    earliest: gone,
-                    ..b
-                });
-                lives.push(life);
-            }
-        }
-        open = true;
-    }
-    if let (Some(life), Some(end)) = (lives.last_mut(), ends.next()) {
-        life.close(end);
-    }
-    lives.shrink_to_fit();
-    lives
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn stretches(signs: &[i64], ends: &[i64]) -> Vec<(i64, i64)> {
-        let stamps = |list: &[i64]| list.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
-        let lives = lives(&stamps(signs), &stamps(ends));
-        lives.iter().map(|l| (l.from.0, l.to.0)).collect()
-    }
-
-    #[test]
-    fn a_lifetime_spans_its_signs() {
-        assert_eq!(stretches(&[1, 5, 9], &[]), [(1, 9)]);
-        assert_eq!(stretches(&[], &[4]), []);
-    }
 
     #[test]
     fn statistics_date_a_subscription_before_the_list_without_it() {
@@ -541,17 +410,10 @@ mod tests {
             // A list without it at 10 s, statistics at 30 s, a list with it at 60 s.
             edge.sign_all(&[stamp(30), stamp(60)], &[stamp(10)]);
             edge.counted = counted;
-            edge.live_within(&vec![whole((stamp(0), stamp(90)))].into());
+            edge.live_within(&vec![Lifetime::whole((stamp(0), stamp(90)))].into());
             edge.lives[0].from
         };
         assert_eq!(began(Vec::new()), stamp(10).plus(1));
         assert_eq!(began(vec![stamp(30)]), stamp(30));
-    }
-
-    #[test]
-    fn an_end_closes_a_lifetime_and_the_next_sign_begins_another() {
-        assert_eq!(stretches(&[1, 5, 9, 10], &[6]), [(1, 6), (9, 10)]);
-        assert_eq!(stretches(&[1, 5], &[0, 7, 8]), [(1, 7)]);
-        assert_eq!(stretches(&[1, 5], &[5]), [(1, 5)]);
     }
 }

@@ -113,22 +113,9 @@ impl Serialize for Json<'_> {
         }
         let phases = mission.log.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
-        let all = &mission.elements;
-        let window = |(window, graph)| WindowOf {
-            window,
-            graph,
-            elements: all,
-        };
         let elements = elements(mission, self.is_runs());
         map.serialize_entry("elements", &List(elements))?;
-        if self.is_runs() {
-            let windows = mission.windows.iter().map(|w| window((w, None)));
-            map.serialize_entry("windows", &List(windows))?;
-        } else {
-            let windows = mission.windows.iter();
-            let windows = windows.zip(mission.graphs.iter().map(Some)).map(window);
-            map.serialize_entry("windows", &List(windows))?;
-        }
+        map.serialize_entry("windows", &Windows(self))?;
         if let Some(places) = places {
             map.serialize_entry("layout", places)?;
         }
@@ -166,6 +153,26 @@ impl<'a> BagJson<'a> {
             complete: Some(bag.complete),
             file_bytes: bag.file_bytes,
         }
+    }
+}
+
+/// All windows.
+struct Windows<'a>(&'a Json<'a>);
+
+impl Serialize for Windows<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mission = self.0.mission;
+        let mut seq = serializer.serialize_seq(None)?;
+        // Not a `List`, which would need a second iterator over the graphs: each has a cursor for every element.
+        let mut graphs = (!self.0.is_runs()).then(|| mission.graphs.iter());
+        for window in &mission.windows {
+            seq.serialize_element(&WindowOf {
+                window,
+                graph: graphs.as_mut().and_then(Iterator::next),
+                elements: &mission.elements,
+            })?;
+        }
+        seq.end()
     }
 }
 
