@@ -1,4 +1,4 @@
-//! Tests of the jobs in `examples/ci/`: their commands run and reproduce the stored outputs.
+//! Tests of the jobs in `examples/ci/`, whose commands run and reproduce the stored outputs, and of what is packaged.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -205,4 +205,52 @@ fn the_action_only_runs_an_archive_with_the_right_checksum() {
     assert!(!done && path.is_empty(), "{said}");
     assert!(!said.contains("hello from"), "{said}");
     assert!(!dir.path().join("temp/bagreel-0.1.0").join(name).exists());
+}
+
+/// All files below a folder.
+fn below(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    let of = |path: PathBuf| {
+        if path.is_dir() {
+            below(&path)
+        } else {
+            vec![path]
+        }
+    };
+    entries.flat_map(of).collect()
+}
+
+#[test]
+fn the_packed_crate_contains_every_file_that_the_source_includes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let listed = Command::new(std::env::var_os("CARGO").unwrap())
+        .args(["package", "--list", "--allow-dirty", "--offline"])
+        .current_dir(root)
+        .output()
+        .unwrap();
+    assert!(
+        listed.status.success(),
+        "{}",
+        String::from_utf8_lossy(&listed.stderr)
+    );
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let packed: Vec<PathBuf> = listed.lines().map(|line| root.join(line)).collect();
+    let mut included = 0;
+    for file in below(&root.join("src")) {
+        let Ok(text) = fs::read_to_string(&file) else {
+            continue;
+        };
+        for part in text
+            .split("include_str!(\"")
+            .chain(text.split("include_bytes!(\""))
+        {
+            let path = file.with_file_name(part.split('"').next().unwrap());
+            if path.is_file() && file.extension().is_some_and(|e| e == "rs") && path != file {
+                let path = path.canonicalize().unwrap();
+                assert!(packed.contains(&path), "{} is not packed", path.display());
+                included += 1;
+            }
+        }
+    }
+    assert!(included > 15, "{included} files are included");
 }

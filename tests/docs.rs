@@ -8,6 +8,8 @@ use std::process::{Command, Output};
 use bagreel::internals::evidence::SOURCES;
 use bagreel::internals::export::FORMATS;
 
+use crate::support::browser;
+
 const README: &str = include_str!("../README.md");
 
 fn root() -> &'static Path {
@@ -138,6 +140,16 @@ fn readme_begins_with_the_two_commands() {
 }
 
 #[test]
+fn readme_shows_the_chart_of_the_example_report() {
+    let report = fs::read_to_string(root().join("examples/ci/out/summary.md")).unwrap();
+    let chart = |text: &str| {
+        let chart = text.split("```mermaid\n").nth(1).unwrap();
+        chart.split("```").next().unwrap().to_owned()
+    };
+    assert_eq!(chart(README), chart(&report));
+}
+
+#[test]
 fn docs_list_every_output_format_and_every_kind_of_evidence() {
     let rows = first_cells(&chapter("outputs.md"), "| extension | output |");
     let formats: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
@@ -223,7 +235,7 @@ fn is_svg(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|e| e == "svg")
 }
 
-/// Only the SVG pictures: the page is a screenshot (`tests/browser/page.py`).
+/// Only the SVG pictures: the page is a screenshot.
 #[test]
 fn readme_pictures_are_drawn_by_the_commands_below_them() {
     let (dir, mut shown) = (folder(), 0);
@@ -242,6 +254,43 @@ fn readme_pictures_are_drawn_by_the_commands_below_them() {
         }
     }
     assert_eq!(shown, 2);
+}
+
+/// The mean brightness of each square of 8 × 8 pixels: letters of another font are as dark as those of this one.
+fn squares(picture: &[u8]) -> Vec<f64> {
+    let grey = image::load_from_memory(picture).unwrap().into_luma8();
+    let (width, height) = (grey.width() / 8, grey.height() / 8);
+    let mut squares = vec![0.0; (width * height) as usize];
+    for (x, y, pixel) in grey.enumerate_pixels() {
+        if x / 8 < width && y / 8 < height {
+            squares[(y / 8 * width + x / 8) as usize] += f64::from(pixel.0[0]) / 64.0;
+        }
+    }
+    squares
+}
+
+#[test]
+fn readme_picture_of_the_page_is_current() {
+    let dir = folder();
+    let (_, rest) = README.split_once("page.webp").unwrap();
+    let output = run(commands(rest)[0], dir.path());
+    assert!(output.status.success(), "{output:?}");
+    let taken = dir.path().join("page.webp");
+    browser::drive("page.py", [dir.path().join("run.html"), taken.clone()]);
+    let Ok(taken) = fs::read(taken) else {
+        return;
+    };
+    let shown = fs::read(root().join("docs/src/images/page.webp")).unwrap();
+    let (taken, shown) = (squares(&taken), squares(&shown));
+    assert_eq!(taken.len(), shown.len());
+    let pairs = taken.iter().zip(&shown);
+    let other = pairs.filter(|(a, b)| (*a - *b).abs() > 16.0).count();
+    let share = other as f64 / shown.len() as f64;
+    assert!(
+        share < 0.02,
+        "{:.1} % of the picture differ: tests/browser/page.py takes it anew",
+        share * 100.0
+    );
 }
 
 /// The anchor that mdBook and GitHub give to a heading.
