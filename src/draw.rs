@@ -1,6 +1,5 @@
 //! Drawings as values: style, measured text and the scene of each window; painters are in `paint`.
 
-pub(crate) mod board;
 pub(crate) mod figure;
 pub(crate) mod paint;
 pub mod picture;
@@ -8,3 +7,4 @@ pub mod scene;
 pub mod strip;
 pub mod style;
 pub mod text;
+pub(crate) mod topic_timeline;

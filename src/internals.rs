@@ -33,7 +33,7 @@ pub mod mission {
 #[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
-        CardRow, Counts, Frame, Headline, Mark, SeenWindow, Showing, Shown, View, ViewOptions, view,
+        CardRow, Counts, Frame, Headline, Looks, Mark, SeenWindow, Shown, View, ViewOptions, view,
     };
 }
 

@@ -29,7 +29,7 @@ pub enum Outline {
     /// The ellipse inside the box.
     Ellipse,
     /// The box with its shorter sides rounded to half circles.
-    Pill,
+    Capsule,
     /// The box itself.
     Box,
 }
@@ -45,7 +45,7 @@ impl Outline {
                 let off = off / (across / 2.0).max(1e-9);
                 half * (1.0 - off * off).max(0.0).sqrt()
             }
-            Self::Pill => {
+            Self::Capsule => {
                 let radius = half.min(across / 2.0);
                 let off = (off.abs() - (across / 2.0 - radius)).max(0.0);
                 half - radius + (radius * radius - off * off).max(0.0).sqrt()

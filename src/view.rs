@@ -20,6 +20,7 @@ mod homes;
 mod items;
 mod lasting;
 mod lives;
+pub(crate) mod looks;
 mod marks;
 mod names;
 mod nothing;
@@ -28,9 +29,8 @@ mod replicas;
 mod roles;
 pub(crate) mod runs;
 mod select;
-mod settle;
-pub(crate) mod showing;
 mod shown;
+mod stable;
 mod state;
 mod turn;
 pub(crate) mod union;
@@ -49,10 +49,10 @@ pub(crate) use filtered::filtered;
 pub(crate) use frame::Phrase;
 pub use frame::{Frame, Headline};
 pub(crate) use lasting::Lasting;
+pub use looks::Looks;
+pub(crate) use looks::TopicRow;
 pub(crate) use nothing::{nothing, unmatched};
 pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
-pub use showing::Showing;
-pub(crate) use showing::TopicRow;
 pub(crate) use shown::Members;
 use shown::sum;
 pub use shown::{Mark, Shown};
@@ -197,12 +197,12 @@ pub struct AlsoHere {
     /// The nodes, then the topics, each sorted by name.
     pub items: Vec<Item>,
     /// The looks of each, window by window.
-    pub shown: Vec<Showing>,
+    pub shown: Vec<Looks>,
 }
 
 /// The presence of one of several equal namespaces in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Attendance {
+pub enum MemberState {
     /// Absent.
     Away,
     /// Present from the beginning to the end.
@@ -213,7 +213,7 @@ pub enum Attendance {
     Left,
 }
 
-impl Attendance {
+impl MemberState {
     /// Whether it is present at the end.
     pub(crate) fn is_here(self) -> bool {
         matches!(self, Self::Here | Self::Joined)
@@ -359,9 +359,9 @@ pub struct View {
     /// The windows.
     pub frames: Vec<Frame>,
     /// The looks of each item, window by window.
-    pub items_shown: Vec<Showing>,
+    pub items_shown: Vec<Looks>,
     /// The looks of each arrow, window by window.
-    pub arrows_shown: Vec<Showing>,
+    pub arrows_shown: Vec<Looks>,
     /// Whether two missions are compared, A and B, so that times, windows and the timeline are meaningless;
     /// the first of the two windows is A alone.
     pub compares: bool,
@@ -407,7 +407,7 @@ impl View {
 
     /// The items and arrows visible in window `k`; none past the last one.
     pub fn seen(&self, k: usize) -> SeenWindow {
-        let of = |all: &[Showing]| {
+        let of = |all: &[Looks]| {
             let there = all.iter().filter_map(|one| one.at(k));
             there.cloned().collect()
         };
@@ -418,7 +418,7 @@ impl View {
     }
 
     /// The look of an element in window `k` as drawn, without a colour if the frame of a crowd has it.
-    pub(crate) fn calm_at(&self, shown: &Showing, k: usize) -> Option<Shown> {
+    pub(crate) fn calm_at(&self, shown: &Looks, k: usize) -> Option<Shown> {
         let mut shown = shown.at(k)?.clone();
         self.frames.get(k)?.calm(&mut shown);
         Some(shown)
@@ -429,7 +429,7 @@ impl View {
         let all = self.items_shown.iter().chain(&self.arrows_shown);
         let also = self.also.iter().flat_map(|also| &also.shown);
         let rows = self.rows.iter().map(|row| &row.shown);
-        all.chain(also).chain(rows).flat_map(Showing::looks)
+        all.chain(also).chain(rows).flat_map(Looks::distinct)
     }
 
     /// The index of the window with most headlines, the first of several; [`View::busiest`] if there are
@@ -458,14 +458,14 @@ impl View {
         // The increase since the previous window.
         let mut more = vec![0_i64; self.frames.len()];
         let rows = self.rows.iter().map(|row| &row.shown);
-        for showing in self
+        for looks in self
             .items_shown
             .iter()
             .chain(&self.arrows_shown)
             .chain(rows)
         {
             let mut was = false;
-            for (window, shown) in showing.runs() {
+            for (window, shown) in looks.runs() {
                 let is = shown.is_some_and(is_there);
                 if let Some(more) = more.get_mut(window as usize) {
                     *more += i64::from(is) - i64::from(was);

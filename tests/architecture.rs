@@ -42,8 +42,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["event_log"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
     ("view", &[
-        &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "names", "replicas", "roles", "runs", "showing", "shown"],
-        &["cards", "settle"],
+        &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "looks", "names", "replicas", "roles", "runs", "shown"],
+        &["cards", "stable"],
         &["union"],
         &["options"],
         &["group", "select"],
@@ -55,7 +55,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["crowds", "filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "route", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["board", "paint", "strip"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip", "topic_timeline"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],

@@ -172,7 +172,7 @@ fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), a
         shown[place(&row[0])] = row[1].as_u64().unwrap();
     }
     let numbers: Vec<u64> = expected.iter().map(|shown| shown.len() as u64).collect();
-    assert_eq!(shown, numbers, "chips of the page of {at}");
+    assert_eq!(shown, numbers, "counts on the page of {at}");
     let graph = &data["graphs"][0];
     let classes: Vec<&str> = graph["classes"]
         .as_array()

@@ -179,7 +179,7 @@ fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
         match plan.vertices[v].outline {
             Outline::Box => x.abs().max(y.abs()) <= 1.0,
             Outline::Ellipse => x * x + y * y <= 1.0,
-            Outline::Pill => dx * dx + dy * dy <= cap * cap,
+            Outline::Capsule => dx * dx + dy * dy <= cap * cap,
         }
     };
     within(1.0) && !within(-1.0)

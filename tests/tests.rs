@@ -9,7 +9,6 @@
 )]
 
 mod architecture;
-mod board;
 mod boxes;
 mod causes;
 mod ci;
@@ -50,5 +49,6 @@ mod support;
 mod tables;
 mod telling;
 mod terminal;
+mod topic_timeline;
 mod values;
 mod warehouse;

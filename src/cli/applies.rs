@@ -56,7 +56,7 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Whether the output shows one window at a time, each with its own furniture.
+    /// Whether the output shows one window at a time, each with its own title.
     fn is_window(&self, output: &Output) -> bool {
         let is_one = output.target.is_numbered() || self.args.time.period == Some(Length::All);
         match output.format.word {

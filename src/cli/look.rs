@@ -141,7 +141,7 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
             format!("`{flag}` has no effect on a topic timeline"),
             "omit it, or use `--view graph`",
         )),
-        (Some("board"), None) => Ok(Body::Board),
+        (Some("board"), None) => Ok(Body::TopicTimeline),
         (None, None) => Ok(Body::Auto),
         _ => Ok(Body::Graph),
     }

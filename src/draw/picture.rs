@@ -5,8 +5,8 @@ mod arrows;
 mod badge;
 mod boxes;
 mod card;
-mod chips;
-pub(crate) use chips::chips;
+mod texts;
+pub(crate) use texts::change_counts;
 mod course;
 mod gates;
 mod ids;
@@ -272,7 +272,7 @@ impl<'a> Picture<'a> {
         };
         self.graph((k, frame), &measured.view.calm(k), &mut scene.groups);
         if !measured.options.bare {
-            self.furniture(k, frame, &mut scene.groups);
+            self.decorations(k, frame, &mut scene.groups);
         }
         measured.options.title().clone_into(&mut scene.title);
         if !measured.view.compares {
@@ -312,7 +312,7 @@ impl<'a> Picture<'a> {
         groups
     }
 
-    fn furniture(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
+    fn decorations(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
         // The timeline names the phase, if there is one.
         let is_named = !self.measured.options.course.phases.is_empty();
         let phase = self

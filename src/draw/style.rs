@@ -115,7 +115,7 @@ sections! {
     Inferred { dash: Vec<f64> }
     Change { glow: Color, color: Color, fill: Color, text: Color, width: f64, dash: Vec<f64> }
     Badge { glow: f64, radius: f64, sign: Color, halo: Color }
-    Chip {
+    CountBadge {
         added: Color, added_text: Color, removed: Color, removed_text: Color, changed: Color, changed_text: Color,
     }
 }
@@ -141,7 +141,7 @@ pub struct Style {
     pub(crate) removed: Change,
     pub(crate) changed: Change,
     pub(crate) badge: Badge,
-    pub(crate) chip: Chip,
+    pub(crate) count: CountBadge,
     #[serde(skip)]
     palette: Vec<Color>,
 }
@@ -171,7 +171,7 @@ impl Style {
 impl Body {
     /// Whether nodes are rounded boxes; otherwise ellipses, as in `rqt_graph`, if the corners of other boxes
     /// are not rounded either.
-    pub(crate) fn is_pill(&self) -> bool {
+    pub(crate) fn is_capsule(&self) -> bool {
         self.radius > 0.0
     }
 
@@ -480,13 +480,13 @@ mod tests {
                 pairs.push((3.0, quiet.stroke, graph.to_vec()));
                 pairs.push((4.5, quiet.text, graph.to_vec()));
             }
-            let chip = &style.chip;
-            let chips = [
-                (chip.added_text, chip.added),
-                (chip.removed_text, chip.removed),
-                (chip.changed_text, chip.changed),
+            let count = &style.count;
+            let counts = [
+                (count.added_text, count.added),
+                (count.removed_text, count.removed),
+                (count.changed_text, count.changed),
             ];
-            pairs.extend(chips.map(|(text, fill)| (4.5, text, vec![fill])));
+            pairs.extend(counts.map(|(text, fill)| (4.5, text, vec![fill])));
             for change in [&style.added, &style.removed, &style.changed] {
                 let fill = or_page(change.fill);
                 pairs.push((4.5, change.text, vec![fill]));

@@ -35,10 +35,10 @@ const BETWEEN: f64 = 2.4;
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
-const PILL: f64 = 3.5;
+const LABEL: f64 = 3.5;
 
 /// A topic timeline ready to be drawn, one scene per window.
-pub(crate) struct Board<'a> {
+pub(crate) struct TopicTimeline<'a> {
     view: &'a View,
     source: &'a FigureSource<'a>,
     style: &'a Style,
@@ -69,7 +69,7 @@ pub struct Overview {
     pub title: String,
 }
 
-impl<'a> Board<'a> {
+impl<'a> TopicTimeline<'a> {
     /// The timeline of the nodes and topics that pass the filters of `source`. Unless `is_sized`, the page
     /// grows until all topics are legible; topics that still do not fit are counted.
     pub(crate) fn new(
@@ -104,7 +104,7 @@ impl<'a> Board<'a> {
         }
         let mission = source.mission;
         let window = |start| mission.windows.partition_point(|w| w.span.start < start);
-        let mut board = Self {
+        let mut timeline = Self {
             title: Title::new(style, fonts, &page, view, &options),
             windows: view.frames.iter().map(|f| window(f.span.start)).collect(),
             ground: Vec::new(),
@@ -119,8 +119,8 @@ impl<'a> Board<'a> {
             place,
             left_out,
         };
-        board.ground = board.ground();
-        board
+        timeline.ground = timeline.ground();
+        timeline
     }
 
     /// Remarks for the user; lower case, no period.
@@ -215,7 +215,7 @@ impl<'a> Board<'a> {
         let mut canvas = self.canvas();
         let end = self.lives.draw(&mut canvas, &self.place);
         canvas.begin("why");
-        let y = end + PILL + 1.6 + self.sizes.line() / 2.0;
+        let y = end + LABEL + 1.6 + self.sizes.line() / 2.0;
         let wide = self.options.size.w / self.scale - 2.0 * self.place.left;
         let text = canvas.cut(&self.why(), Type::Small, wide);
         canvas.text(self.place.left, y, Type::Small, ink::QUIET, &text);
@@ -311,7 +311,7 @@ impl<'a> Board<'a> {
         if all.is_empty() {
             return;
         }
-        let y = self.lives.bottom(canvas, &self.place) + self.sizes.line() + 2.0 + PILL / 2.0;
+        let y = self.lives.bottom(canvas, &self.place) + self.sizes.line() + 2.0 + LABEL / 2.0;
         canvas.text(self.place.left, y, Type::Small, ink::QUIET, "nodes known");
         let mut x = self.place.axis.left;
         let end = self.options.size.w / self.scale - self.place.left;
@@ -328,8 +328,13 @@ impl<'a> Board<'a> {
             } else {
                 (ink::PAPER, ink::QUIET)
             };
-            let place = Rect::new(x, y - PILL / 2.0, wide, PILL);
-            canvas.frame(place, PILL / 2.0, fill, &Stroke::solid(ink::RULE, HAIRLINE));
+            let place = Rect::new(x, y - LABEL / 2.0, wide, LABEL);
+            canvas.frame(
+                place,
+                LABEL / 2.0,
+                fill,
+                &Stroke::solid(ink::RULE, HAIRLINE),
+            );
             canvas.text(x + 1.2, y, Type::Small, color, role);
             x += wide + 1.4;
         }

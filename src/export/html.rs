@@ -14,7 +14,6 @@ use crate::base::digest;
 use crate::base::notice::NoticeKind;
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::board::Overview;
 use crate::draw::paint::classes::{self, Classes, ElementLook};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
@@ -22,6 +21,7 @@ use crate::draw::picture::title::SIDES;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;
+use crate::draw::topic_timeline::Overview;
 use crate::export::sequence::Sequence;
 use crate::view::View;
 use crate::view::runs::{ElementRuns, Runs, at};
@@ -206,7 +206,7 @@ impl HtmlPage<'_> {
 
     fn graphs(&self, still: usize) -> String {
         if let Some(overview) = self.overview {
-            return board(overview);
+            return timeline(overview);
         }
         let mut xml = Xml::with_capacity(1 << 16);
         let is_hidden = self.folded.is_some();
@@ -294,7 +294,7 @@ impl HtmlPage<'_> {
 }
 
 /// The timeline of topics, for readers without scripts: the player draws it as its timeline.
-fn board(overview: &Overview) -> String {
+fn timeline(overview: &Overview) -> String {
     let still = svg::write(&overview.scene);
     let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
     let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);

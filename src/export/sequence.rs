@@ -2,16 +2,16 @@
 
 pub use super::options::SequenceOptions;
 
-pub use crate::draw::board::Overview;
 pub use crate::draw::figure::course::LifeLines;
+pub use crate::draw::topic_timeline::Overview;
 
 use crate::base::notice::Notices;
-use crate::draw::board::Board;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Picture, Union};
 use crate::draw::scene::Scene;
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
+use crate::draw::topic_timeline::TopicTimeline;
 use crate::mission::{Mission, Places};
 use crate::view::{Frame, View};
 
@@ -63,7 +63,7 @@ impl Drawings for Picture<'_> {
     }
 }
 
-impl Drawings for Board<'_> {
+impl Drawings for TopicTimeline<'_> {
     fn scene(&self, window: usize, phase: f64) -> Scene {
         self.scene(window, phase)
     }

@@ -22,15 +22,15 @@ pub enum Body {
     /// The computation graph.
     Graph,
     /// The timeline of topics.
-    Board,
+    TopicTimeline,
 }
 
 impl Body {
     /// Whether it is a topic timeline for this mission.
-    pub(super) fn is_board(self, mission: &Mission) -> bool {
+    pub(super) fn is_timeline(self, mission: &Mission) -> bool {
         match self {
             Self::Graph => false,
-            Self::Board => true,
+            Self::TopicTimeline => true,
             Self::Auto => !knows_publishers(&mission.elements, &mission.sending),
         }
     }
@@ -84,7 +84,7 @@ impl Drawing {
 }
 
 impl Drawing {
-    /// The same drawing for this medium, which overrides page, text size and furniture.
+    /// The same drawing for this medium, which overrides page, text size and decorations.
     #[must_use]
     pub fn seen(self, purpose: Purpose) -> Self {
         Self {

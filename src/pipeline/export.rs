@@ -10,7 +10,6 @@ use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
-use crate::draw::board::Board;
 use crate::draw::figure::Figure;
 use crate::draw::figure::course::{self, Course, LifeLines};
 use crate::draw::figure::lives::LivesFigure;
@@ -18,6 +17,7 @@ use crate::draw::figure::source::FigureSource;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, strip};
+use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::{Drawings, Sequence, Unfolded};
@@ -159,11 +159,11 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
 /// The job with a still instead of an animation if there is nothing to animate, with a note on how to get an animation.
 fn still(job: &Render, mission: &mut Mission) -> Option<Render> {
     let still = job.still.as_ref()?;
-    let is_board = job.drawing.body.is_board(mission);
-    if mission.windows.len() > 1 && !is_board {
+    let is_timeline = job.drawing.body.is_timeline(mission);
+    if mission.windows.len() > 1 && !is_timeline {
         return None;
     }
-    let why = if is_board {
+    let why = if is_timeline {
         "a topic timeline shows the whole time at once"
     } else {
         "nothing changes after the beginning, so this is one picture with rates over the whole time"
@@ -202,14 +202,14 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
     };
     let is_drawn = job.outputs.iter().any(is_graph);
-    let is_board = is_drawn && drawing.body.is_board(&mission);
+    let is_timeline = is_drawn && drawing.body.is_timeline(&mission);
     let source = FigureSource::new(
         &mission,
         &drawing.view.ns_filter,
         &drawing.view.topic_filter,
         job.reading.phases.is_named(),
     );
-    let lives = (is_drawn && !is_board).then(|| course::of_all(&source));
+    let lives = (is_drawn && !is_timeline).then(|| course::of_all(&source));
     let course = lives
         .as_ref()
         .map(|lives| Course::new(lives, rows(drawing.page.size.h)));
@@ -220,15 +220,15 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         page,
         layout,
         notices,
-    } = if is_drawn && !is_board {
+    } = if is_drawn && !is_timeline {
         compose(&mission, &drawing, watch)
-    } else if is_board || job.outputs.iter().any(|o| o.format.is_viewed) {
+    } else if is_timeline || job.outputs.iter().any(|o| o.format.is_viewed) {
         unplaced(&mission, &drawing)
     } else {
         unseen(&drawing)
     };
-    if is_board {
-        return show_board(job, mission, &drawing, (&view, &options), watch);
+    if is_timeline {
+        return show_timeline(job, mission, &drawing, (&view, &options), watch);
     }
     let elements = &mission.elements;
     if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
@@ -355,7 +355,7 @@ fn rows(height: f64) -> usize {
 }
 
 /// Writes a mission whose picture is the topic timeline.
-fn show_board(
+fn show_timeline(
     job: &Render,
     mission: Mission,
     drawing: &Drawing,
@@ -372,7 +372,7 @@ fn show_board(
     let source = FigureSource::new(&mission, nodes, topics, false);
     let page = drawing.page.clone();
     let is_sized = drawing.is_sized || !drawing.is_fitted;
-    let board = Board::new(
+    let timeline = TopicTimeline::new(
         &source,
         view,
         &drawing.style,
@@ -380,9 +380,9 @@ fn show_board(
         page,
         is_sized,
     );
-    let remarks = board.remarks().into_iter();
+    let remarks = timeline.remarks().into_iter();
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
-    let overview = board.overview();
+    let overview = timeline.overview();
     let viewed = job.is_filtered.then(|| filtered(&mission, options));
     let lives = LifeLines::new(LivesFigure::new(&source, true));
     // Each topic has its own row.
@@ -395,7 +395,7 @@ fn show_board(
         places: None,
         notices: &all,
         view,
-        picture: &board,
+        picture: &timeline,
         unfolded: Some(Unfolded {
             view: opened.as_ref().unwrap_or(view),
             picture: None,

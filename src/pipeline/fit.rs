@@ -94,8 +94,8 @@ const AROUND: f64 = 20.0;
 const LEAST: (f64, f64, f64) = (720.0, 320.0, 140.0);
 /// The minimum width of such a page with a legend.
 const LEGEND: f64 = 480.0;
-/// The width of a page with furniture of normal size, and the smallest legible scale of furniture.
-const FURNITURE: (f64, f64) = (1100.0, 0.8);
+/// The width of a page with decorations (title, legend, timeline) of normal size, and their smallest legible scale.
+const DECORATIONS: (f64, f64) = (1100.0, 0.8);
 
 /// The page cropped to its graph, if names of a legible size leave it empty.
 fn cut(composed: &Composed, drawing: &Drawing) -> PageOptions {
@@ -110,12 +110,12 @@ fn cut(composed: &Composed, drawing: &Drawing) -> PageOptions {
         .min(page.size.w);
     let mut cut = PageOptions {
         size: Size::new(wide, page.size.h),
-        unit: Some((wide / FURNITURE.0).clamp(FURNITURE.1, 1.0)),
+        unit: Some((wide / DECORATIONS.0).clamp(DECORATIONS.1, 1.0)),
         has_legend: page.has_legend && wide >= LEGEND,
         ..page.clone()
     };
-    let furniture = page.size.h - measured(&cut).layout_options().page.h;
-    let high = furniture + natural.h * scale + 1.2 * AROUND;
+    let decorations = page.size.h - measured(&cut).layout_options().page.h;
+    let high = decorations + natural.h * scale + 1.2 * AROUND;
     cut.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
     if cut.size.h < page.size.h {
         cut

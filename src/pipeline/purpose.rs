@@ -24,8 +24,8 @@ worded! {
 const PX_PER_MM: f64 = 96.0 / 25.4;
 /// The largest height of a drawing on paper, in millimetres.
 const HIGHEST: f64 = 225.0;
-/// The smallest text of the style's furniture, in its pixels.
-const FURNITURE: f64 = 10.5;
+/// The smallest text of the style's decorations, in its pixels.
+const DECORATIONS: f64 = 10.5;
 
 impl Purpose {
     /// The purpose of this word.
@@ -68,13 +68,13 @@ impl Purpose {
         }
     }
 
-    /// The page with legible furniture: only a slide has room for a legend.
+    /// The page with legible decorations: only a slide has room for a legend.
     pub(crate) fn page(self, page: PageOptions) -> PageOptions {
         let is_slide = self == Self::Slide;
         PageOptions {
             size: self.sizes().first().copied().unwrap_or(page.size),
             width_mm: self.width_mm(),
-            unit: (!is_slide).then(|| self.readable() / FURNITURE),
+            unit: (!is_slide).then(|| self.readable() / DECORATIONS),
             has_legend: is_slide,
             ..page
         }

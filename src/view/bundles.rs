@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::group::Groups;
-use super::names::is_plumbing;
+use super::names::is_infrastructure;
 use super::select::Selection;
-use super::{AlsoHere, Item, Namespace, Showing, ViewOptions};
+use super::{AlsoHere, Item, Looks, Namespace, ViewOptions};
 use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
@@ -30,7 +30,7 @@ pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
 /// their connections changes or there is no other topic.
 pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     let elements = &mission.elements;
-    let plain = |topic: &Topic| !options.hide.quiet || !is_plumbing(topic.name.as_str());
+    let plain = |topic: &Topic| !options.hide.quiet || !is_infrastructure(topic.name.as_str());
     let mut drawn: Vec<bool> = elements.topics.iter().map(plain).collect();
     let mut connected = vec![0_u8; drawn.len()];
     let both = [(&elements.publishes, 1), (&elements.subscribes, 2)];
@@ -157,7 +157,7 @@ pub(crate) fn changed(mission: &Mission) -> impl Iterator<Item = &Event> {
 /// These nodes with their looks, by the innermost namespace with a box.
 pub(super) fn also_here(
     items: Vec<Item>,
-    shown: Vec<Showing>,
+    shown: Vec<Looks>,
     namespaces: &[Namespace],
 ) -> Vec<AlsoHere> {
     let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();

@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::names::is_plumbing;
-use super::showing::{Showing, ShowingWriter};
+use super::looks::{Looks, LooksWriter};
+use super::names::is_infrastructure;
 use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
 
@@ -18,11 +18,11 @@ pub struct CardRow {
     /// Whether that box publishes it, and whether it subscribes to it.
     pub ways: [bool; 2],
     /// Whether it is a hub, a topic that half the system is connected to, and a row in each of these boxes.
-    pub is_plumbing: bool,
+    pub is_infrastructure: bool,
     /// The topic, or the group of topics.
     pub item: Item,
     /// The looks of the topic, window by window.
-    pub shown: Showing,
+    pub shown: Looks,
 }
 
 /// The least number of boxes that a hub is connected to, and of outermost namespaces (or the outside) that
@@ -34,15 +34,15 @@ const FEWEST_HOMES: usize = 2;
 pub(super) struct Drawn {
     pub(super) items: Vec<Item>,
     pub(super) arrows: Vec<Arrow>,
-    pub(super) items_shown: Vec<Showing>,
-    pub(super) arrows_shown: Vec<Showing>,
+    pub(super) items_shown: Vec<Looks>,
+    pub(super) arrows_shown: Vec<Looks>,
 }
 
 impl Drawn {
-    /// Makes topics with one known endpoint rows of its box and, if `hides_plumbing`, hubs rows of all
+    /// Makes topics with one known endpoint rows of its box and, if `hides_infrastructure`, hubs rows of all
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
-    pub(super) fn fold_leaves(&mut self, hides_plumbing: bool) -> Vec<CardRow> {
+    pub(super) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
         let mut lines: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (at, arrow) in self.arrows.iter().enumerate() {
             if let Some((topic, _)) = self.topic_of(arrow) {
@@ -57,12 +57,15 @@ impl Drawn {
                 let end = self.topic_of(&self.arrows[*at]).map(|(_, owner)| owner);
                 owners.entry(end.unwrap_or(topic)).or_default().push(*at);
             }
-            let is_plumbing = hides_plumbing && is_plumbing(&self.items[topic as usize].name)
+            let is_infrastructure = hides_infrastructure
+                && is_infrastructure(&self.items[topic as usize].name)
                 || self.is_hub(owners.keys());
-            if (owners.len() == 1 || is_plumbing) && self.is_reported(topic, &lines, is_plumbing) {
+            if (owners.len() == 1 || is_infrastructure)
+                && self.is_reported(topic, &lines, is_infrastructure)
+            {
                 let own = owners.into_iter();
                 rows.extend(
-                    own.map(|(owner, lines)| self.row((topic, owner), &lines, is_plumbing)),
+                    own.map(|(owner, lines)| self.row((topic, owner), &lines, is_infrastructure)),
                 );
                 gone.extend(lines);
             }
@@ -72,7 +75,13 @@ impl Drawn {
         let never = self.hide_unnamed(&rows);
         self.drop_items(&mut rows, &never);
         rows.sort_by(|a, b| {
-            let key = |row: &CardRow| (row.owner, [!row.ways[0], !row.ways[1]], row.is_plumbing);
+            let key = |row: &CardRow| {
+                (
+                    row.owner,
+                    [!row.ways[0], !row.ways[1]],
+                    row.is_infrastructure,
+                )
+            };
             key(a)
                 .cmp(&key(b))
                 .then_with(|| a.item.name.cmp(&b.item.name))
@@ -106,13 +115,13 @@ impl Drawn {
 
     /// Whether one of these arrows of a topic exists whenever the topic does; of a hub, whenever there is an
     /// event about it.
-    fn is_reported(&self, topic: u32, lines: &[usize], is_plumbing: bool) -> bool {
+    fn is_reported(&self, topic: u32, lines: &[usize], is_infrastructure: bool) -> bool {
         let Some(looks) = self.items_shown.get(topic as usize) else {
             return true;
         };
         let needs_line = |k: &u32| {
             let look = looks.at(*k as usize);
-            look.is_some_and(|look| !is_plumbing || look.mark.is_some())
+            look.is_some_and(|look| !is_infrastructure || look.mark.is_some())
         };
         let mut windows = self.turns(topic, lines).into_iter().filter(needs_line);
         windows.all(|k| self.line(lines, k).is_some())
@@ -123,7 +132,7 @@ impl Drawn {
         let own = self.items_shown.get(topic as usize).into_iter();
         let lines = lines.iter().filter_map(|at| self.arrows_shown.get(*at));
         own.chain(lines)
-            .flat_map(Showing::runs)
+            .flat_map(Looks::runs)
             .map(|run| run.0)
             .collect()
     }
@@ -142,10 +151,10 @@ impl Drawn {
     }
 
     /// The row of a topic in a box; that of a hub has the rate of this box alone.
-    fn row(&self, (topic, owner): (u32, u32), lines: &[usize], is_plumbing: bool) -> CardRow {
+    fn row(&self, (topic, owner): (u32, u32), lines: &[usize], is_infrastructure: bool) -> CardRow {
         let sends = |at: &usize| self.arrows[*at].to == topic;
         let receives = |at: &usize| self.arrows[*at].from == topic;
-        let mut writer = ShowingWriter::default();
+        let mut writer = LooksWriter::default();
         for window in self.turns(topic, lines) {
             let line = self.line(lines, window);
             let look = self.items_shown[topic as usize].at(window as usize);
@@ -158,7 +167,7 @@ impl Drawn {
                     mark: reported.mark,
                     rates: reported.rates,
                     events: events.into_iter().collect(),
-                    ..(if is_plumbing { line } else { look }).clone()
+                    ..(if is_infrastructure { line } else { look }).clone()
                 }
             });
             writer.show(window, look);
@@ -166,7 +175,7 @@ impl Drawn {
         CardRow {
             owner,
             ways: [lines.iter().any(sends), lines.iter().any(receives)],
-            is_plumbing,
+            is_infrastructure,
             item: self.items[topic as usize].clone(),
             shown: writer.finish(),
         }
@@ -176,7 +185,7 @@ impl Drawn {
     /// be empty. Returns the boxes that are never shown.
     fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<u32> {
         let mut never = BTreeSet::new();
-        for (showing, at) in self.items_shown.iter_mut().zip(0_u32..) {
+        for (looks, at) in self.items_shown.iter_mut().zip(0_u32..) {
             let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
             let is_unnamed = is_unnamed(&self.items[at as usize].name);
             if !is_unnamed || self.arrows.iter().any(is_linked) {
@@ -184,21 +193,21 @@ impl Drawn {
             }
             let own = rows
                 .iter()
-                .filter(|row| row.owner == at && !row.is_plumbing);
-            let own: Vec<&Showing> = own.map(|row| &row.shown).collect();
+                .filter(|row| row.owner == at && !row.is_infrastructure);
+            let own: Vec<&Looks> = own.map(|row| &row.shown).collect();
             let turns = own
                 .iter()
                 .flat_map(|shown| shown.runs())
-                .chain(showing.runs());
+                .chain(looks.runs());
             let turns: BTreeSet<u32> = turns.map(|run| run.0).collect();
-            let mut writer = ShowingWriter::default();
+            let mut writer = LooksWriter::default();
             for window in turns {
                 let is_there = own.iter().any(|shown| shown.at(window as usize).is_some());
-                let look = showing.at(window as usize).filter(|_| is_there);
+                let look = looks.at(window as usize).filter(|_| is_there);
                 writer.show(window, look.cloned());
             }
-            *showing = writer.finish();
-            if showing.looks().is_empty() {
+            *looks = writer.finish();
+            if looks.distinct().is_empty() {
                 never.insert(at);
             }
         }
@@ -235,8 +244,8 @@ impl Drawn {
         }
         keep(&mut self.arrows, |at| !gone.contains(&at));
         keep(&mut self.arrows_shown, |at| !gone.contains(&at));
-        for (showing, id) in self.arrows_shown.iter_mut().zip(0..) {
-            showing.renumber(id);
+        for (looks, id) in self.arrows_shown.iter_mut().zip(0..) {
+            looks.renumber(id);
         }
     }
 
@@ -268,16 +277,16 @@ impl Drawn {
             row.owner = places[row.owner as usize];
         }
         for shown in [&mut self.items_shown, &mut self.arrows_shown] {
-            for (showing, id) in shown.iter_mut().zip(0..) {
-                showing.renumber(id);
+            for (looks, id) in shown.iter_mut().zip(0..) {
+                looks.renumber(id);
             }
         }
     }
 }
 
 /// The looks of one line for both ways between a node and a topic.
-fn both_ways(ways: [&Showing; 2]) -> Showing {
-    let mut writer = ShowingWriter::default();
+fn both_ways(ways: [&Looks; 2]) -> Looks {
+    let mut writer = LooksWriter::default();
     let windows: BTreeSet<u32> = ways
         .iter()
         .flat_map(|way| way.runs())
@@ -371,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plumbing_is_a_row_of_every_node() {
+    fn infrastructure_is_a_row_of_every_node() {
         let (boxes, rows) = drawn(&["/a>/tf /b>/tf /c</tf /a>/t /c</t"], Mode::All);
         assert_eq!(boxes, ["/a", "/b", "/c", "/t"]);
         assert_eq!(rows, ["/a → /tf .", "/b → /tf .", "/c ← /tf ."]);

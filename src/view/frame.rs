@@ -1,6 +1,6 @@
 //! One window of the picture with its events, and the words of its headline.
 
-use super::{Attendance, Counts, Crowd, Lasting};
+use super::{Counts, Crowd, Lasting, MemberState};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::event_log::{EventId, Kind};
@@ -77,7 +77,7 @@ pub struct Frame {
     pub messages: u64,
     /// For each namespace that represents several, in the order of [`View::namespaces`](super::View::namespaces), the
     /// presence of each of them.
-    pub member_lists: Vec<Vec<Attendance>>,
+    pub member_lists: Vec<Vec<MemberState>>,
     /// The events that begin in it, in the order of the event log. Headline, marks and timeline are all made from these.
     pub headlines: Vec<Headline>,
     /// The events of earlier windows that last into it or end in it: they are marked and in the headline, but

@@ -5,12 +5,12 @@ use super::caption::CaptionWriter;
 use super::items::Viewed;
 use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
+use super::looks::{Looks, LooksWriter};
 use super::marks::{Parts, WindowMarks};
-use super::settle::{Lengths, settled};
-use super::showing::{Showing, ShowingWriter};
+use super::stable::{Lengths, stable};
 use super::state::{LivingItems, Now};
 use super::turn::{WindowTurn, marked, with_ends};
-use super::{Attendance, Counts, Frame, Shown, ViewOptions};
+use super::{Counts, Frame, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
 use crate::mission::{Mission, Window};
@@ -19,8 +19,8 @@ use crate::mission::{Mission, Window};
 #[derive(Default)]
 pub(crate) struct Frames {
     pub(crate) list: Vec<Frame>,
-    pub(crate) items: Vec<Showing>,
-    pub(crate) arrows: Vec<Showing>,
+    pub(crate) items: Vec<Looks>,
+    pub(crate) arrows: Vec<Looks>,
 }
 
 /// The windows one after the other. In windows without headlines, only elements whose numbers changed are
@@ -112,7 +112,7 @@ struct ShownWindows<'a> {
     beginning: Option<Stamp>,
     now: Now<'a>,
     turn: WindowTurn,
-    member_lists: Vec<Vec<Attendance>>,
+    member_lists: Vec<Vec<MemberState>>,
     items: Cast,
     arrows: Cast,
 }
@@ -120,7 +120,7 @@ struct ShownWindows<'a> {
 /// The items, or the arrows: the looks of each so far.
 #[derive(Default)]
 struct Cast {
-    shown: Vec<ShowingWriter>,
+    shown: Vec<LooksWriter>,
     /// The ids of those with other numbers than in the previous window.
     touched: Vec<u32>,
     is_touched: Vec<bool>,
@@ -129,7 +129,7 @@ struct Cast {
 impl Cast {
     fn new(count: usize) -> Self {
         Self {
-            shown: (0..count).map(|_| ShowingWriter::default()).collect(),
+            shown: (0..count).map(|_| LooksWriter::default()).collect(),
             touched: Vec::new(),
             is_touched: vec![false; count],
         }
@@ -157,9 +157,9 @@ impl Cast {
         }
     }
 
-    fn finish(self, lengths: &Lengths) -> Vec<Showing> {
+    fn finish(self, lengths: &Lengths) -> Vec<Looks> {
         let all = self.shown.into_iter();
-        all.map(|raw| settled(&raw.finish(), lengths)).collect()
+        all.map(|raw| stable(&raw.finish(), lengths)).collect()
     }
 }
 
@@ -229,8 +229,8 @@ impl<'a> ShownWindows<'a> {
     fn go_on(&mut self, at: u32) {
         for who in self.member_lists.iter_mut().flatten() {
             *who = match who {
-                Attendance::Joined | Attendance::Here => Attendance::Here,
-                Attendance::Left | Attendance::Away => Attendance::Away,
+                MemberState::Joined | MemberState::Here => MemberState::Here,
+                MemberState::Left | MemberState::Away => MemberState::Away,
             };
         }
         for id in self.items.take_touched() {
@@ -266,15 +266,15 @@ fn member_lists(
     before: &Alive,
     after: &Alive,
     is_first: bool,
-) -> Vec<Vec<Attendance>> {
+) -> Vec<Vec<MemberState>> {
     let attendance = |elements: &Vec<Element>| {
         let is = |alive: &Alive| elements.iter().any(|e| alive.is(*e));
         match (is(before), is(after)) {
-            (false, true) if is_first => Attendance::Here,
-            (false, true) => Attendance::Joined,
-            (true, true) => Attendance::Here,
-            (true, false) => Attendance::Left,
-            (false, false) => Attendance::Away,
+            (false, true) if is_first => MemberState::Here,
+            (false, true) => MemberState::Joined,
+            (true, true) => MemberState::Here,
+            (true, false) => MemberState::Left,
+            (false, false) => MemberState::Away,
         }
     };
     let fleets = viewed.fleets.all.iter();

@@ -62,9 +62,9 @@ impl TopicRow {
 
 /// The looks of one item or arrow, window by window.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Showing {
-    /// Its looks, each only once unless it is marked.
-    looks: Vec<Shown>,
+pub struct Looks {
+    /// Each look only once unless it is marked.
+    distinct: Vec<Shown>,
     /// Pairs of a window and the index of the look from then on, or [`AWAY`]; sorted.
     runs: Vec<(u32, u32)>,
 }
@@ -72,29 +72,29 @@ pub struct Showing {
 /// The index that means absence.
 const AWAY: u32 = u32::MAX;
 
-impl Showing {
+impl Looks {
     /// The look in a window; `None` if it is absent.
     pub fn at(&self, window: usize) -> Option<&Shown> {
         let after = self.runs.partition_point(|run| run.0 as usize <= window);
         let (_, look) = self.runs.get(after.checked_sub(1)?)?;
-        self.looks.get(*look as usize)
+        self.distinct.get(*look as usize)
     }
 
     /// Every look that it ever has, in no particular order.
-    pub fn looks(&self) -> &[Shown] {
-        &self.looks
+    pub fn distinct(&self) -> &[Shown] {
+        &self.distinct
     }
 
     /// Its looks with the window from which each applies, in order; `None` if it is absent, as before the
     /// first of these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
-        let look = |place: u32| self.looks.get(place as usize);
+        let look = |place: u32| self.distinct.get(place as usize);
         self.runs.iter().map(move |run| (run.0, look(run.1)))
     }
 
     /// Sets the id of all its looks.
     pub(super) fn renumber(&mut self, id: u32) {
-        for look in &mut self.looks {
+        for look in &mut self.distinct {
             look.id = id;
         }
     }
@@ -106,7 +106,7 @@ impl Showing {
 
     /// The looks in the windows of a sequence, one event per window.
     pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
-        let mut writer = ShowingWriter::default();
+        let mut writer = LooksWriter::default();
         for (window, shown) in (0..).zip(windows) {
             writer.show(window, shown.cloned());
         }
@@ -116,8 +116,8 @@ impl Showing {
 
 /// A writer that adds looks in order of the windows.
 #[derive(Debug, Default)]
-pub(super) struct ShowingWriter {
-    showing: Showing,
+pub(super) struct LooksWriter {
+    looks: Looks,
     /// The indices of looks without a mark, if there are more than [`FEW`] looks.
     places: BTreeMap<LookKey, u32>,
 }
@@ -135,7 +135,7 @@ type LookKey = (
     Option<Arc<str>>,
 );
 
-impl ShowingWriter {
+impl LooksWriter {
     /// Adds the look from this window on; `None` if it is absent.
     pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
         let place = shown.map_or(AWAY, |shown| self.look(shown));
@@ -148,7 +148,7 @@ impl ShowingWriter {
         if is_plain && let Some(place) = self.place(&shown) {
             return place;
         }
-        let all = &mut self.showing.looks;
+        let all = &mut self.looks.distinct;
         let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
         if all.is_empty() {
             all.reserve_exact(1);
@@ -163,9 +163,9 @@ impl ShowingWriter {
     /// The index of a look without a mark, if it exists already.
     fn place(&mut self, shown: &Shown) -> Option<u32> {
         let wanted = key(shown);
-        let looks = (0..).zip(&self.showing.looks);
-        let mut plain = looks.filter(|(_, look)| look.mark.is_none());
-        if self.showing.looks.len() <= FEW {
+        let all = (0..).zip(&self.looks.distinct);
+        let mut plain = all.filter(|(_, look)| look.mark.is_none());
+        if self.looks.distinct.len() <= FEW {
             let found = plain.find(|(_, look)| key(look) == wanted);
             return found.map(|(place, _)| place);
         }
@@ -178,16 +178,16 @@ impl ShowingWriter {
 
     /// Adds the index of the look from this window on.
     pub(super) fn turn(&mut self, window: u32, place: u32) {
-        let runs = &mut self.showing.runs;
+        let runs = &mut self.looks.runs;
         if runs.last().map_or(AWAY, |last| last.1) != place {
             runs.push((window, place));
         }
     }
 
-    pub(super) fn finish(mut self) -> Showing {
-        self.showing.runs.shrink_to_fit();
-        self.showing.looks.shrink_to_fit();
-        self.showing
+    pub(super) fn finish(mut self) -> Looks {
+        self.looks.runs.shrink_to_fit();
+        self.looks.distinct.shrink_to_fit();
+        self.looks
     }
 }
 
@@ -209,8 +209,8 @@ fn key(shown: &Shown) -> LookKey {
 
 /// The windows in which one of two looks differs from the previous window, with both looks.
 pub(crate) fn both<'a>(
-    a: &'a Showing,
-    b: &'a Showing,
+    a: &'a Looks,
+    b: &'a Looks,
 ) -> impl Iterator<Item = (Option<&'a Shown>, Option<&'a Shown>)> {
     let (mut next_a, mut next_b) = (a.runs().peekable(), b.runs().peekable());
     let (mut now_a, mut now_b) = (None, None);
@@ -250,35 +250,35 @@ mod tests {
             shown(1.0, None),
             None,
         ];
-        let showing = Showing::of(all.iter().map(Option::as_ref));
+        let looks = Looks::of(all.iter().map(Option::as_ref));
         for (window, want) in all.iter().enumerate() {
-            assert_eq!(showing.at(window), want.as_ref(), "{window}");
+            assert_eq!(looks.at(window), want.as_ref(), "{window}");
         }
-        assert_eq!(showing.at(99), None);
-        assert_eq!(showing.looks().len(), 3);
+        assert_eq!(looks.at(99), None);
+        assert_eq!(looks.distinct().len(), 3);
     }
 
     #[test]
     fn equal_looks_are_stored_once() {
         let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
-        let showing = Showing::of(all.iter().map(Option::as_ref));
-        assert_eq!(showing.looks().len(), 20);
-        assert_eq!(showing.at(57), all[57].as_ref());
+        let looks = Looks::of(all.iter().map(Option::as_ref));
+        assert_eq!(looks.distinct().len(), 20);
+        assert_eq!(looks.at(57), all[57].as_ref());
     }
 
     #[test]
     fn constant_elements_take_no_memory() {
         let (slow, fast) = (shown(1.0, None), shown(2.0, None));
         let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
-        let showing = Showing::of(all.map(Option::as_ref));
-        assert_eq!((showing.looks().len(), showing.places().len()), (2, 2));
+        let looks = Looks::of(all.map(Option::as_ref));
+        assert_eq!((looks.distinct().len(), looks.places().len()), (2, 2));
     }
 
     #[test]
-    fn two_showings_are_paired_by_window() {
+    fn two_series_of_looks_are_paired_by_window() {
         let (one, two) = (shown(1.0, None), shown(2.0, None));
-        let a = Showing::of([one.as_ref(), one.as_ref(), two.as_ref()]);
-        let b = Showing::of([None, one.as_ref(), one.as_ref()]);
+        let a = Looks::of([one.as_ref(), one.as_ref(), two.as_ref()]);
+        let b = Looks::of([None, one.as_ref(), one.as_ref()]);
         let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
         let reported: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
         let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];

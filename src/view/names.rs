@@ -30,7 +30,7 @@ pub(crate) fn is_debug_label(topic: &str) -> bool {
 
 /// Whether it is a topic that every system has and nearly every node is connected to: it is irrelevant to what a robot
 /// does.
-pub(crate) fn is_plumbing(topic: &str) -> bool {
+pub(crate) fn is_infrastructure(topic: &str) -> bool {
     const LAST: [&str; 9] = [
         "tf",
         "tf_static",

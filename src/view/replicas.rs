@@ -329,7 +329,7 @@ fn hash(what: &impl Hash) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::Attendance::{self, Away, Here, Joined, Left};
+    use crate::view::MemberState::{self, Away, Here, Joined, Left};
     use crate::view::testing::mission;
     use crate::view::{Mark, outline, view};
 
@@ -439,7 +439,7 @@ mod tests {
         let windows = [all(&[1, 2, 3]), all(&[1, 2, 3, 4]), all(&[2, 3, 4])];
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let (seen, _) = view(&mission(&windows), &ViewOptions::default());
-        let member_lists: Vec<&[Attendance]> =
+        let member_lists: Vec<&[MemberState]> =
             seen.frames.iter().map(|f| &f.member_lists[0][..]).collect();
         assert_eq!(member_lists[0], [Here, Here, Here, Away]);
         assert_eq!(member_lists[1], [Here, Here, Here, Joined]);

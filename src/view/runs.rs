@@ -10,7 +10,7 @@ use crate::base::cast;
 use crate::base::words;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, Mark, Showing, Shown, TopicRow, View};
+use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
 
 /// A value of a table that applies from a window on, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,14 +62,14 @@ impl Runs {
     pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
         let mut classes = ValueTable::starting_with(None);
         let mut labels = ValueTable::starting_with(String::new());
-        let mut runs = |all: &[Showing], arrows| {
+        let mut runs = |all: &[Looks], arrows| {
             let mut recorder = RunRecorder {
                 classes: &mut classes,
                 labels: &mut labels,
                 label: &label,
                 arrows,
             };
-            let runs = all.iter().map(|showing| recorder.runs(showing));
+            let runs = all.iter().map(|looks| recorder.runs(looks));
             runs.collect::<Vec<_>>()
         };
         let mut items = runs(&view.items_shown, None);
@@ -228,12 +228,12 @@ struct RunRecorder<'a, F> {
 }
 
 impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
-    fn runs(&mut self, showing: &Showing) -> ElementRuns {
+    fn runs(&mut self, looks: &Looks) -> ElementRuns {
         let mut life = ElementRuns::default();
         // The label of each rate is cached: formatting takes time, and most rates recur.
         let mut known: BTreeMap<_, u32> = BTreeMap::new();
         let mut last_hz = None;
-        for (window, shown) in showing.runs() {
+        for (window, shown) in looks.runs() {
             let Some(shown) = shown else {
                 push(&mut life.classes, window, 0);
                 continue;
@@ -337,7 +337,7 @@ mod tests {
                 is_service: false,
                 kilobytes: None,
             }],
-            arrows_shown: vec![Showing::of(story.iter().map(Option::as_ref))],
+            arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))],
             ..View::default()
         };
         Runs::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))

@@ -1,7 +1,7 @@
 //! Stable looks without flicker: between two events of the log, an element keeps its state, the thickness for
 //! its rate, and its written number as long as the difference may be random.
 
-use super::showing::{Showing, ShowingWriter};
+use super::looks::{Looks, LooksWriter};
 use super::{Mark, Shown};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
@@ -60,7 +60,7 @@ struct LookRun<'a> {
 ///
 /// A topic with a message per minute is also active in the seconds in between; only a pause in the event log
 /// is drawn as one.
-pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
+pub(crate) fn stable(raw: &Looks, lengths: &Lengths) -> Looks {
     let mut runs = runs(raw, lengths.windows());
     let mut life = PresentLife::default();
     let mut last = 0;
@@ -87,11 +87,11 @@ pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
     written(&runs, lengths.windows())
 }
 
-fn runs(raw: &Showing, windows: u32) -> Vec<LookRun<'_>> {
+fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
     let ends = raw.places().iter().skip(1).map(|next| next.0);
     let all = raw.places().iter().zip(ends.chain([windows]));
     let run = |(&(from, place), to): (&(u32, u32), u32)| {
-        let shown = raw.looks().get(place as usize)?;
+        let shown = raw.distinct().get(place as usize)?;
         Some(LookRun {
             from,
             to,
@@ -156,8 +156,8 @@ impl PresentLife {
 }
 
 /// The runs with their stable looks.
-fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
-    let mut writer = ShowingWriter::default();
+fn written(runs: &[LookRun<'_>], windows: u32) -> Looks {
+    let mut writer = LooksWriter::default();
     let look = |run: &LookRun<'_>| (run.look, run.steady_hz, run.held);
     let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| look(a) == look(b);
     // Between two changes only the numbers differ, and only a few of them.

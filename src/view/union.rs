@@ -1,15 +1,15 @@
 //! All windows as one, for a still picture of the whole mission.
 
-use crate::view::settle::Lengths;
-use crate::view::{SeenWindow, Showing, Shown, TopicRow, View, sum as added};
+use crate::view::stable::Lengths;
+use crate::view::{Looks, SeenWindow, Shown, TopicRow, View, sum as added};
 
 /// The whole sequence as one window without marks: everything that ever existed, in its most active state,
 /// with rates averaged over the whole time and messages summed. `None` for a view without windows.
 pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     view.frames.first()?;
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
-    let all = |shown: &[Showing]| {
-        let whole = shown.iter().filter_map(|showing| whole(showing, &lengths));
+    let all = |shown: &[Looks]| {
+        let whole = shown.iter().filter_map(|looks| whole(looks, &lengths));
         whole.collect()
     };
     Some(SeenWindow {
@@ -19,11 +19,11 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 }
 
 /// The look of one item or arrow in all windows together.
-fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
-    let ends = showing.runs().skip(1).map(|next| next.0);
+fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
+    let ends = looks.runs().skip(1).map(|next| next.0);
     let ends = ends.chain([lengths.windows()]);
     let mut slot = None;
-    for ((from, shown), to) in showing.runs().zip(ends) {
+    for ((from, shown), to) in looks.runs().zip(ends) {
         if let Some(shown) = shown {
             gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
         }

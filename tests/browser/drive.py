@@ -229,8 +229,8 @@ def compare_telling(b, evolution):
     """Badges, list and marks of every window: each counts the headlines of the event log."""
     b.keys(HOME)
     for w, own in enumerate(headlines(evolution)):
-        entries, numbers, listed = b.js("""const chips = document.getElementById('chips');
-            return [chips.dataset.entries.split(' ').filter(Boolean).length, [...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
+        entries, numbers, listed = b.js("""const counts = document.getElementById('counts');
+            return [counts.dataset.entries.split(' ').filter(Boolean).length, [...counts.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
         assert entries == listed == len(own), (w, entries, listed, own)
         assert sum(int(n) for n in re.findall(r"\d+", " ".join(numbers))) == len(own), (w, numbers)
         for e in own[:1]:
@@ -242,7 +242,7 @@ def compare_telling(b, evolution):
                     [(x["end_ns"] - evolution["windows"][0]["start_ns"]) / 1e9 for x in evolution["windows"]]))
             assert went == w, (went, w)
         b.keys(RIGHT)
-    print("  chips, lists and marks count what the ledger tells")
+    print("  counts, lists and marks count what the ledger tells")
 
 
 def compare_table(b, evolution, data):
@@ -282,8 +282,8 @@ def compare_windows(b, evolution, data):
         moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
         differs = (old.keys() ^ new.keys()) | moved
         shown = b.js("""const more = document.querySelector('#news .more'); more?.click();
-            const chips = document.getElementById('chips');
-            return [[...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length, 'entries' in chips.dataset]""")
+            const counts = document.getElementById('counts');
+            return [[...counts.children].map(c => c.textContent), document.querySelectorAll('#news button').length, 'entries' in counts.dataset]""")
         # Differences between two arbitrary windows are not events of the log: they are counted and listed without event ids.
         counted = sum(int(n) for n in re.findall(r"\d+", " ".join(shown[0])))
         assert [counted, *shown[1:]] == [len(differs), len(differs), False], (before, after, shown, len(differs))

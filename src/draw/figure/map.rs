@@ -24,7 +24,7 @@ use crate::layout::{Cluster, Outline, Plan, Vertex};
 /// The height of a map of nodes, in millimetres, above which groups are drawn instead, if they fit.
 const HIGH: f64 = 130.0;
 /// The height of a node in millimetres.
-const PILL: f64 = 3.3;
+const CAPSULE: f64 = 3.3;
 /// The most members that a group names.
 const NAMED: usize = 4;
 /// The most nodes that are laid out separately; more never fit.
@@ -35,7 +35,7 @@ const MOST_GROUPS: usize = 60;
 /// One box with the text in it.
 enum MapBox {
     /// A node by its label, and its phases.
-    Pill(String, String),
+    Capsule(String, String),
     /// Nodes without a known partner.
     List(Vec<(String, String)>),
     /// A group: namespace, phases, its lines, and the cells of its bar.
@@ -145,7 +145,7 @@ fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>)
     let mut canvas = sheet.canvas();
     let drawn = match groups {
         Some(groups) => of_groups(sheet, &canvas, tracks, groups),
-        None => of_pills(sheet, &canvas, tracks),
+        None => of_capsules(sheet, &canvas, tracks),
     }?;
     paint(&mut canvas, sheet, tracks, &drawn);
     let end = drawn.placed.size.h + 0.2;
@@ -209,7 +209,7 @@ fn below(
 }
 
 /// The map with every node as a rounded box, namespaces as frames; `None` if it does not fit.
-fn of_pills(
+fn of_capsules(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
     tracks: &[Track],
@@ -245,7 +245,7 @@ fn of_pills(
     let mut vertex = vec![None; tracks.len()];
     for at in linked.iter().copied() {
         members.push(vec![at]);
-        let look = MapBox::Pill(label(&tracks[at]), phases[at].clone());
+        let look = MapBox::Capsule(label(&tracks[at]), phases[at].clone());
         vertex[at] = Some(vertices.len());
         vertices.push(sized(canvas, &look, home(&tracks[at]), source.phases.len()));
         looks.push(look);
@@ -370,9 +370,9 @@ fn sized(canvas: &PaperCanvas<'_>, look: &MapBox, cluster: Option<usize>, phases
         canvas.width(name, Type::Name) + gap + canvas.width(phases, Type::Head)
     };
     let size = match look {
-        MapBox::Pill(name, phases) => Size::new(
+        MapBox::Capsule(name, phases) => Size::new(
             named(&(name.clone(), phases.clone())) + 2.2,
-            PILL.max(line + 0.5),
+            CAPSULE.max(line + 0.5),
         ),
         MapBox::List(all) => {
             let widest = all.iter().map(named).fold(0.0, f64::max);
@@ -427,7 +427,7 @@ fn paint(
         let names = members.iter().map(|at| &*tracks[*at].name);
         canvas.begin_box(names, &marks.events(members));
         match look {
-            MapBox::Pill(name, phases) => pill(canvas, *rect, name, phases),
+            MapBox::Capsule(name, phases) => capsule(canvas, *rect, name, phases),
             MapBox::List(all) => list(canvas, *rect, all),
             MapBox::Group(space, own, lines, cells) => {
                 let many = sheet.source.phases.len();
@@ -437,7 +437,7 @@ fn paint(
     }
 }
 
-fn pill(canvas: &mut PaperCanvas<'_>, rect: Rect, name: &str, phases: &str) {
+fn capsule(canvas: &mut PaperCanvas<'_>, rect: Rect, name: &str, phases: &str) {
     let fill = if phases.is_empty() {
         ink::BAND[1]
     } else {

@@ -18,7 +18,7 @@ use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Arrow, Item, ItemKind, Mark, SeenWindow, Showing, Shown, View};
+use crate::view::{Arrow, Item, ItemKind, Looks, Mark, SeenWindow, Shown, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -178,7 +178,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         }
     });
     let mut widest: Vec<Option<f64>> = vec![None; view.arrows.len()];
-    for shown in view.arrows_shown.iter().flat_map(Showing::looks) {
+    for shown in view.arrows_shown.iter().flat_map(Looks::distinct) {
         let arrow = view.arrows.get(shown.id as usize);
         let label = arrow.and_then(|arrow| label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.id as usize)) {

@@ -4,9 +4,9 @@ use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 use super::boxes::Boxes;
-use super::chips;
 use super::measured::LINE;
 use super::options;
+use super::texts;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::rate_change;
 use crate::draw::scene::{Anchor, Group, Text};
@@ -49,7 +49,7 @@ pub(crate) fn footers(view: &View, style: &Style, fonts: &Fonts) -> Vec<Footer> 
         let all = names.iter().zip(&also.items).zip(&also.shown);
         let long = |text: &String| text.chars().count();
         let longest = all.map(|((name, item), shown)| {
-            let texts = shown.looks().iter().map(|look| said(item, look, name));
+            let texts = shown.distinct().iter().map(|look| said(item, look, name));
             texts.max_by_key(long).unwrap_or_else(|| name.clone())
         });
         let longest: Vec<String> = longest.collect();
@@ -74,7 +74,7 @@ fn said(item: &Item, shown: &Shown, name: &str) -> String {
     let rate = match shown.rates {
         _ if item.kind.word() == "node" || shown.mark == Some(Mark::Removed) => None,
         Some((before, now)) => Some(rate_change(before, now)),
-        None => chips::rate_in(shown),
+        None => texts::rate_in(shown),
     };
     let name = rate.map_or_else(|| name.to_owned(), |rate| format!("{name} {rate}"));
     match shown.mark {

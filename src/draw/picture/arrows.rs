@@ -4,7 +4,7 @@ use super::boxes::{class, reported};
 use super::measured::{LINE, arrow_label};
 use super::options::{self, ArrowLook};
 use super::page::GraphFit;
-use super::{badge, chips, topics};
+use super::{badge, texts, topics};
 use crate::base::geometry::{Point, Rect, Size, after, on_cubic, polyline};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
@@ -235,7 +235,7 @@ impl Arrows<'_> {
             id: track.id.clone(),
             class: class(&format!("edge {}", arrow.class()), shown),
             data: reported(vec![("from", from.clone()), ("to", to.clone())], shown),
-            title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
+            title: format!("{from} → {to}\n{kind}: {}", texts::facts(shown)),
             ..Group::default()
         };
         if arrow.kind == ArrowKind::Bundle {
@@ -258,10 +258,10 @@ impl Arrows<'_> {
         } else {
             self.line(&mut group, track, &look, (tip, [true, false]));
         }
-        if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0])
+        if let Some((text, is_badge)) = arrow_label(arrow, shown, ends[0])
             && track.label.is_some()
         {
-            self.label(&mut over, &text, is_pill, track, shown, &look);
+            self.label(&mut over, &text, is_badge, track, shown, &look);
         }
         if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {
             let size = self.fit.pen * 0.8;
@@ -380,7 +380,7 @@ impl Arrows<'_> {
         &self,
         group: &mut Group,
         text: &str,
-        is_pill: bool,
+        is_badge: bool,
         track: &ArrowPath,
         shown: &Shown,
         look: &ArrowLook,
@@ -389,11 +389,11 @@ impl Arrows<'_> {
         let text = self.fonts.shown(text);
         let style = &self.style.edge;
         let size = style.size * self.fit.scale;
-        if is_pill {
+        if is_badge {
             let paint = (look.stroke.color, self.style.badge.sign);
-            let width = badge::pill_width(self.fonts, &text, size);
+            let width = badge::label_width(self.fonts, &text, size);
             let centre = place.middle(width);
-            badge::pill(group, self.fonts, paint, &text, centre, size);
+            badge::label(group, self.fonts, paint, &text, centre, size);
             return;
         }
         let edge = place.middle(style.halo_width * self.fit.scale);

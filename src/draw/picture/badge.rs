@@ -1,6 +1,6 @@
 //! The signs of change: a round badge at a corner, and a rate label.
 
-use super::measured::{PILL_HEIGHT, PILL_PAD};
+use super::measured::{BADGE_HEIGHT, BADGE_PAD};
 use super::options;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
@@ -109,12 +109,12 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
 }
 
 /// The width of a rate label with this text.
-pub(crate) fn pill_width(fonts: &Fonts, text: &str, size: f64) -> f64 {
-    fonts.width(text, size, Weight::SemiBold) + size * PILL_PAD
+pub(crate) fn label_width(fonts: &Fonts, text: &str, size: f64) -> f64 {
+    fonts.width(text, size, Weight::SemiBold) + size * BADGE_PAD
 }
 
 /// A rate label with `text` and its middle at `centre`; `size` is its font size.
-pub(crate) fn pill(
+pub(crate) fn label(
     group: &mut Group,
     fonts: &Fonts,
     paint: (Color, Color),
@@ -122,8 +122,8 @@ pub(crate) fn pill(
     centre: Point,
     size: f64,
 ) {
-    let height = size * PILL_HEIGHT;
-    let area = Rect::around(centre, Size::new(pill_width(fonts, text, size), height));
+    let height = size * BADGE_HEIGHT;
+    let area = Rect::around(centre, Size::new(label_width(fonts, text, size), height));
     let form = Form::Rect(area, height / 2.0);
     group.shape(Shape::filled(form, paint.0));
     let font = (size, Weight::SemiBold);

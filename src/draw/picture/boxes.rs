@@ -5,7 +5,7 @@ use super::measured::{LINE, Label, ShownRates, rate_label, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::spaces::Space;
-use super::{badge, chips};
+use super::{badge, texts};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};
 use crate::draw::style::{Body, Color, Style};
@@ -122,13 +122,13 @@ impl Boxes<'_> {
             stroke: Stroke::dashed(change.color, change.width * pen, &change.dash),
         });
         let size = style.cluster.size * self.fit.scale;
-        let width = |crowd: &Crowd| badge::pill_width(self.fonts, &crowd.words, size);
+        let width = |crowd: &Crowd| badge::label_width(self.fonts, &crowd.words, size);
         let taken: f64 = others.map(|other| width(other) + size * 0.5).sum();
         let centre = Point::new(
             place.right() - width(crowd) / 2.0 - size - taken,
             place.y - beyond * 0.75,
         );
-        badge::pill(
+        badge::label(
             &mut words,
             self.fonts,
             (change.color, style.badge.sign),
@@ -195,7 +195,7 @@ impl Boxes<'_> {
         if let Some(text) = rate_label(shown, card.shown_rates) {
             let (below, size) = self.below(place);
             let paint = (look.stroke.color, style.badge.sign);
-            badge::pill(&mut group, self.fonts, paint, &text, below, size);
+            badge::label(&mut group, self.fonts, paint, &text, below, size);
         }
         if let Some(mark) = shown.mark {
             badge::badge(&mut group, style, mark, card.badge, self.fit.pen);
@@ -238,7 +238,7 @@ impl Boxes<'_> {
         let kind = item.kind;
         let form = match kind {
             _ if item.is_service => hexagon(place, radius.max(body.pad_x * scale)),
-            ItemKind::Node if body.is_pill() => Form::Rect(place, place.w.min(place.h) / 2.0),
+            ItemKind::Node if body.is_capsule() => Form::Rect(place, place.w.min(place.h) / 2.0),
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
         };
@@ -411,5 +411,5 @@ pub(crate) fn title(item: &Item, shown: &Shown) -> String {
         ItemKind::Group => "topics",
         ItemKind::Namespace => "namespace",
     };
-    format!("{}\n{what}: {}", item.name, chips::facts(shown))
+    format!("{}\n{what}: {}", item.name, texts::facts(shown))
 }

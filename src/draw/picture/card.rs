@@ -54,7 +54,9 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
         };
         let same = card.lines.iter_mut().find(|line| {
             let first = &view.rows[line.topics[0].0];
-            let is_alike = is_quiet(row) && is_quiet(first) && row.is_plumbing == first.is_plumbing;
+            let is_alike = is_quiet(row)
+                && is_quiet(first)
+                && row.is_infrastructure == first.is_infrastructure;
             is_alike && line.sign == sign
         });
         match same {
@@ -77,9 +79,9 @@ pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
 
 /// Whether a topic has no events and either never carries a message or is a hub.
 fn is_quiet(row: &CardRow) -> bool {
-    row.shown.looks().iter().all(|look| {
+    row.shown.distinct().iter().all(|look| {
         let is_silent = look.state != State::Latched && look.hz.unwrap_or(0.0) <= 0.0;
-        look.mark.is_none() && (is_silent || row.is_plumbing)
+        look.mark.is_none() && (is_silent || row.is_infrastructure)
     })
 }
 
@@ -103,7 +105,7 @@ impl Line {
         let looks = self
             .topics
             .iter()
-            .flat_map(|(at, _)| view.rows[*at].shown.looks());
+            .flat_map(|(at, _)| view.rows[*at].shown.distinct());
         let rates = looks.filter(|_| self.topics.len() == 1).filter_map(rate);
         let rates = rates.map(|text| fonts.width(&text, style.topic.small, Weight::SemiBold));
         words + rates.fold(0.0, f64::max) + 3.0 * PAD * size

@@ -11,7 +11,7 @@ use crate::base::geometry::Size;
 use crate::draw::style::Edge;
 use crate::draw::text::Fonts;
 use crate::layout::Layout;
-use crate::view::{Arrow, ArrowKind, Showing, Shown, TopicRow, View};
+use crate::view::{Arrow, ArrowKind, Looks, Shown, TopicRow, View};
 
 /// The lines between the boxes of a namespace and one box outside of it, drawn as one while they are
 /// unchanged.
@@ -65,7 +65,7 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
 }
 
 /// The number of windows in which an element exists without a mark.
-fn quiet_windows(shown: &Showing, windows: usize) -> usize {
+fn quiet_windows(shown: &Looks, windows: usize) -> usize {
     let mut runs: Vec<(usize, bool)> = shown
         .runs()
         .map(|(window, look)| (window as usize, look.is_some_and(is_quiet)))
@@ -110,14 +110,14 @@ impl Gate {
     pub(crate) fn turns(&self, view: &View) -> BTreeSet<u32> {
         let shown = self.members.iter();
         let shown = shown.filter_map(|(at, _)| view.arrows_shown.get(*at));
-        shown.flat_map(Showing::runs).map(|run| run.0).collect()
+        shown.flat_map(Looks::runs).map(|run| run.0).collect()
     }
 
     /// Whether each line is drawn separately in some window.
     pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (usize, bool)> {
         let changed = |at: usize| {
             let shown = view.arrows_shown.get(at);
-            shown.is_some_and(|shown| !shown.looks().iter().all(is_quiet))
+            shown.is_some_and(|shown| !shown.distinct().iter().all(is_quiet))
         };
         let is_lead_changed = changed(self.lead);
         let all = self.members.iter();
@@ -253,7 +253,7 @@ pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<us
         let [topic] = &arrow.topics[..] else {
             return None;
         };
-        let looks = view.arrows_shown.get(at)?.looks();
+        let looks = view.arrows_shown.get(at)?.distinct();
         let is_sent = |shown: &Shown| shown.topics.iter().all(|row| row.ways == [true, false]);
         let is_fork = looks.iter().all(is_sent) && is_between_nodes(view, arrow);
         is_fork.then_some((arrow.from, &**topic))

@@ -12,7 +12,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{ArrowKind, ItemKind, Mark, Showing, Shown, View};
+use crate::view::{ArrowKind, ItemKind, Looks, Mark, Shown, View};
 
 /// A sign with its meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,12 +38,12 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
     let change = |own, words| (mark(&[own]), LegendSign::Change(own), words);
     let state = |state, words| {
         let boxes = view.items_shown.iter().chain(&view.arrows_shown);
-        let mut looks = boxes.flat_map(Showing::looks);
+        let mut looks = boxes.flat_map(Looks::distinct);
         let is_there = looks.any(|s| s.state == state && s.mark.is_none());
         (is_there, LegendSign::Box(state), words)
     };
     let confidence = |confidence, words| {
-        let mut looks = view.arrows_shown.iter().flat_map(Showing::looks);
+        let mut looks = view.arrows_shown.iter().flat_map(Looks::distinct);
         let is_there = looks.any(|s| s.confidence == confidence);
         (is_there, LegendSign::Line(confidence), words)
     };
@@ -274,7 +274,7 @@ fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State
         _ => Confidence::Measured,
     };
     let look = options::of_box(style, body, &shown(state, confidence, None));
-    let form = if round && body.is_pill() {
+    let form = if round && body.is_capsule() {
         Form::Rect(place, place.h / 2.0)
     } else if round {
         Form::Ellipse(place)

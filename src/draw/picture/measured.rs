@@ -4,7 +4,7 @@ use super::also::{self, Footer};
 use super::card::{self, Card};
 use super::gates::{self, Gate, larger};
 use super::spaces::{Space, first_seen, spaces};
-use super::{chips, replicas, topics};
+use super::{replicas, texts, topics};
 use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
@@ -13,16 +13,16 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::showing::both;
-use crate::view::{Arrow, ArrowKind, Item, ItemKind, Showing, Shown, View};
+use crate::view::looks::both;
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Looks, Shown, View};
 
 /// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
 /// The height of a line of text, relative to its font size.
 pub(crate) const LINE: f64 = 1.22;
 /// The height of a rate label, and its width beyond its text, relative to the font size.
-pub(crate) const PILL_HEIGHT: f64 = 1.5;
-pub(crate) const PILL_PAD: f64 = 1.2;
+pub(crate) const BADGE_HEIGHT: f64 = 1.5;
+pub(crate) const BADGE_PAD: f64 = 1.2;
 /// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
 const OWN_RATE: f64 = 0.15;
 
@@ -99,7 +99,7 @@ impl MeasuredGraph {
                 size,
                 outline: match item.kind {
                     _ if has_rows => Outline::Box,
-                    ItemKind::Node if style.node.is_pill() => Outline::Pill,
+                    ItemKind::Node if style.node.is_capsule() => Outline::Capsule,
                     ItemKind::Node => Outline::Ellipse,
                     _ => Outline::Box,
                 },
@@ -197,8 +197,8 @@ impl Measurer<'_> {
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
         let title = self.fonts.width(&space.title, size, Weight::SemiBold);
-        let chips = replicas::chips(space, self.fonts, size).pop();
-        let last = replicas::course(space, self.fonts, size).or(chips);
+        let badges = replicas::badges(space, self.fonts, size).pop();
+        let last = replicas::course(space, self.fonts, size).or(badges);
         let end = last.map_or(title, |(x, width)| x + width);
         Size::new(end, size * LINE)
     }
@@ -234,7 +234,7 @@ impl Measurer<'_> {
         let height = body.size * LINE + small;
         let depth = match item.kind {
             ItemKind::Node if has_rows => 0.0,
-            ItemKind::Node if body.is_pill() => {
+            ItemKind::Node if body.is_capsule() => {
                 let high = height + 2.0 * body.pad_y * FLAT;
                 return Size::new((width + 1.7 * body.pad_x).max(high), high);
             }
@@ -252,7 +252,7 @@ impl Measurer<'_> {
     fn second_lines(&self) -> Vec<Option<f64>> {
         let shown_rates = shown_rates(self.view);
         let mut widest = vec![None; self.view.items.len()];
-        for shown in self.view.items_shown.iter().flat_map(Showing::looks) {
+        for shown in self.view.items_shown.iter().flat_map(Looks::distinct) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(at) else {
                 continue;
@@ -270,7 +270,7 @@ impl Measurer<'_> {
     fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
         let style = &self.style.edge;
         let reported = shown_by_arrows(self.view);
-        let nothing = Showing::default();
+        let nothing = Looks::default();
         let all = self
             .view
             .arrows
@@ -278,7 +278,7 @@ impl Measurer<'_> {
             .zip(&self.view.arrows_shown)
             .zip(reported)
             .zip(topics);
-        let rooms = all.map(|(((arrow, showing), is_reported), names)| {
+        let rooms = all.map(|(((arrow, looks), is_reported), names)| {
             let mut widest = None;
             if arrow.kind == ArrowKind::Bundle {
                 // The box of a topic has its name and its rate.
@@ -286,7 +286,7 @@ impl Measurer<'_> {
                 if to.kind.word() == "topic" {
                     return None;
                 }
-                let rooms = showing.looks().iter();
+                let rooms = looks.distinct().iter();
                 let rooms =
                     rooms.filter_map(|s| topics::room(&topics::rows(s, names), self.fonts, style));
                 return rooms.fold(None, |a, b| larger(a, Some(b)));
@@ -295,23 +295,23 @@ impl Measurer<'_> {
             let topic = self.view.items_shown.get(arrow.from as usize);
             let topic = topic.filter(|_| is_reported && arrow.kind == ArrowKind::Subscribe);
             let looks = both(
-                if is_reported { showing } else { &nothing },
+                if is_reported { looks } else { &nothing },
                 topic.unwrap_or(&nothing),
             );
             for (shown, topic) in looks {
                 let label = shown.and_then(|shown| arrow_label(arrow, shown, topic));
-                let Some((text, is_pill)) = label else {
+                let Some((text, is_badge)) = label else {
                     continue;
                 };
-                let (weight, pad) = if is_pill {
-                    (Weight::SemiBold, style.size * PILL_PAD)
+                let (weight, pad) = if is_badge {
+                    (Weight::SemiBold, style.size * BADGE_PAD)
                 } else {
                     (Weight::Regular, style.halo_width)
                 };
                 let width = self.fonts.width(&text, style.size, weight);
                 widen(&mut widest, width + pad);
             }
-            Some(Size::new(widest?, style.size * PILL_HEIGHT))
+            Some(Size::new(widest?, style.size * BADGE_HEIGHT))
         });
         rooms.collect()
     }
@@ -375,7 +375,7 @@ pub(crate) fn arrow_label(
     if let Some((before, now)) = shown.rates.filter(|_| arrow.kind != ArrowKind::Bundle) {
         return Some((topic + &words::rate_change(before, now), true));
     }
-    let rate = chips::rate_in(shown);
+    let rate = texts::rate_in(shown);
     match arrow.kind {
         ArrowKind::Publish => rate.map(|rate| (rate, false)),
         ArrowKind::Subscribe => {
@@ -396,7 +396,7 @@ pub(crate) fn arrow_label(
 /// The smaller line of a box in a window.
 pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<String> {
     if let Some(inside) = &shown.inside {
-        return Some(chips::inside(inside));
+        return Some(texts::inside(inside));
     }
     if shown.is_ghost() {
         return None;
@@ -410,7 +410,7 @@ pub(crate) fn second_line(shown: &Shown, shown_rates: ShownRates) -> Option<Stri
     match (shown_rates, shown.rates) {
         (ShownRates::Nothing | ShownRates::Changes, _) => None,
         (ShownRates::Rates, Some((before, now))) => Some(words::rate_change(before, now)),
-        (ShownRates::Rates, None) => chips::rate_in(shown),
+        (ShownRates::Rates, None) => texts::rate_in(shown),
     }
 }
 

@@ -6,28 +6,28 @@ use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{Attendance, View};
+use crate::view::{MemberState, View};
 
 /// The badges in the member list of a namespace that represents several: left edges and widths, relative to
 /// the title.
-pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
-    if space.replicas.len() > MOST_CHIPS {
+pub(crate) fn badges(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
+    if space.replicas.len() > MOST_BADGES {
         return Vec::new();
     }
     let mut x = fonts.width(&space.title, size, Weight::SemiBold) + size;
-    let chip = |index: &String| {
-        let width = fonts.width(index, size * CHIP_TEXT, Weight::SemiBold) + size * 0.6;
+    let badge = |index: &String| {
+        let width = fonts.width(index, size * BADGE_TEXT, Weight::SemiBold) + size * 0.6;
         let at = x;
         x += width + size * 0.2;
         (at, width)
     };
-    space.replicas.iter().map(chip).collect()
+    space.replicas.iter().map(badge).collect()
 }
 
 /// The largest number of equal namespaces with a badge each; more are only counted.
-const MOST_CHIPS: usize = 32;
+const MOST_BADGES: usize = 32;
 /// The font size of a badge, relative to that of the title.
-const CHIP_TEXT: f64 = 0.8;
+const BADGE_TEXT: f64 = 0.8;
 
 /// The width of the line of their number over time, relative to the font size of the title.
 const COURSE: f64 = 6.0;
@@ -39,7 +39,7 @@ pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f6
         return None;
     }
     let title = fonts.width(&space.title, size, Weight::SemiBold);
-    let end = chips(space, fonts, size).pop();
+    let end = badges(space, fonts, size).pop();
     let end = end.map_or(title, |(x, width)| x + width);
     Some((end + size * 0.7, size * COURSE))
 }
@@ -93,7 +93,7 @@ impl Boxes<'_> {
         space: &Space,
         (place, by): (Rect, f64),
         id: &str,
-        (now, who): (f64, &[Attendance]),
+        (now, who): (f64, &[MemberState]),
     ) -> Group {
         let size = self.style.cluster.size;
         let (place, scale) = (
@@ -110,15 +110,15 @@ impl Boxes<'_> {
         };
         let here = who.iter().filter(|who| who.is_here());
         let mut group = Group {
-            id: format!("s{id}..roll"),
-            class: "roll".to_owned(),
+            id: format!("s{id}..members"),
+            class: "members".to_owned(),
             data: vec![("name", space.name.clone())],
             title: format!("{} of {} present", here.count(), who.len()),
             ..Group::default()
         };
-        let chips = chips(space, self.fonts, size);
-        for ((index, who), place) in space.replicas.iter().zip(who).zip(chips) {
-            self.chip(&mut group, index, *who, area(place));
+        let badges = badges(space, self.fonts, size);
+        for ((index, who), place) in space.replicas.iter().zip(who).zip(badges) {
+            self.badge(&mut group, index, *who, area(place));
         }
         if let Some(place) = course(space, self.fonts, size) {
             let area = area(place);
@@ -133,18 +133,18 @@ impl Boxes<'_> {
     }
 
     /// The badge of one namespace.
-    fn chip(&self, group: &mut Group, index: &str, who: Attendance, area: Rect) {
+    fn badge(&self, group: &mut Group, index: &str, who: MemberState, area: Rect) {
         let (style, scale) = (self.style, self.fit.scale);
         let (fill, color, text) = match who {
-            Attendance::Here => (style.node.fill, style.node.stroke, style.node.text),
-            Attendance::Away => (Color::NONE, style.silent.stroke, style.silent.text),
-            Attendance::Joined => (style.added.fill, style.added.color, style.added.text),
-            Attendance::Left => (style.removed.fill, style.removed.color, style.removed.text),
+            MemberState::Here => (style.node.fill, style.node.stroke, style.node.text),
+            MemberState::Away => (Color::NONE, style.silent.stroke, style.silent.text),
+            MemberState::Joined => (style.added.fill, style.added.color, style.added.text),
+            MemberState::Left => (style.removed.fill, style.removed.color, style.removed.text),
         };
         let dash = match who {
-            Attendance::Here | Attendance::Joined => Vec::new(),
-            Attendance::Away => style.silent.dash.clone(),
-            Attendance::Left => style.removed.dash.clone(),
+            MemberState::Here | MemberState::Joined => Vec::new(),
+            MemberState::Away => style.silent.dash.clone(),
+            MemberState::Left => style.removed.dash.clone(),
         };
         let stroke = Stroke {
             color,
@@ -156,7 +156,7 @@ impl Boxes<'_> {
             fill,
             stroke: stroke.scaled(self.fit.pen),
         });
-        let letters = style.cluster.size * CHIP_TEXT * scale;
+        let letters = style.cluster.size * BADGE_TEXT * scale;
         let font = (letters, Weight::SemiBold);
         group.text(Text::centred(
             Anchor::Middle,

@@ -51,8 +51,8 @@ pub(crate) fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
 /// The first window in which each namespace has content.
 pub(crate) fn first_seen(view: &View) -> Vec<usize> {
     let mut first = vec![usize::MAX; view.namespaces.len()];
-    for (item, showing) in (0..).zip(&view.items_shown) {
-        let seen = showing.runs().find(|(_, shown)| shown.is_some());
+    for (item, looks) in (0..).zip(&view.items_shown) {
+        let seen = looks.runs().find(|(_, shown)| shown.is_some());
         let seen = seen.map_or(usize::MAX, |(window, _)| window as usize);
         for at in view.around(item) {
             first[at] = first[at].min(seen);

@@ -44,7 +44,7 @@ fn body(group: &Group) -> Option<Form> {
     })
 }
 
-/// Whether it is a part of the graph, and not of the furniture.
+/// Whether it is a part of the graph, and not a decoration.
 fn is_element(group: &Group) -> bool {
     let known = |(key, _): &(&str, String)| matches!(*key, "name" | "from");
     group.data.first().is_some_and(known)
@@ -79,11 +79,11 @@ fn lines_do_not_cross_text() {
                 Piece::Text(text) => Some(text.text.as_str()),
                 Piece::Shape(_) => None,
             });
-        let furniture = ["title", "legend", "axis"];
+        let decorations = ["title", "legend", "axis"];
         let own = scene
             .groups
             .iter()
-            .filter(|g| furniture.contains(&g.id.as_str()));
+            .filter(|g| decorations.contains(&g.id.as_str()));
         let own = own
             .flat_map(|g| &g.pieces)
             .filter(|p| matches!(p, Piece::Text(_)));
@@ -232,7 +232,7 @@ fn incremental_frames_equal_fully_drawn_ones() {
 }
 
 #[test]
-fn furniture_fits_pages_of_any_size() {
+fn decorations_fit_pages_of_any_size() {
     for (w, h) in [
         (1920.0, 1080.0),
         (800.0, 450.0),
@@ -308,7 +308,7 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let scenes = scenes(&windows);
         let member_lists = scenes.iter().map(|scene| {
-            let member_list = scene.groups.iter().find(|group| group.class == "roll");
+            let member_list = scene.groups.iter().find(|group| group.class == "members");
             let shapes = member_list
                 .into_iter()
                 .flat_map(|member_list| &member_list.pieces);

@@ -5,7 +5,7 @@ use crate::view::{Counts, Shown};
 
 /// The texts of the badges for beginnings, ends and other changes, each with the number of headlines it
 /// counts; empty for none.
-pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
+pub(crate) fn change_counts(counts: &Counts) -> [(String, usize); 3] {
     let came = [counts.nodes_added, counts.topics_added, counts.edges_added];
     let went = [
         counts.nodes_removed,
@@ -13,14 +13,14 @@ pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
         counts.edges_removed,
     ];
     [
-        (chip('+', came), counts.came()),
-        (chip('−', went), counts.went()),
+        (change_count('+', came), counts.came()),
+        (change_count('−', went), counts.went()),
         (changed(counts), counts.changed()),
     ]
 }
 
 /// The text of one badge, from the numbers of nodes, topics and edges: `+1 node +2 topics`.
-fn chip(sign: char, numbers: [usize; 3]) -> String {
+fn change_count(sign: char, numbers: [usize; 3]) -> String {
     let mut parts = Vec::new();
     for (n, word) in numbers.into_iter().zip(["node", "topic", "edge"]) {
         if n > 0 {
@@ -118,10 +118,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chips_count() {
-        assert_eq!(chip('+', [1, 2, 0]), "+1 node +2 topics");
-        assert_eq!(chip('−', [0, 0, 1]), "−1 edge");
-        assert_eq!(chip('+', [0, 0, 0]), "");
+    fn badges_count_changes() {
+        assert_eq!(change_count('+', [1, 2, 0]), "+1 node +2 topics");
+        assert_eq!(change_count('−', [0, 0, 1]), "−1 edge");
+        assert_eq!(change_count('+', [0, 0, 0]), "");
         let counts = Counts {
             nodes_added: 1,
             nodes_removed: 4,
@@ -130,7 +130,7 @@ mod tests {
             ..Counts::default()
         };
         assert_eq!(
-            chips(&counts),
+            change_counts(&counts),
             [
                 ("+1 node".to_owned(), 1),
                 ("−4 nodes".to_owned(), 4),

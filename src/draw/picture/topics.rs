@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::chips;
 use super::measured::LINE;
+use super::texts;
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::Edge;
@@ -191,7 +191,7 @@ fn rate(row: &TopicRow) -> Option<String> {
     if row.is_starved {
         return Some(STARVED.to_owned());
     }
-    let rate = chips::rate_in_window(row.hz, row.count).filter(|_| row.ways != [true, true]);
+    let rate = texts::rate_in_window(row.hz, row.count).filter(|_| row.ways != [true, true]);
     rate.or_else(|| (row.state == State::Latched).then(|| "(latched)".to_owned()))
 }
 

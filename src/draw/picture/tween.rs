@@ -18,7 +18,7 @@ pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
     for group in &after.groups {
         match old.remove(group.id.as_str()) {
             Some(before) if before == group => groups.push(group.clone()),
-            Some(_) if is_furniture(group) => groups.push(group.clone()),
+            Some(_) if is_decoration(group) => groups.push(group.clone()),
             Some(before) => cross_fade(&mut groups, before, group, part(CHANGING, phase)),
             None => push(&mut groups, group, part(COMING, phase)),
         }
@@ -60,7 +60,7 @@ fn push(groups: &mut Vec<Group>, group: &Group, opacity: f64) {
 }
 
 /// Whether it is a title, a badge, a caption or the playhead, which immediately show the new window.
-fn is_furniture(group: &Group) -> bool {
+fn is_decoration(group: &Group) -> bool {
     group.data.is_empty()
 }
 

@@ -7,13 +7,13 @@ use super::arrows::{ArrowPath, Arrows, is_badged};
 use super::boxes::{Boxes, ItemBox};
 use super::measured::ShownRates;
 use super::page::GraphFit;
-use super::{Picture, badge, chips, encoded, places};
+use super::{Picture, badge, encoded, places, texts};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, ItemKind, Mark, Showing, Shown};
+use crate::view::{Arrow, ItemKind, Looks, Mark, Shown};
 
 /// The whole graph, every element once, drawn as active; a painter omits the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,7 +54,7 @@ pub struct UnionElement {
 /// The rate of an element in a window as drawn, after the topics that an arrow between nodes carries; empty
 /// for none.
 pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
-    let rate = chips::rate_in(shown).unwrap_or_default();
+    let rate = texts::rate_in(shown).unwrap_or_default();
     match arrow.and_then(|arrow| arrow.carries(shown)) {
         Some(topic) => format!("{topic} {rate}").trim_end().to_owned(),
         _ => rate,
@@ -109,7 +109,7 @@ impl Picture<'_> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         let mut latched = BTreeSet::new();
-        for shown in view.items_shown.iter().flat_map(Showing::looks) {
+        for shown in view.items_shown.iter().flat_map(Looks::distinct) {
             if shown.state == State::Latched {
                 latched.insert(shown.id as usize);
             }
@@ -155,9 +155,8 @@ impl Picture<'_> {
             fit,
         };
         let mut marks = vec![BTreeSet::new(); view.arrows.len()];
-        for ((arrow, showing), marks) in view.arrows.iter().zip(&view.arrows_shown).zip(&mut marks)
-        {
-            for (window, shown) in showing.runs() {
+        for ((arrow, looks), marks) in view.arrows.iter().zip(&view.arrows_shown).zip(&mut marks) {
+            for (window, shown) in looks.runs() {
                 let Some(mark) = shown.and_then(|shown| shown.mark) else {
                     continue;
                 };
@@ -170,9 +169,9 @@ impl Picture<'_> {
         let arrows_shown = view.arrows.iter().zip(&view.arrows_shown);
         let parts = arrows_shown.zip(tracks).zip(&plan.links).zip(marks);
         parts
-            .map(|((((arrow, showing), track), link), marks)| {
+            .map(|((((arrow, looks), track), link), marks)| {
                 let shown = plain(link.label.map(|_| 1.0));
-                let is_starved = showing.looks().iter().any(|look| look.is_starved);
+                let is_starved = looks.distinct().iter().any(|look| look.is_starved);
                 UnionElement {
                     group: arrows.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),

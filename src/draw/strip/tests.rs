@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, State};
 use crate::layout;
-use crate::view::{Headline, Item, ItemKind, Mark, Phrase, Showing, Shown};
+use crate::view::{Headline, Item, ItemKind, Looks, Mark, Phrase, Shown};
 
 /// Four minutes in which one node exists and another appears and vanishes.
 fn two_nodes() -> (Mission, View) {
@@ -61,8 +61,8 @@ fn two_nodes() -> (Mission, View) {
     let view = View {
         items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
         items_shown: vec![
-            Showing::of(marks.iter().map(|_| Some(&driver))),
-            Showing::of(planner.iter().map(Option::as_ref)),
+            Looks::of(marks.iter().map(|_| Some(&driver))),
+            Looks::of(planner.iter().map(Option::as_ref)),
         ],
         frames: marks.into_iter().enumerate().map(frame).collect(),
         ..View::default()

@@ -13,7 +13,7 @@ use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::figure::course::{LifeLine, LifeLines};
 use crate::draw::figure::marks::Sign;
-use crate::draw::picture::chips;
+use crate::draw::picture::change_counts;
 use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
@@ -246,7 +246,7 @@ fn reported(
     let frames = frames.filter(|(_, frame)| frame.is_changed());
     let parts = mission.log.all_parts();
     let reported = |(at, frame): (usize, &Frame)| {
-        let mut chips = chips(&frame.counts).map(|(text, _)| text);
+        let mut counts = change_counts(&frame.counts).map(|(text, _)| text);
         let place = |what: &Element| places.get(what).map_or(-1, |at| i64::from(*at));
         let returns: Vec<_> = frame
             .lasting
@@ -260,7 +260,7 @@ fn reported(
             })
             .collect();
         if frame.headlines.is_empty() {
-            chips[2] = format!("{} back", returns.len());
+            counts[2] = format!("{} back", returns.len());
         }
         let lines = frame
             .headlines
@@ -274,7 +274,7 @@ fn reported(
                 Some((time, sign(event.kind), what, sentence, headline.event))
             })
             .chain(returns);
-        ReportedData(at, frame.counts.total(), chips, lines.collect())
+        ReportedData(at, frame.counts.total(), counts, lines.collect())
     };
     frames.map(reported).collect()
 }

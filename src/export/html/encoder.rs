@@ -44,8 +44,8 @@ fn page(
     // A chosen style is always used; the default one has a dark variant.
     let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
-    let board = overview.as_ref().map_or("", |o| &o.title);
-    let title = sequence.picture.title().unwrap_or(board);
+    let timeline = overview.as_ref().map_or("", |o| &o.title);
+    let title = sequence.picture.title().unwrap_or(timeline);
     let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
     // The timeline of topics has a row for each, even if a graph would group them.
     let each = sequence.unfolded.map_or(sequence.view, |u| u.view);

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::view::{Mark, SeenWindow, Showing, Shown, View};
+use crate::view::{Looks, Mark, SeenWindow, Shown, View};
 
 /// The most edges that are drawn.
 const MOST_EDGES: usize = 60;
@@ -66,17 +66,17 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
 }
 
 /// The outcome of each element up to window `last`: its last state, with a mark for the whole mission.
-fn ends(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
-    let ends = all.iter().filter_map(|showing| end(showing, last));
+fn ends(all: &[Looks], last: usize) -> BTreeMap<u32, Shown> {
+    let ends = all.iter().filter_map(|looks| end(looks, last));
     ends.map(|shown| (shown.id, shown)).collect()
 }
 
-fn end(showing: &Showing, last: usize) -> Option<Shown> {
+fn end(looks: &Looks, last: usize) -> Option<Shown> {
     let is_gone = |shown: &Shown| shown.mark == Some(Mark::Removed);
-    let runs = || showing.runs().filter_map(|(_, shown)| shown);
+    let runs = || looks.runs().filter_map(|(_, shown)| shown);
     let end = runs().rev().find(|shown| !is_gone(shown));
     let end = end.or_else(|| runs().next())?;
-    let there = |k: usize| showing.at(k).is_some_and(|shown| !is_gone(shown));
+    let there = |k: usize| looks.at(k).is_some_and(|shown| !is_gone(shown));
     let is_marked = runs().any(|shown| shown.mark.is_some());
     Some(Shown {
         rates: None,

@@ -180,7 +180,7 @@ fn enters(pair: &[Point], at: &Rect, outline: Outline) -> bool {
         let t = f64::from(step) / 40.0;
         let (x, y) = (a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t);
         match outline {
-            Outline::Box | Outline::Pill => x.abs() < 1.0 && y.abs() < 1.0,
+            Outline::Box | Outline::Capsule => x.abs() < 1.0 && y.abs() < 1.0,
             Outline::Ellipse => x * x + y * y < 1.0,
         }
     })

@@ -225,12 +225,12 @@ pub(crate) fn variables(style: &Style) -> String {
         ("added", style.added.color),
         ("removed", style.removed.color),
         ("changed", style.changed.color),
-        ("added-chip", style.chip.added),
-        ("added-on", style.chip.added_text),
-        ("removed-chip", style.chip.removed),
-        ("removed-on", style.chip.removed_text),
-        ("changed-chip", style.chip.changed),
-        ("changed-on", style.chip.changed_text),
+        ("added-count", style.count.added),
+        ("added-on", style.count.added_text),
+        ("removed-count", style.count.removed),
+        ("removed-on", style.count.removed_text),
+        ("changed-count", style.count.changed),
+        ("changed-on", style.count.changed_text),
     ];
     let mut out = String::from(":root{");
     for (name, color) in all {

@@ -101,4 +101,4 @@ class Graph {
 }
 const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);
 const folded = data.graphs[1] && new Graph(data.graphs[1], $.folded);
-const news = new Map(told.map(([w, n, chips, lines]) => [w, { n, chips, lines }]));
+const news = new Map(told.map(([w, n, counts, lines]) => [w, { n, counts, lines }]));

@@ -79,8 +79,8 @@ function marked(g = shown) {
 	for (let i = 0; i < g.count; i++) if (base < 0 ? g.marks[g.class(i, now)] >= 0 : g.difference(i, base, now).length) all.push(i);
 	return all;
 }
-function chipsOf() {
-	if (base < 0 && !range) return news.get(now)?.chips ?? [];
+function countsOf() {
+	if (base < 0 && !range) return news.get(now)?.counts ?? [];
 	const sum = { added: [0, 0, 0], removed: [0, 0, 0], changed: [0, 0, 0] };
 	marked(whole).forEach(i => sum[range ? looksOf(whole)[i][0].split(' ').at(-1) : whole.difference(i, base, now)[0].split(' ')[0]][i < whole.N ? +(whole.kinds[i] % 3 > 0) : 2]++);
 	const spell = (sign, counts) => counts.map((n, k) => n && `${sign}${n} ${['node', 'topic', 'edge'][k]}${n > 1 ? 's' : ''}`).filter(Boolean).join(' ');
@@ -100,7 +100,7 @@ function seek(w, quiet) {
 	save();
 }
 function header() {
-	const place = `window ${now + 1} of ${W}`, chips = chipsOf();
+	const place = `window ${now + 1} of ${W}`, counts = countsOf();
 	if (range) say('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${clock(starts[range[0]])} – ${clock(ends[range[1]])} of ${clock(total)} · mean rates`);
 	else say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
@@ -109,11 +109,11 @@ function header() {
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
 	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
-	if (base < 0 && !range) $.chips.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
-	else delete $.chips.dataset.entries;
-	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
+	if (base < 0 && !range) $.counts.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
+	else delete $.counts.dataset.entries;
+	$.counts.replaceChildren(...counts.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;
-	$.seek.ariaValueText = [clock(starts[now]), place, ...chips.filter(Boolean)].join(', ');
+	$.seek.ariaValueText = [clock(starts[now]), place, ...counts.filter(Boolean)].join(', ');
 }
 function play(on) {
 	if (!on && !timer) return;
