@@ -103,7 +103,7 @@ fn run(picture: &Picture<'_>, painter: &Painter, frames: &[usize], threads: usiz
         let mut canvas = Canvas::new(painter, 1.0);
         chunk
             .iter()
-            .map(|k| png(canvas.draw(picture.scene(*k)).unwrap()))
+            .map(|k| png(canvas.draw(picture.scene(*k)).unwrap().pixels))
             .sum()
     };
     pool.install(|| frames.par_chunks(30).map(chunk).sum())
@@ -133,9 +133,12 @@ fn over_the_last(picture: &Picture<'_>, painter: &Painter, view: &View) {
         let start = Instant::now();
         let scene = picture.scene(k);
         let between = Instant::now();
-        let pixels = canvas.draw(scene.clone()).unwrap();
+        let drawn = canvas.draw(scene.clone()).unwrap();
         let end = Instant::now();
-        assert!(*pixels == painter.paint(&scene, 1.0).unwrap(), "window {k}");
+        assert!(
+            *drawn.pixels == painter.paint(&scene, 1.0).unwrap(),
+            "window {k}"
+        );
         if differing(&last, &scene) * 10 < few {
             time += end - start;
             drawing += end - between;

@@ -9,7 +9,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use resvg::usvg::{self, Tree, fontdb};
 
-pub use self::canvas::Canvas;
+pub use self::canvas::{Canvas, DrawnScene};
 use self::drawn::Drawn;
 use self::tiles::Tiles;
 use crate::base::cast;

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::steps::{RunStep, Steps};
 use crate::base::error::Result;
-use crate::draw::paint::raster::{Canvas, Pixels};
+use crate::base::geometry::Size;
+use crate::draw::paint::raster::{Canvas, DrawnScene};
 use crate::draw::scene::Scene;
 use crate::export::palette::{Census, Matcher, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
@@ -22,6 +23,9 @@ const MOST_BYTES: f64 = 48e6;
 const MOST_IN_A_ROW: usize = 8;
 /// Unwritten rows per core: one in progress, one queued.
 const ROWS_AHEAD: usize = 2;
+/// The most groups on the pages of all threads together, except on those of a single thread: a thread keeps the scene
+/// and the drawing of each group, up to 10 kB, and tens of thousands of boxes must fit into 512 MB.
+const MOST_GROUPS: usize = 50_000;
 /// The most frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
 
@@ -52,6 +56,9 @@ pub(crate) struct RasterPool<'a> {
     needs: Needs,
     palette: Palette,
     steps: &'a Steps,
+    /// The size of a page, in the pixels of the picture.
+    page: Size,
+    threads: usize,
 }
 
 impl<'a> RasterPool<'a> {
@@ -70,7 +77,15 @@ impl<'a> RasterPool<'a> {
             needs: needs.unwrap_or(Needs::Nothing),
             palette: Palette::new(Vec::new()),
             steps,
+            page: Size::new(1.0, 1.0),
+            threads: rayon::current_num_threads(),
         };
+        if let Some(first) = frame_times.first() {
+            let scene = pool.scene(*first);
+            pool.page = scene.size;
+            let most = MOST_GROUPS / scene.groups.len().max(1);
+            pool.threads = pool.threads.min(most).max(1);
+        }
         if pool.needs >= Needs::Indices {
             pool.palette = pool.survey()?;
         }
@@ -91,7 +106,7 @@ impl<'a> RasterPool<'a> {
         mut take: impl FnMut(Vec<Packed>) -> Result<ControlFlow<()>>,
     ) -> Result<()> {
         let rows = self.rows();
-        let cores = rayon::current_num_threads().min(rows.len());
+        let cores = self.threads.min(rows.len());
         thread::scope(|scope| {
             // Dropping the receivers, in any case, ends the drawing threads.
             let drawn: Vec<Receiver<Result<Vec<Packed>>>> = (0..cores)
@@ -125,10 +140,9 @@ impl<'a> RasterPool<'a> {
     /// The frames in rows of about equal length, as long as memory allows.
     fn rows(&self) -> Vec<Range<usize>> {
         let count = self.frame_times.len();
-        let cores = rayon::current_num_threads();
-        let page = self.frame_times.first().map(|f| self.scene(*f).size);
+        let cores = self.threads;
         let scale = self.sequence.options.scale;
-        let pixels = page.map_or(1.0, |page| page.w * page.h * scale * scale);
+        let pixels = self.page.w * self.page.h * scale * scale;
         let density: f64 = self.wants.iter().map(|want| want.density).sum();
         let fits =
             |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * density <= MOST_BYTES;
@@ -157,15 +171,15 @@ impl<'a> RasterPool<'a> {
         sample.extend(spread(&all, SAMPLES / 2));
         sample.sort_unstable();
         sample.dedup();
-        let each = sample.len().div_ceil(rayon::current_num_threads()).max(1);
+        let each = sample.len().div_ceil(self.threads).max(1);
         let count = |places: &[usize]| -> Result<Census> {
             let mut canvas = Canvas::new(self.sequence.painter, self.sequence.options.scale);
             let mut census = Census::default();
             for at in places {
                 let scene = self.scene(self.frame_times[*at]);
-                let pixels = self.steps.time(RunStep::Paint, || canvas.draw(scene))?;
+                let drawn = self.steps.time(RunStep::Paint, || canvas.draw(scene))?;
                 self.steps
-                    .time(RunStep::Colours, || census.count(&pixels.rgba));
+                    .time(RunStep::Colours, || census.count(&drawn.pixels.rgba));
             }
             Ok(census)
         };
@@ -213,20 +227,20 @@ impl<'a> Drawer<'a> {
         let (steps, needs) = (self.pool.steps, self.pool.needs);
         let frame_time = self.pool.frame_times[at];
         let scene = steps.time(RunStep::Compose, || self.pool.scene(frame_time));
-        let nothing = NOTHING;
-        let pixels = if needs >= Needs::Pixels {
-            let scene = scene.clone();
-            steps.time(RunStep::Paint, || self.canvas.draw(scene))?;
-            self.canvas.pixels().unwrap_or(&nothing)
+        let undrawn;
+        let drawn = if needs >= Needs::Pixels {
+            steps.time(RunStep::Paint, || self.canvas.draw(scene))?
         } else {
-            &nothing
+            undrawn = scene;
+            DrawnScene::without_pixels(&undrawn)
         };
+        let DrawnScene { scene, pixels, .. } = drawn;
         if needs >= Needs::Indices {
             std::mem::swap(&mut self.before, &mut self.indices);
             self.indices.clone_from(&self.before);
             self.indices.resize(pixels.rgba.len() / 4, 0);
             steps.time(RunStep::Colours, || {
-                for bytes in self.canvas.changed() {
+                for bytes in drawn.changed() {
                     let places = bytes.start / 4..bytes.end / 4;
                     self.matcher
                         .map(&pixels.rgba[bytes], &mut self.indices[places]);
@@ -236,7 +250,7 @@ impl<'a> Drawer<'a> {
         self.at = Some(at);
         let frame = DrawnFrame {
             time: frame_time,
-            scene: &scene,
+            scene,
             pixels,
             palette: &self.pool.palette,
             indices: &self.indices,
@@ -258,12 +272,6 @@ impl<'a> Drawer<'a> {
         })
     }
 }
-
-const NOTHING: Pixels = Pixels {
-    width: 0,
-    height: 0,
-    rgba: Vec::new(),
-};
 
 /// At most `most` of `all`, evenly spread, the first and the last among them.
 fn spread(all: &[usize], most: usize) -> Vec<usize> {

@@ -13,6 +13,40 @@ use crate::draw::scene::{Group, Scene};
 /// The largest share of changed tiles; above it, everything is redrawn.
 const MOST_SHARE: f64 = 0.7;
 
+/// A scene with its pixels.
+pub struct DrawnScene<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its pixels; none if it was not drawn.
+    pub pixels: &'a Pixels,
+    sheet: Option<(&'a PixelSheet, Option<&'a Tiles>)>,
+}
+
+impl<'a> DrawnScene<'a> {
+    /// A scene that was not drawn.
+    pub fn without_pixels(scene: &'a Scene) -> Self {
+        const NOTHING: &Pixels = &Pixels {
+            width: 0,
+            height: 0,
+            rgba: Vec::new(),
+        };
+        Self {
+            scene,
+            pixels: NOTHING,
+            sheet: None,
+        }
+    }
+
+    /// The bytes of the pixels that may differ from those of the scene before, from top to bottom.
+    pub fn changed(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let rows = self
+            .sheet
+            .and_then(|(sheet, dirty)| Some(sheet.rows(dirty?)));
+        let all = rows.is_none().then_some(0..self.pixels.rgba.len());
+        all.into_iter().chain(rows.into_iter().flatten())
+    }
+}
+
 /// A page on which frames are drawn one after another; it stores the last one.
 pub struct Canvas<'a> {
     painter: &'a Painter,
@@ -43,28 +77,17 @@ impl<'a> Canvas<'a> {
     ///
     /// # Errors
     /// As [`Painter::paint`].
-    pub fn draw(&mut self, scene: Scene) -> Result<&Pixels> {
+    pub fn draw(&mut self, scene: Scene) -> Result<DrawnScene<'_>> {
         let last = match self.last.take() {
             Some(last) => last.followed_by(scene, self.painter)?,
             None => Last::first(scene, self.painter, self.scale)?,
         };
-        Ok(&self.last.insert(last).sheet.pixels)
-    }
-
-    /// The last drawing; `None` before the first.
-    pub fn pixels(&self) -> Option<&Pixels> {
-        self.last.as_ref().map(|last| &last.sheet.pixels)
-    }
-
-    /// The bytes of the pixels that the last drawing may have changed, from top to bottom.
-    pub fn changed(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let all = self.last.as_ref().filter(|last| last.dirty.is_none());
-        let all = all.map(|last| 0..last.sheet.pixels.rgba.len());
-        let rows = self.last.as_ref().and_then(|last| {
-            let dirty = last.dirty.as_ref()?;
-            Some(last.sheet.rows(dirty))
-        });
-        all.into_iter().chain(rows.into_iter().flatten())
+        let last = self.last.insert(last);
+        Ok(DrawnScene {
+            scene: &last.scene,
+            pixels: &last.sheet.pixels,
+            sheet: Some((&last.sheet, last.dirty.as_ref())),
+        })
     }
 }
 
