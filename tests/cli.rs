@@ -270,6 +270,15 @@ fn a_survey_of_a_folder_includes_broken_bags() {
 }
 
 #[test]
+fn long_help_shows_the_placeholder_of_windows() {
+    let dir = folder();
+    let help = bagreel(dir.path(), &["render", "--help"]);
+    let help = String::from_utf8(help.stdout).unwrap();
+    assert!(help.contains("a drawing per window with `{n}`"), "{help}");
+    assert!(help.contains("`{n}` writes one file"), "{help}");
+}
+
+#[test]
 fn every_command_has_its_manual_page() {
     let dir = folder();
     let page = |args: &[&str]| {

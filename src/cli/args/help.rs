@@ -203,6 +203,10 @@ impl Typed {
 fn examples(command: Command, text: &str) -> Command {
     let examples = format!("Examples:{text}");
     let more = command.get_after_long_help().or(command.get_after_help());
-    let long = more.map_or_else(|| examples.clone(), |more| format!("{examples}\n\n{more}"));
+    // With its escape sequences: one of them keeps `{n}` as it is.
+    let long = more.map_or_else(
+        || examples.clone(),
+        |more| format!("{examples}\n\n{}", more.ansi()),
+    );
     command.after_help(examples).after_long_help(long)
 }

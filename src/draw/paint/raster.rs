@@ -115,7 +115,12 @@ impl Painter {
     /// [`Error::Usage`] if the picture would have no pixels, a side of more than 65,535, or more than 64
     /// million pixels.
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
-        Ok(PixelSheet::covered(self, scene, scale)?.0.pixels)
+        let mut sheet = PixelSheet::of(scene, scale)?;
+        for group in &scene.groups {
+            let group = self.read(scene, group, &sheet)?;
+            sheet.draw(&group);
+        }
+        Ok(sheet.pixels)
     }
 
     /// The group in pixels, from the cache if it was drawn before.
