@@ -90,15 +90,15 @@ def main():
         time.sleep(max(0, begun + sequence / 50 - time.time()))
     cpu, peak, now = usage(follower.pid)
     for at, when in born.items():
-        told = [t for t, line in lines if f"/node{at // 4} started" in line]
-        delays += [told[0] - when] if told else []
+        lines_of = [t for t, line in lines if f"/node{at // 4} started" in line]
+        delays += [lines_of[0] - when] if lines_of else []
     follower.terminate()
     follower.wait()
     size = os.path.getsize(path) / 1e6
     print(f"{topics} topics at 50 Hz for {seconds:.0f} s, {size:.0f} MB: {100 * cpu / seconds:.1f} % of a core, {peak:.0f} MB at most, {now:.0f} MB at the end")
     if delays:
         delays.sort()
-        print(f"{len(delays)} of {len(born)} starts told, after {delays[len(delays) // 2]:.2f} s (median), at most {delays[-1]:.2f} s")
+        print(f"{len(delays)} of {len(born)} starts reported, after {delays[len(delays) // 2]:.2f} s (median), at most {delays[-1]:.2f} s")
 
 
 main()
