@@ -52,43 +52,55 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp,
             }
         }
     }
-    let whole = |bag: usize| {
-        let parts = bags.iter().zip(&of).filter(|(_, one)| **one == of[bag]);
-        let spans = parts.filter_map(|((span, _), _)| *span);
-        spans
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-            .unwrap_or((Stamp::MIN, Stamp::MAX))
-    };
-    (0..bags.len()).map(whole).collect()
+    let mut whole: BTreeMap<usize, (Stamp, Stamp)> = BTreeMap::new();
+    for ((span, _), one) in bags.iter().zip(&of) {
+        if let Some((from, to)) = *span {
+            let all = whole.entry(*one).or_insert((from, to));
+            *all = (all.0.min(from), all.1.max(to));
+        }
+    }
+    let unknown = (Stamp::MIN, Stamp::MAX);
+    of.iter()
+        .map(|one| whole.get(one).copied().unwrap_or(unknown))
+        .collect()
 }
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,
 /// or recorded twice.
-#[expect(
-    clippy::type_complexity,
-    reason = "a short-lived list of when each bag contains a node and topic"
-)]
 pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name> {
-    let mut seen: BTreeMap<(Name, Name), Vec<(usize, (Stamp, Stamp))>> = BTreeMap::new();
-    let mut doubled = BTreeSet::new();
+    let mut seen: BTreeMap<(Name, Name), Vec<(Stamp, Stamp, usize)>> = BTreeMap::new();
     let named = streams
         .iter()
         .filter(|s| s.trust == Reliability::Whole && !s.latched);
     for stream in named.filter(|s| !crate::base::name::is_quiet(s.connection.topic.as_str())) {
-        let (Some(node), Some(times)) = (stream.sender, recorded.messages.bounds(stream.times))
-        else {
-            continue;
-        };
-        let before = seen.entry((node, stream.topic)).or_default();
-        let meets = |(bag, other): &(usize, (Stamp, Stamp))| {
-            *bag != stream.bag && times.1.min(other.1).since(times.0.max(other.0)) > OUT_OF_ORDER_NS
-        };
-        if before.iter().any(meets) {
-            doubled.insert(node);
+        let times = recorded.messages.bounds(stream.times);
+        if let (Some(node), Some((from, to))) = (stream.sender, times) {
+            let all = seen.entry((node, stream.topic)).or_default();
+            all.push((from, to, stream.bag));
         }
-        before.push((stream.bag, times));
     }
-    doubled
+    let doubled = seen
+        .into_iter()
+        .filter_map(|((node, _), all)| overlap(all).then_some(node));
+    doubled.collect()
+}
+
+/// Whether intervals (first and last moment, bag) of different bags overlap.
+fn overlap(mut all: Vec<(Stamp, Stamp, usize)>) -> bool {
+    all.sort_unstable();
+    // The latest end so far with its bag, and the latest end in all other bags.
+    let (mut latest, mut other) = ((Stamp::MIN, usize::MAX), Stamp::MIN);
+    all.into_iter().any(|(from, to, bag)| {
+        let end = if bag == latest.1 { other } else { latest.0 };
+        if bag == latest.1 {
+            latest.0 = latest.0.max(to);
+        } else if to > latest.0 {
+            (other, latest) = (latest.0, (to, bag));
+        } else {
+            other = other.max(to);
+        }
+        end > from && end.min(to).since(from) > OUT_OF_ORDER_NS
+    })
 }
 
 /// A sender with its recordings.
@@ -251,6 +263,31 @@ mod tests {
     use super::*;
 
     const MILLI: i64 = 1_000_000;
+
+    #[test]
+    fn intervals_of_different_bags_overlap() {
+        let shared = |all: &[(i64, i64, usize)]| {
+            let second = |s: i64| Stamp(s * 1000 * MILLI);
+            let all = all
+                .iter()
+                .map(|(from, to, bag)| (second(*from), second(*to), *bag));
+            overlap(all.collect())
+        };
+        assert!(!shared(&[(0, 90, 0), (10, 80, 0), (90, 200, 1)]));
+        assert!(shared(&[(0, 90, 0), (10, 80, 0), (50, 60, 1)]));
+        assert!(shared(&[
+            (0, 200, 0),
+            (10, 100, 1),
+            (50, 150, 0),
+            (60, 70, 0)
+        ]));
+        assert!(!shared(&[
+            (300, 400, 0),
+            (0, 100, 0),
+            (100, 200, 1),
+            (200, 300, 2)
+        ]));
+    }
 
     fn stretch(first: i64, last: i64, period: i64) -> Stretch {
         Stretch {
