@@ -1,6 +1,6 @@
-"""The graph of a run as a test: `pytest examples/python`, where the wheel is installed.
+"""The graph of a run as a test: `pytest examples/python`, with the wheel installed.
 
-A run is a recording; here it is `courier.mcap`, in a project the one that the job before has just made.
+A run is a recording: here `courier.mcap`, in your project the one that the previous job has just recorded.
 """
 
 from pathlib import Path
