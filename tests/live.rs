@@ -99,6 +99,7 @@ fn a_ros_1_master_is_watched() {
     assert!(said.contains("no connection to ros1://127.0.0.1"), "{said}");
     let printed = String::from_utf8_lossy(&done.stdout);
     assert!(printed.contains("/talker stopped"), "{printed}");
+    assert!(!printed.contains("nothing was recorded"), "{printed}");
     let (nodes, edges) = graph(folder.path());
     assert!(nodes.iter().eq(["/listener", "/talker"]), "{nodes:?}");
     assert!(edges.contains("/talker → /chat"), "{edges:?}");
@@ -144,16 +145,27 @@ fn answering(answer: String, drips: bool) -> String {
 fn a_server_that_is_not_a_master_is_reported() {
     let ok = "HTTP/1.0 200 OK\r\n\r\n";
     let attributes: Vec<String> = (0..200_000).map(|at| format!(" a{at}=''")).collect();
+    let none = "is not that of a ROS master";
     let answers = [
-        (format!("{ok}{}", "<value/>".repeat(4 << 20)), false),
-        (format!("{ok}<a{}/>", attributes.concat()), false),
-        (format!("{ok}{}", " ".repeat(10_000)), true),
-        ("HTTP/1.1 404 Not Found\r\n\r\n".to_owned(), false),
+        (format!("{ok}{}", "<value/>".repeat(4 << 20)), "too large"),
+        (
+            format!("{ok}<a>{}</a>", "<a/>".repeat(1 << 20)),
+            "nodes limit",
+        ),
+        (format!("{ok}<a{}/>", attributes.concat()), none),
+        (
+            format!("{ok}<{}:a/>", "p".repeat(4_000_000)),
+            "ppp…; trying",
+        ),
+        ("HTTP/1.1 404 Not Found\r\n\r\n".to_owned(), none),
     ];
-    for (answer, drips) in answers {
-        let said = complaint(&answering(answer, drips));
+    for (answer, why) in answers {
+        let said = complaint(&answering(answer, false));
         assert!(said.contains("no connection to ros1://"), "{said}");
+        assert!(said.contains(why) && said.len() < 500, "{said}");
     }
+    let said = complaint(&answering(format!("{ok}{}", " ".repeat(10_000)), true));
+    assert!(said.contains("it did not respond in time"), "{said}");
 }
 
 #[test]
@@ -359,5 +371,7 @@ mod bridge {
             .unwrap();
         let log = String::from_utf8_lossy(&log.stdout);
         assert!(log.contains("\"received\": 60"), "{log}");
+        let printed = String::from_utf8_lossy(&done.stdout);
+        assert!(!printed.contains("nothing was recorded"), "{printed}");
     }
 }

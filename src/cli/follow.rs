@@ -31,6 +31,9 @@ const LEAST_NEW: f64 = 0.2;
 /// The seconds from the first sign of something new to its analysis: a first message alone does not show a rhythm.
 const SETTLED: f64 = 0.5;
 
+/// The most events printed at once about a live system: more than anyone reads, and than all its nodes when it starts.
+const MOST_LINES: usize = 1000;
+
 /// A recurring task, and the next time at which it may run.
 struct Pace {
     due: f64,
@@ -140,8 +143,7 @@ impl Follower<'_> {
         let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
         loop {
             let growth = self.follow.poll()?;
-            let news = self.live.iter().flat_map(Live::news);
-            news.for_each(|text| terminal.say(&text));
+            self.report(terminal);
             let now = terminal.seconds();
             if growth == Growth::More {
                 (grew, is_behind, is_page_behind) = (now, true, true);
@@ -152,6 +154,10 @@ impl Follower<'_> {
             }
             let is_idle = idle.is_some_and(|idle| now - grew >= idle);
             let is_over = growth == Growth::Ended || is_idle || terminal.take_signal();
+            if is_over {
+                // Another one ends the remaining work.
+                terminal.note_signals(false);
+            }
             let is_settled = appeared.is_some_and(|at| now >= at + SETTLED);
             let is_new = is_settled && now >= self.events.due_new;
             if is_behind && (is_over || is_new || now >= self.events.due) {
@@ -173,8 +179,13 @@ impl Follower<'_> {
             }
             terminal.wait();
         }
-        terminal.note_signals(false);
         self.end(terminal)
+    }
+
+    /// Prints the status messages of the connection.
+    fn report(&self, terminal: &mut Terminal) {
+        let news = self.live.iter().flat_map(Live::news);
+        news.for_each(|text| terminal.say(&text));
     }
 
     /// Prints the new events; false if standard output was closed.
@@ -184,7 +195,13 @@ impl Follower<'_> {
             let known = follow.so_far(MOST, Length::All)?;
             Ok(known.map_or_else(Vec::new, |known| feed.news(&known, format)))
         });
-        terminal.lines(&lines?, format)
+        let mut lines = lines?;
+        let more = lines.len().saturating_sub(MOST_LINES);
+        if self.live.is_some() && more > 0 {
+            lines.truncate(MOST_LINES);
+            terminal.note(&format!("… and {more} more events"));
+        }
+        terminal.lines(&lines, format)
     }
 
     /// Prints new findings and updates the page.
@@ -223,7 +240,9 @@ impl Follower<'_> {
 
     /// Checks the recording as it is now and writes the outputs.
     fn end(mut self, terminal: &mut Terminal) -> Result<u8> {
+        terminal.note_signals(false);
         self.live.iter_mut().for_each(Live::finish);
+        self.report(terminal);
         let job = Render {
             reading: self.follow.closed(),
             ..self.job

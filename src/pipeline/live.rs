@@ -6,12 +6,13 @@
 
 #[cfg(feature = "live")]
 mod bridge;
+mod connection;
+mod graph;
 mod master;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::{self, BufWriter, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs as _};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,22 +21,29 @@ use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::bag::source::Temporary;
-use crate::base::budget::NAMES;
+#[cfg(feature = "live")]
+use crate::base::budget::DEFINITIONS;
 use crate::base::error::{Error, Result};
 use crate::base::name::HEARTBEAT;
 use crate::base::time::Stamp;
-use crate::export::mcap::{GRAPH, GraphEnd, GraphFile, GraphNode, graph};
+use crate::base::words::shorten;
+use crate::export::mcap::{GRAPH, GraphFile};
+use graph::LiveGraph;
 
 /// The heartbeat interval.
 const BEAT: Duration = Duration::from_secs(1);
 /// The payload of a heartbeat: a message without a field, in CDR.
 const EMPTY: [u8; 5] = [0, 1, 0, 0, 0];
-/// The time for connecting, and for a whole answer.
-const WAIT: Duration = Duration::from_secs(5);
 /// The longest wait before reconnecting.
 const MOST_WAIT: Duration = Duration::from_secs(16);
 /// The most bytes of graphs recorded per second, so that a system that changes all the time does not fill the disk.
 const MOST_RECORDED: f64 = 1e6;
+/// The most channels of requested topics, including those that are advertised again with another type: forty times the
+/// topics that anyone requests.
+#[cfg(feature = "live")]
+const MOST_CHANNELS: usize = 1 << 12;
+/// The most characters of the reason for a failure, which may quote the server.
+const MOST_REASON: usize = 300;
 
 /// The supported protocols by URL scheme; `None` for those disabled in this build.
 const WAYS: [(&str, Option<Watch>); 2] = [("ros1://", Some(master::watch)), ("ws://", BRIDGE)];
@@ -101,13 +109,17 @@ impl Live {
             file,
             heartbeat,
             topics: topics.iter().cloned().collect(),
+            channels: BTreeMap::new(),
+            described: 0,
+            ignored: 0,
             graph: LiveGraph::default(),
             written: None,
             due: Instant::now(),
             is_over: is_over.clone(),
+            reported,
         };
         let (name, place) = (text.to_string(), place.trim_end_matches('/').to_owned());
-        let recorder = spawn(move || record(watch, &name, &place, watched, &reported));
+        let recorder = spawn(move || record(watch, &name, &place, watched));
         Ok(Some(Self {
             path,
             is_over,
@@ -144,7 +156,7 @@ impl Drop for Live {
 }
 
 /// Watches the system and reconnects if the connection fails.
-fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, reported: &Sender<String>) {
+fn record(watch: Watch, name: &str, place: &str, mut watched: Watched) {
     let mut wait = BEAT;
     while !watched.is_over() {
         watched.written = None;
@@ -159,22 +171,23 @@ fn record(watch: Watch, name: &str, place: &str, mut watched: Watched, reported:
             .err()
             .map_or_else(|| "it was closed".to_owned(), |e| e.to_string());
         let text = format!(
-            "no connection to {name}: {why}; trying again in {} s",
+            "no connection to {name}: {}; trying again in {} s",
+            shorten(&why, MOST_REASON),
             wait.as_secs()
         );
-        if reported.send(text).is_err() {
+        if watched.reported.send(text).is_err() {
             break;
         }
-        let until = SystemTime::now() + wait;
-        while !watched.is_over() && SystemTime::now() < until {
-            sleep(BEAT / 10);
-        }
+        watched.rest(wait);
         wait = (wait * 2).min(MOST_WAIT);
     }
+    if watched.ignored > 0 {
+        let text = format!("{} channels of {name} were ignored", watched.ignored);
+        let _ = watched.reported.send(text);
+    }
     if let Err(error) = watched.file.finish() {
-        let _ = reported.send(format!(
-            "the recording of {name} could not be finished: {error}"
-        ));
+        let text = format!("the recording of {name} could not be finished: {error}");
+        let _ = watched.reported.send(text);
     }
 }
 
@@ -185,12 +198,21 @@ struct Watched {
     /// The topics whose messages are recorded.
     #[cfg_attr(not(feature = "live"), expect(dead_code, reason = "a master has none"))]
     topics: BTreeSet<String>,
+    /// The channels of those topics in the file, by topic, encoding, type, encoding of the definition, and definition.
+    #[cfg_attr(not(feature = "live"), expect(dead_code, reason = "a master has none"))]
+    channels: BTreeMap<[String; 5], usize>,
+    /// The bytes of those texts.
+    #[cfg_attr(not(feature = "live"), expect(dead_code, reason = "a master has none"))]
+    described: usize,
+    /// The number of channels beyond the limits.
+    ignored: u64,
     graph: LiveGraph,
     /// The last graph written since the connection was established.
     written: Option<Vec<u8>>,
     /// The time at which the next graph may be written.
     due: Instant,
     is_over: Arc<AtomicBool>,
+    reported: Sender<String>,
 }
 
 impl Watched {
@@ -198,10 +220,50 @@ impl Watched {
         self.is_over.load(Ordering::Relaxed)
     }
 
+    /// Waits, but not beyond the end.
+    fn rest(&self, most: Duration) {
+        let until = Instant::now() + most;
+        while !self.is_over() && Instant::now() < until {
+            sleep(BEAT / 10);
+        }
+    }
+
+    /// The channel in the file for a requested topic, see [`Watched::channels`]; `None` beyond the limits.
+    #[cfg(feature = "live")]
+    fn channel(&mut self, parts: [String; 5]) -> io::Result<Option<usize>> {
+        if let Some(known) = self.channels.get(&parts) {
+            return Ok(Some(*known));
+        }
+        let bytes = parts.iter().map(String::len).sum::<usize>();
+        if self.channels.len() >= MOST_CHANNELS || self.described + bytes > DEFINITIONS {
+            if self.ignored == 0 {
+                let text = format!(
+                    "further channels are ignored: there are more than {MOST_CHANNELS}, or {} of definitions",
+                    crate::base::words::bytes(DEFINITIONS as u64)
+                );
+                let _ = self.reported.send(text);
+            }
+            self.ignored += 1;
+            return Ok(None);
+        }
+        let [topic, encoding, kind, of_schema, schema] = &parts;
+        let schema = (&**kind, &**of_schema, schema.clone());
+        let number = self
+            .file
+            .channel(topic, encoding, schema, &BTreeMap::new())?;
+        self.described += bytes;
+        self.channels.insert(parts, number);
+        Ok(Some(number))
+    }
+
     /// Records a heartbeat, and the graph if it has changed.
+    ///
+    /// # Errors
+    /// If the graph is too large, or the file cannot be written.
     fn beat(&mut self) -> io::Result<()> {
         let now = now();
         if self.written.is_none() || Instant::now() >= self.due {
+            self.graph.check()?;
             let payload = self.graph.payload();
             if self.written.as_ref() != Some(&payload) {
                 self.file.write(GRAPH, now, &payload)?;
@@ -215,127 +277,10 @@ impl Watched {
     }
 }
 
-/// A connection whose reads end at a certain time, however slowly the server sends.
-struct Patient {
-    stream: TcpStream,
-    until: Instant,
-}
-
-impl Patient {
-    /// Sets the time for all reads from now on.
-    fn wait(&mut self, most: Duration) {
-        self.until = Instant::now() + most;
-    }
-}
-
-impl Read for Patient {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let late = || io::Error::new(io::ErrorKind::TimedOut, "it did not respond in time");
-        let left = self.until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(late());
-        }
-        self.stream.set_read_timeout(Some(left))?;
-        let read = self.stream.read(into);
-        read.map_err(|error| match error.kind() {
-            io::ErrorKind::WouldBlock => late(),
-            _ => error,
-        })
-    }
-}
-
-impl Write for Patient {
-    fn write(&mut self, from: &[u8]) -> io::Result<usize> {
-        self.stream.write(from)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.stream.flush()
-    }
-}
-
-/// Connects to a server, which then has [`WAIT`] for its first answer.
-fn connect(place: &str) -> io::Result<Patient> {
-    let mut failed = io::Error::other("the host name cannot be resolved");
-    for at in place.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&at, WAIT) {
-            Ok(stream) => {
-                stream.set_write_timeout(Some(WAIT))?;
-                let until = Instant::now() + WAIT;
-                return Ok(Patient { stream, until });
-            }
-            Err(error) => failed = error,
-        }
-    }
-    Err(failed)
-}
-
 /// The current time of this machine.
 fn now() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     Stamp(since.map_or(0, |since| {
         i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
     }))
-}
-
-/// The ends of all connections: the names of publishers, subscribers, clients and servers by topic or
-/// service.
-#[derive(Default)]
-struct LiveGraph {
-    ends: [BTreeMap<String, BTreeSet<String>>; 4],
-    /// The types of topics.
-    types: BTreeMap<String, String>,
-}
-
-/// The indices in [`LiveGraph::ends`].
-const PUBLISHERS: usize = 0;
-const SUBSCRIBERS: usize = 1;
-const SERVERS: usize = 3;
-
-impl LiveGraph {
-    #[cfg(feature = "live")]
-    fn is_empty(&self) -> bool {
-        self.ends.iter().all(BTreeMap::is_empty)
-    }
-
-    /// Sets the nodes of a topic or service; none if it no longer exists.
-    fn set(&mut self, side: usize, name: &str, nodes: BTreeSet<String>) {
-        if nodes.is_empty() {
-            self.ends[side].remove(name);
-        } else {
-            self.ends[side].insert(name.to_owned(), nodes);
-        }
-    }
-
-    /// # Errors
-    /// If there are implausibly many names; each end counts once.
-    fn check(&self) -> io::Result<()> {
-        let ends = self
-            .ends
-            .iter()
-            .flat_map(BTreeMap::values)
-            .map(BTreeSet::len);
-        if ends.sum::<usize>() + self.types.len() > NAMES {
-            return Err(io::Error::other(format!("more than {NAMES} names")));
-        }
-        Ok(())
-    }
-
-    fn payload(&self) -> Vec<u8> {
-        let mut nodes: BTreeMap<&str, GraphNode<'_>> = BTreeMap::new();
-        for (side, ends) in self.ends.iter().enumerate() {
-            for (name, at) in ends {
-                let kind = self.types.get(name).map_or("", String::as_str);
-                for node in at {
-                    let node = nodes.entry(node).or_insert_with(|| GraphNode::new(node));
-                    node.ends[side].push(GraphEnd {
-                        name,
-                        kind,
-                        qos: None,
-                    });
-                }
-            }
-        }
-        graph(&nodes.into_values().collect::<Vec<_>>())
-    }
 }

@@ -6,7 +6,9 @@ use std::io;
 use super::restarts::Restarts;
 use super::senders::{Sender, Traffic};
 use crate::base::name::HEARTBEAT;
-use crate::base::rhythm::{FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE};
+use crate::base::rhythm::{
+    FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE, UNSEEN_NS,
+};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
 use crate::evidence::inference::{Reliability, Stream};
@@ -186,7 +188,7 @@ pub(crate) fn unseen(recorded: &Recorded, streams: &[Stream]) -> io::Result<Vec<
     for stream in streams.iter().filter(is_beat) {
         let times = recorded.messages.times(stream.times)?;
         let gaps = times.windows(2).map(|pair| Span::new(pair[0], pair[1]));
-        found.extend(gaps.filter(|gap| gap.nanos() >= GAP_NS));
+        found.extend(gaps.filter(|gap| gap.nanos() >= UNSEEN_NS));
     }
     Ok(found)
 }

@@ -2,6 +2,7 @@
 //! contradict it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::SoFar;
 use crate::base::rhythm::{CLOSING_NS, SWITCH_NS, TOGETHER_NS};
@@ -42,12 +43,13 @@ impl Certainty {
 
 /// The key by which two rows of the log are the same event, besides their time: numbers become more precise,
 /// while another state, or another number of switched nodes, is another event.
-#[derive(PartialEq)]
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Key {
     Event {
         kind: Kind,
         names: (Option<String>, Option<String>),
-        state: Option<Detail>,
+        /// The state before and after.
+        state: Option<(Arc<str>, Arc<str>)>,
     },
     Interruption(InterruptionKind),
     Switch {
@@ -82,10 +84,11 @@ impl Feed {
         let mission = &known.mission;
         // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
-        for printed in &mut self.printed {
-            printed.is_there = false;
+        let mut places: BTreeMap<&Key, Vec<usize>> = BTreeMap::new();
+        for (place, printed) in self.printed.iter().enumerate() {
+            places.entry(&printed.key).or_default().push(place);
         }
-        let (mut places, mut rows) = (Vec::new(), Vec::new());
+        let mut found = Vec::new();
         for row in headlines(mission, format) {
             let Some((key, time, certainty)) = identity(mission, &row, known.now) else {
                 continue;
@@ -93,11 +96,19 @@ impl Feed {
             if time < from {
                 continue;
             }
-            let same = |printed: &Printed| {
-                let is_near = printed.time.since(time).abs() <= TOGETHER_NS;
-                is_near && !printed.is_there && printed.key == key
-            };
-            let place = self.printed.iter().position(same);
+            let is_near =
+                |place: &usize| self.printed[*place].time.since(time).abs() <= TOGETHER_NS;
+            let place = places.get_mut(&key).and_then(|places| {
+                let at = places.iter().position(is_near)?;
+                Some(places.remove(at))
+            });
+            found.push((place, key, time, certainty, row));
+        }
+        for printed in &mut self.printed {
+            printed.is_there = false;
+        }
+        let (mut places, mut rows) = (Vec::new(), Vec::new());
+        for (place, key, time, certainty, row) in found {
             let is_new = place.is_none_or(|at| self.printed[at].certainty < certainty);
             let place = place.unwrap_or_else(|| {
                 self.printed.push(Printed {
@@ -138,10 +149,16 @@ fn identity(mission: &Mission, row: &LogRow<'_>, now: Stamp) -> Option<(Key, Sta
     Some(match row {
         LogRow::Event(_, event) => {
             let (node, topic) = mission.elements.names(event.what);
+            let state = match &event.detail {
+                Detail::Values { from, to } if event.kind == Kind::Lifecycle => {
+                    Some((from.clone(), to.clone()))
+                }
+                _ => None,
+            };
             let key = Key::Event {
                 kind: event.kind,
                 names: (node.map(str::to_owned), topic.map(str::to_owned)),
-                state: (event.kind == Kind::Lifecycle).then(|| event.detail.clone()),
+                state,
             };
             (key, event.time, certainty(event, now))
         }
