@@ -69,6 +69,10 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp,
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,
 /// or recorded twice.
+#[expect(
+    clippy::type_complexity,
+    reason = "a short-lived list of when each bag contains a node and topic"
+)]
 pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name> {
     let mut seen: BTreeMap<(Name, Name), Vec<(Stamp, Stamp, usize)>> = BTreeMap::new();
     let named = streams
