@@ -101,15 +101,23 @@ fn sum(folder: &Path, name: &str, of: &str) -> i64 {
 
 /// A folder of bags: good ones, an empty one, a cut one, a foreign file with a bag's extension.
 fn fleet(folder: &Path) {
-    let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
+    // Copies would be left out.
+    let at = |minutes: i64| {
+        let mut run = support::small();
+        for (_, time, _) in &mut run.messages {
+            *time += minutes * 60_000_000_000;
+        }
+        rosbag1::write(&run, rosbag1::Pack::None, 4000)
+    };
+    let bag = at(0);
     let put = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     };
     put("bags/a.bag", &bag);
-    put("bags/b/run_0.bag", &bag);
-    put("bags/b/run_1.bag", &bag);
+    put("bags/b/run_0.bag", &at(1));
+    put("bags/b/run_1.bag", &at(2));
     put("bags/c.mcap", &fs::read(COURIER).unwrap());
     put("bags/cut.bag", &bag[..bag.len() / 2]);
     put(

@@ -10,6 +10,8 @@ const SECOND: i64 = 1_000_000_000;
 
 /// The fewest messages that establish a rhythm: with fewer, one late message is half of the evidence.
 pub(crate) const FEWEST: u64 = 5;
+/// The fewest messages for a mean rate: a count has a random error of its square root, a sixth for 40.
+pub(crate) const FEWEST_OF_MEAN: u64 = 40;
 /// The number of usual intervals of silence that break a rhythm; one or two messages are lost now and then.
 pub(crate) const BREAK: i64 = 5;
 /// The shortest silence that breaks a rhythm: at its start and end a recorder writes topics up to a second apart.

@@ -4,6 +4,7 @@ mod elements;
 mod happened;
 mod pairs;
 mod report;
+mod sending;
 mod union;
 
 use super::facts::Facts;
@@ -31,6 +32,8 @@ pub(crate) struct Difference {
     pub(crate) kind: &'static str,
     /// The name of the node or topic it is about, or both names of an edge.
     pub(crate) name: String,
+    /// The node or topic, or both as in `name`; the name of an event contains more.
+    pub(crate) element: String,
     pub(crate) side: Where,
     /// The value in the first mission; empty for none.
     pub(crate) first: String,
@@ -47,9 +50,11 @@ impl Difference {
             Where::Second => (String::new(), what.to_owned()),
             _ => (what.to_owned(), String::new()),
         };
+        let name = name.into();
         Self {
             kind,
-            name: name.into(),
+            element: name.clone(),
+            name,
             side,
             first,
             second,
@@ -64,9 +69,11 @@ impl Difference {
         first: impl Into<String>,
         second: impl Into<String>,
     ) -> Self {
+        let name = name.into();
         Self {
             kind,
-            name: name.into(),
+            element: name.clone(),
+            name,
             side: Where::Both,
             first: first.into(),
             second: second.into(),
@@ -75,7 +82,7 @@ impl Difference {
     }
 }
 
-/// All differences, elements before events, each kind sorted by name. A rate must differ by more than the fraction
+/// All differences: elements, then events, then times of topics. A rate must differ by more than the fraction
 /// `rate_change`, and significantly.
 pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
     let (a, b) = (Facts::new(first), Facts::new(second));
@@ -88,5 +95,14 @@ pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -
             one.is_known = false;
         }
     }
+    let times = sending::times(&a, &b, &all);
+    // A topic that ends earlier is also silent.
+    let ends = |d: &Difference| {
+        times
+            .iter()
+            .any(|t| t.kind == "end" && t.element == d.element)
+    };
+    all.retain(|d| !(d.kind == "event" && d.name.ends_with(" silent") && ends(d)));
+    all.extend(times);
     all
 }

@@ -3,6 +3,7 @@
 use std::fs;
 
 use super::{HEALTHY, Robot, bag, recording, run};
+use crate::support::Recording;
 
 #[test]
 fn differences_are_limited_to_what_both_can_show() {
@@ -112,4 +113,59 @@ fn unobservable_elements_are_listed_below_the_differences() {
         rows(folded, "| ? ") > 0 && rows(folded, "| - ") == 0,
         "{markdown}"
     );
+}
+
+/// Two minutes of a lidar whose node lives on, and of commands in bursts, of which every n-th is sent.
+fn two_minutes(scan: (i64, i64), every: usize, shift: i64) -> Recording {
+    let mut bag = Recording::default();
+    let base = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
+    bag.send(base, (0, 120_000), 100, &[1; 48]);
+    let state = bag.publisher("/lidar", "/lidar/state", "std_msgs/String");
+    bag.send(state, (shift, 120_000), 500, b"\x01\0\0\0a");
+    let lidar = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    bag.send(lidar, (scan.0 + shift, scan.1), 100, &[2; 400]);
+    let pilot = bag.publisher("/pilot", "/cmd_vel", "geometry_msgs/Twist");
+    let bursts = (0..12).flat_map(|n| (0..20).map(move |k| 2000 + n * n * 800 + k * 30));
+    for at in bursts.step_by(every) {
+        bag.send(pilot, (at + shift, at + shift + 1), 1, &[3; 48]);
+    }
+    bag
+}
+
+#[test]
+fn topics_that_begin_or_end_at_another_time_or_send_less_differ_also_on_the_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let whole = (0, 120_000);
+    bag(here, "good.bag", &two_minutes(whole, 1, 0));
+    for (name, scan, every, line, page) in [
+        ("healthy", whole, 1, "no differences", "Differences"),
+        (
+            "late",
+            (40_000, 120_000),
+            1,
+            "~ begin      /scan  00:00 → 00:40",
+            "begins at 00:40",
+        ),
+        (
+            "ends",
+            (0, 72_000),
+            1,
+            "~ end        /scan  stays → ends at 01:12",
+            "stays → ends at 01:12",
+        ),
+        ("fewer", whole, 2, "~ rate       /cmd_vel  ", "/cmd_vel"),
+    ] {
+        let file = format!("{name}.bag");
+        bag(here, &file, &two_minutes(scan, every, 300));
+        let (code, said) = run(here, &["diff", "good.bag", &file, "-o", "d.html"]);
+        let is_same = name == "healthy";
+        assert_eq!(code, i32::from(!is_same), "{name}: {said}");
+        assert!(said.contains(line), "{name}: no `{line}` in {said}");
+        let one = is_same || said.contains(": 1 difference");
+        assert!(one, "{name}: {said}");
+        let html = fs::read_to_string(here.join("d.html")).unwrap();
+        assert!(html.contains(page), "{name}");
+        assert_eq!(html.contains("compares paired"), !is_same, "{name}");
+    }
 }

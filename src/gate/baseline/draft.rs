@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{length, list, mapping, scalar, two_digits};
-use crate::base::rhythm::{CLOSING_NS, FEWEST, GAP_NS};
+use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::gate::facts::{Facts, Rate};
@@ -17,8 +17,6 @@ use crate::mission::event_log::Kind;
 const SHARE: f64 = 0.1;
 /// The fraction by which the mean rate of an uneven topic may differ between runs.
 const MEAN_SHARE: f64 = 0.15;
-/// The fewest messages for a mean rate: a count has a random error of its square root, a sixth for 40.
-const FEWEST_OF_MEAN: u64 = 40;
 /// The allowed silence, as a multiple of the longest in the runs.
 const GAPS: i64 = 2;
 /// This many usual intervals are added, since one or two messages are lost now and then.

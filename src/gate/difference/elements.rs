@@ -2,19 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::sending::rates;
 use super::{Difference, Where};
-use crate::base::rhythm::{CLOSING_NS, FEWEST};
+use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::Stamp;
-use crate::base::words;
-use crate::gate::facts::{Facts, Rate};
+use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::event_log::Kind;
 
 /// An end is certain if the silence after it is this many times its uncertainty.
 const DOUBTS: i64 = 8;
-/// The number of standard deviations beyond which rates differ significantly.
-const SIGMAS: f64 = 3.0;
 
 /// All differences of elements.
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec<Difference> {
@@ -78,7 +76,7 @@ fn nodes<'a, 'f>(facts: &'f Facts<'a>) -> BTreeMap<&'a str, &'f [NodeId]> {
 }
 
 /// The topics with messages, without housekeeping.
-fn topics<'a>(facts: &Facts<'a>) -> BTreeMap<&'a str, TopicId> {
+pub(super) fn topics<'a>(facts: &Facts<'a>) -> BTreeMap<&'a str, TopicId> {
     let all = facts.topics(&Pattern::new("**")).into_iter();
     let with_messages = all.filter(|id| !facts.is_housekeeping(*id) && facts.messages(*id) > 0);
     with_messages.map(|id| (facts.topic(id), id)).collect()
@@ -199,61 +197,4 @@ fn topic(
             all.push(difference);
         }
     }
-}
-
-fn rates(
-    name: &str,
-    (a, first): (&Facts<'_>, TopicId),
-    (b, second): (&Facts<'_>, TopicId),
-    rate_change: f64,
-    all: &mut Vec<Difference>,
-) {
-    let mean = |facts: &Facts<'_>, id: TopicId| {
-        let rates = facts.rates(id, true, facts.mission.span);
-        let count: u64 = rates.iter().map(|r| r.count).sum();
-        let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
-        let seconds = nanos.max(1) as f64 / 1e9;
-        (count >= FEWEST).then(|| {
-            (
-                count as f64,
-                seconds,
-                Rate::are_even(&rates),
-                spread(&rates),
-            )
-        })
-    };
-    let (Some(one), Some(other)) = (mean(a, first), mean(b, second)) else {
-        return;
-    };
-    let (from, to) = (one.0 / one.1, other.0 / other.1);
-    // The count of an even topic is exact to a message; a random one varies by its square root, bursts by more.
-    let doubt = |(count, seconds, is_even, spread): (f64, f64, bool, f64)| {
-        let chance = if is_even { 1.0 } else { libm::sqrt(count) };
-        (chance / seconds).max(spread)
-    };
-    let (mine, theirs) = (doubt(one), doubt(other));
-    let noise = SIGMAS * libm::sqrt(mine * mine + theirs * theirs);
-    let apart = libm::fabs(to - from);
-    if apart > rate_change * from.min(to) && apart > noise {
-        all.push(Difference::changed(
-            "rate",
-            name,
-            words::rate(from),
-            words::rate(to),
-        ));
-    }
-}
-
-/// The standard error of the mean rate, by how windows differ; 0 with fewer than two.
-fn spread(rates: &[Rate]) -> f64 {
-    let n = rates.len() as f64;
-    if rates.len() < 2 {
-        return 0.0;
-    }
-    let mean = rates.iter().map(Rate::hz).sum::<f64>() / n;
-    let sum: f64 = rates
-        .iter()
-        .map(|r| (r.hz() - mean) * (r.hz() - mean))
-        .sum();
-    libm::sqrt(sum / (n - 1.0) / n)
 }

@@ -11,7 +11,7 @@ use crate::mission::event_log::{Event, Kind};
 
 /// The difference in nanoseconds up to which times of two runs count as equal: nodes of one launch file start in any
 /// order, a second apart.
-const APART_NS: i64 = 2_000_000_000;
+pub(super) const APART_NS: i64 = 2_000_000_000;
 /// The part of the time since the start by which two runs may drift: a fiftieth.
 const PACE: i64 = 50;
 
@@ -87,12 +87,8 @@ fn only(
         // Silence at the very end is due to the robot's shutdown, if the other recording lasts that long.
         .filter(|t| facts.mission.span.end.since(t.time) > CLOSING_NS);
     let differences = alone.map(|t| {
-        Difference::only(
-            "event",
-            name(&t.key),
-            side,
-            &format!("at {}", facts.clock(t.time)),
-        )
+        let at = format!("at {}", facts.clock(t.time));
+        about_event(&t.key, |name| Difference::only("event", name, side, &at))
     });
     differences.collect()
 }
@@ -105,23 +101,56 @@ fn name((kind, name, count): &Key) -> String {
     }
 }
 
-/// The difference for an event at another time in the other mission, if any. If it has the same `shift` as the previous
-/// event, everything is delayed, which was reported for the first one.
+/// The difference for an event at another time in the other mission, if any.
 fn moved(
     (a, one): (&Facts<'_>, &NamedEvent),
     (b, other): (&Facts<'_>, &NamedEvent),
     shift: &mut i64,
 ) -> Option<Difference> {
-    let (first, second) = (a.mission.offset(one.time), b.mission.offset(other.time));
-    let later = second.saturating_sub(first);
+    let moment = |facts: &Facts<'_>, event: &NamedEvent| Moment {
+        at: facts.mission.offset(event.time),
+        doubt: event.doubt,
+    };
+    let is_moved = is_moved([moment(a, one), moment(b, other)], shift);
+    let times = (a.clock(one.time), b.clock(other.time));
+    is_moved.then(|| {
+        about_event(&one.key, |name| {
+            Difference::changed("time", name, times.0, times.1)
+        })
+    })
+}
+
+/// A time since the start of a mission and its uncertainty, in nanoseconds.
+pub(super) struct Moment {
+    pub(super) at: i64,
+    pub(super) doubt: i64,
+}
+
+/// Whether something is at another time in the second mission. If it has the same `shift` as the previous one,
+/// everything is delayed, which was reported for the first one.
+pub(super) fn is_moved([first, second]: [Moment; 2], shift: &mut i64) -> bool {
+    let later = second.at.saturating_sub(first.at);
     let since_before = later.saturating_sub(*shift);
-    let doubt = one.doubt.saturating_add(other.doubt);
+    let doubt = first.doubt.saturating_add(second.doubt);
     if doubt <= APART_NS {
         *shift = later;
     }
     let apart = later.saturating_abs().min(since_before.saturating_abs());
-    let pace = first.max(second) / PACE;
-    let is_moved = apart > APART_NS.saturating_add(doubt).saturating_add(pace);
-    let times = (a.clock(one.time), b.clock(other.time));
-    is_moved.then(|| Difference::changed("time", name(&one.key), times.0, times.1))
+    apart
+        > APART_NS
+            .saturating_add(doubt)
+            .saturating_add(pace(first.at.max(second.at)))
+}
+
+/// The drift of two runs in this time since the start.
+pub(super) fn pace(since: i64) -> i64 {
+    since / PACE
+}
+
+/// A difference in an event, with its node or topic.
+fn about_event(key: &Key, of: impl FnOnce(String) -> Difference) -> Difference {
+    Difference {
+        element: key.1.clone(),
+        ..of(name(key))
+    }
 }

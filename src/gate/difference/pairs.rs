@@ -27,7 +27,7 @@ pub(crate) fn pairs(
 ) -> LifeLines {
     let known = differing.iter().filter(|d| d.is_known);
     // An edge's name is that of both its ends.
-    let names: BTreeSet<&str> = known.flat_map(|d| d.name.split(" → ")).collect();
+    let names: BTreeSet<&str> = known.flat_map(|d| d.element.split(" → ")).collect();
     let all = NameFilter::default();
     let nodes = (0..).zip(&drawn.elements.nodes);
     let nodes = nodes.map(|(id, n)| (n.name.as_str(), Element::Node(id)));

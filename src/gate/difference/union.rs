@@ -341,41 +341,41 @@ impl UnionLog<'_> {
         }
     }
 
-    /// Adds the event of an element with different values.
+    /// Adds the event of an element with different values, or of an event in only one mission.
     fn change(&mut self, difference: &Difference) {
-        if difference.side != Where::Both {
-            return;
-        }
-        let node = self.elements.node(&difference.name);
-        let topic = self.elements.topic(&difference.name);
-        let values = || {
-            let of = |value: &str| match (difference.kind, value.parse()) {
-                ("restarts", Ok(n)) => words::count(n, "restart").into(),
-                _ => value.into(),
-            };
-            Detail::Values {
-                from: of(&difference.first),
-                to: of(&difference.second),
+        let node = self.elements.node(&difference.element).map(Element::Node);
+        let topic = self.elements.topic(&difference.element).map(Element::Topic);
+        let (kind, what) = match difference.kind {
+            "rate" => (Kind::Rate, topic),
+            "type" => (Kind::Type, topic),
+            "qos" => (Kind::Qos, topic),
+            "event" | "time" | "begin" | "end" | "lifecycle" | "restarts" => {
+                (Kind::Lifecycle, node.or(topic))
             }
+            _ => return,
         };
-        match (difference.kind, node, topic) {
-            ("rate", _, Some(topic)) => {
-                let hz = |seen: &MissionSide| seen.topics.get(&difference.name).and_then(|t| t.hz);
-                if let (Some(from_hz), Some(to_hz)) = (hz(self.a), hz(self.b)) {
-                    let rates = Detail::Rates { from_hz, to_hz };
-                    self.add(Kind::Rate, Element::Topic(topic), rates, None);
-                }
-            }
-            ("type", _, Some(topic)) => {
-                self.add(Kind::Type, Element::Topic(topic), values(), None);
-            }
-            ("qos", _, Some(topic)) => {
-                self.add(Kind::Qos, Element::Topic(topic), values(), None);
-            }
-            ("lifecycle" | "end" | "restarts", Some(node), _) => {
-                self.add(Kind::Lifecycle, Element::Node(node), values(), None);
-            }
-            _ => {}
+        if let (Some(what), true) = (what, difference.is_known) {
+            self.add(kind, what, self.values(difference), None);
+        }
+    }
+
+    /// The different values.
+    fn values(&self, difference: &Difference) -> Detail {
+        let hz = |seen: &MissionSide| seen.topics.get(&difference.element).and_then(|t| t.hz);
+        if let ("rate", Some(from_hz), Some(to_hz)) = (difference.kind, hz(self.a), hz(self.b)) {
+            return Detail::Rates { from_hz, to_hz };
+        }
+        let event = difference.name.strip_prefix(&*difference.element);
+        let of = |value: &str| match (difference.kind, value.parse()) {
+            ("restarts", Ok(n)) => words::count(n, "restart").into(),
+            ("event", _) if value.is_empty() => "no such event".into(),
+            ("begin", _) => format!("begins at {value}").into(),
+            ("event" | "time", _) => format!("{} {value}", event.unwrap_or("").trim()).into(),
+            _ => value.into(),
+        };
+        Detail::Values {
+            from: of(&difference.first),
+            to: of(&difference.second),
         }
     }
 

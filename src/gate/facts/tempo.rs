@@ -175,6 +175,18 @@ impl<'a> Facts<'a> {
         all
     }
 
+    /// The longest silence of a topic between its first and its last message, in nanoseconds; at least a window's length
+    /// if single messages are unknown.
+    pub(crate) fn longest_silence(&self, topic: TopicId) -> i64 {
+        let silences = self.silences(topic, true, self.mission.span);
+        let longest = silences.iter().map(|s| s.nanos).max().unwrap_or(0);
+        if self.mission.sending.pauses.is_empty() {
+            longest.max(self.mission.period.nanos())
+        } else {
+            longest
+        }
+    }
+
     /// The longest times between two messages, if single messages are known.
     fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
         let pauses = self.mission.sending.pauses.get(topic as usize);
