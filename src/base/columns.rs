@@ -178,11 +178,12 @@ pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) 
     out
 }
 
-/// The text with lines of at most `width` characters; the rest of a longer one is below the start of its last column.
+/// The text with lines of at most `width` characters; the rest of a longer one is below the start of the last
+/// column that begins in its first half.
 pub(crate) fn fitted(text: &str, width: usize) -> String {
     let mut out = String::new();
     for line in text.lines() {
-        let widest = line.char_indices().nth(width - width / 4);
+        let widest = line.char_indices().nth(width / 2);
         let half = widest.map_or("", |(at, _)| &line[..at]);
         let indent = half
             .rfind("  ")
@@ -207,7 +208,9 @@ mod tests {
     #[test]
     fn a_long_line_goes_on_below_its_last_column() {
         let text = "+ node  /é  only in the first of two\nshort\n";
-        let expected = "+ node  /é  only in\n            the first\n            of two\nshort\n";
+        let expected = "+ node  /é  only in the\n            first of two\nshort\n";
+        assert_eq!(fitted(text, 25), expected);
+        let expected = "+ node  /é  only in\n        the first of\n        two\nshort\n";
         assert_eq!(fitted(text, 22), expected);
         assert_eq!(fitted(text, 40), text);
     }

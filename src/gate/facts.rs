@@ -379,14 +379,18 @@ impl<'a> Facts<'a> {
             let evidence = elements.nodes[*id as usize].evidence;
             has(evidence, &LISTING) || has(evidence, &STARTING) || !has(evidence, &["rosout"])
         };
-        let edges = (0..).zip(&elements.publishes);
+        !self.is_sender(nodes) && !nodes.iter().any(is_listed)
+    }
+
+    /// Whether any of these nodes sent a message on a topic other than housekeeping.
+    pub(crate) fn is_sender(&self, nodes: &[NodeId]) -> bool {
+        let edges = (0..).zip(&self.mission.elements.publishes);
         let mut own = edges.filter(|(_, e)| nodes.contains(&e.node));
-        let sends = own.any(|(id, e)| {
+        own.any(|(id, e)| {
             let rows = self.mission.graphs.rows(Element::Publish(id));
             let count: u64 = rows.filter_map(|(_, row)| row.count).sum();
             count > 0 && !self.is_housekeeping(e.topic)
-        });
-        !sends && !nodes.iter().any(is_listed)
+        })
     }
 
     /// A point in time of the mission as text for people.

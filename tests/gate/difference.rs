@@ -116,7 +116,7 @@ fn unobservable_elements_are_listed_below_the_differences() {
 }
 
 /// Two minutes of a lidar whose node lives on, and of commands in bursts, of which every n-th is sent.
-fn two_minutes(scan: (i64, i64), every: usize, shift: i64) -> Recording {
+pub(super) fn two_minutes(scan: (i64, i64), every: usize, shift: i64) -> Recording {
     let mut bag = Recording::default();
     let base = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
     bag.send(base, (0, 120_000), 100, &[1; 48]);
@@ -151,8 +151,8 @@ fn topics_that_begin_or_end_at_another_time_or_send_less_differ_also_on_the_page
             "ends",
             (0, 72_000),
             1,
-            "~ end        /scan  stays → ends at 01:12",
-            "stays → ends at 01:12",
+            "~ end        /scan  stays → ends at 01:11",
+            "stays → ends at 01:11",
         ),
         ("fewer", whole, 2, "~ rate       /cmd_vel  ", "/cmd_vel"),
     ] {

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use super::difference::two_minutes;
 use super::{bag, findings, run};
 use crate::support::Recording;
 
@@ -216,4 +217,85 @@ fn two_healthy_runs_do_not_differ_in_order_or_timing() {
         code == 1 && said.contains("~ time       /arm started"),
         "{said}"
     );
+}
+
+#[test]
+fn a_topic_that_once_sent_and_now_does_not_is_missing_but_not_its_node() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    // The other topics of an action name its result.
+    let made = |results: i64| {
+        let mut bag = recording(GOOD, 0);
+        let client = bag.publisher("/client", "/arm/pick/goal", "actionlib/TestActionGoal");
+        let status = "actionlib_msgs/GoalStatusArray";
+        let status = bag.publisher("/arm", "/arm/pick/status", status);
+        bag.send(status, (40_000, 90_000), 200, &[6; 48]);
+        let feedback = "actionlib/TestActionFeedback";
+        let feedback = bag.publisher("/arm", "/arm/pick/feedback", feedback);
+        bag.send(feedback, (45_000, 88_000), 1000, &[7; 48]);
+        let result = "actionlib/TestActionResult";
+        let result = (results > 0).then(|| bag.publisher("/arm", "/arm/pick/result", result));
+        for n in 0..3 {
+            let at = 50_000 + 10_000 * n;
+            bag.send(client, (at, at + 1), 1, &[8; 48]);
+            if let Some(result) = result {
+                bag.send(result, (at + 5000, at + 5001), 1, &[9; 48]);
+            }
+        }
+        bag
+    };
+    bag(here, "good.bag", &made(3));
+    bag(here, "none.bag", &made(0));
+    let (code, said) = run(here, &["baseline", "good.bag", "-o", "g.yaml"]);
+    assert_eq!(code, 0, "{said}");
+    assert_eq!(run(here, &["check", "good.bag", "--expect", "g.yaml"]).0, 0);
+    let wanted = "error[topic-missing]: /arm/pick/result has no message in the bag";
+    fs::write(
+        here.join("one.yaml"),
+        "schema: bagreel.expect/1\nnodes: {/arm: {}}\ntopics:\n  /arm/pick/result: {by: [/arm], within: 0..}\n",
+    )
+    .unwrap();
+    for expect in ["g.yaml", "one.yaml"] {
+        let (code, said) = run(here, &["check", "none.bag", "--expect", expect]);
+        assert!(code == 1 && said.contains(wanted), "{expect}: {said}");
+        assert!(!said.contains("sends nothing"), "{expect}: {said}");
+    }
+}
+
+#[test]
+fn a_window_cut_by_the_end_is_checked_with_enough_expected_messages() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let made = |every: i64, shift: i64| {
+        let mut bag = Recording::default();
+        let base = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
+        bag.send(base, (shift, 124_000), 100, &[1; 48]);
+        bag.send(base, (124_000, 146_000), 100 * every, &[1; 48]);
+        bag
+    };
+    bag(here, "good.bag", &made(1, 0));
+    let learned = ["baseline", "good.bag", "--period", "60", "-o", "g.yaml"];
+    assert_eq!(run(here, &learned).0, 0);
+    for (every, expected) in [(1, &[][..]), (3, &["topic-rate-low"])] {
+        bag(here, "run.bag", &made(every, 30));
+        assert_eq!(findings(here, "run.bag", "g.yaml"), expected);
+    }
+}
+
+#[test]
+fn an_update_lets_a_topic_end_that_ended() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "good.bag", &two_minutes((0, 120_000), 1, 0));
+    bag(here, "ends.bag", &two_minutes((0, 70_000), 1, 0));
+    assert_eq!(run(here, &["baseline", "good.bag", "-o", "g.yaml"]).0, 0);
+    let check = ["check", "ends.bag", "--expect", "g.yaml"];
+    assert_eq!(run(here, &check).0, 1);
+    let update = [
+        "baseline", "ends.bag", "--update", "g.yaml", "--only", "/scan",
+    ];
+    let (code, said) = run(here, &update);
+    assert_eq!(code, 0, "{said}");
+    let (code, said) = run(here, &check);
+    assert_eq!(code, 0, "{said}");
 }

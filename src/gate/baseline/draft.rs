@@ -24,6 +24,9 @@ const INTERVALS: i64 = 4;
 /// A rate may also differ by this multiple of the spread between windows.
 const SPREADS: f64 = 3.0;
 
+/// The time range for a first message at any time.
+const ANY_TIME: &str = "0..";
+
 const SECOND: i64 = 1_000_000_000;
 
 /// The facts that are true in all runs.
@@ -276,21 +279,28 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
     };
     let within = times.within(&began);
     let may_end = times.may_end(&ends, true).or(stays);
-    let max_gap = longest(seen, ends_somewhere).map(length);
+    let max_gap = longest(seen, ends_somewhere)
+        .map(length)
+        .filter(|_| is_timed);
+    let within = within.filter(|_| is_timed).or_else(|| {
+        // A topic without such a fact is only required to send at all.
+        let is_required = hz.is_some() || mean_hz.is_some() || max_gap.is_some();
+        (!is_required && !times.is_part).then(|| ANY_TIME.to_owned())
+    });
     let mut line = Line::of([
         ("type", types),
         ("by", same(&|s| s.by()).and_then(names)),
         ("to", names(to)),
         ("hz", hz.map(|hz| hz.to_string())),
         ("mean_hz", mean_hz.map(|hz| hz.to_string())),
-        ("max_gap", max_gap.filter(|_| is_timed)),
-        ("within", within.filter(|_| is_timed)),
+        ("max_gap", max_gap),
+        ("within", within),
         ("may_end", may_end.filter(|_| is_timed)),
         ("latched", flag(is_latched, "true")),
         ("optional", flag(is_optional, "true")),
     ]);
     if hz.is_none() && mean_hz.is_none() && !is_latched {
-        line.comment = format!("  # {}: not checked", unjudged(seen, &rates.concat()));
+        line.comment = format!("  # {}: rate not checked", unjudged(seen, &rates.concat()));
     }
     line
 }

@@ -72,15 +72,18 @@ pub(crate) fn update(
             "generate a new one with `bagreel baseline BAG -o graph.yaml`, or update single names with `--only NAME`",
         ));
     }
+    let mut changed = 0;
     for (name, finding) in &wanted {
+        let before = work.text.0.clone();
         work.accept(name, finding)
             .map_err(|bad| unchanged(path, &bad))?;
+        changed += usize::from(work.text.0 != before);
     }
     let text = work.text.0;
     read(&text, path)?;
     Ok(Update {
         text,
-        changed: wanted.len(),
+        changed,
         left,
     })
 }
@@ -196,7 +199,12 @@ impl Work<'_> {
                     let value = self.of_topic(name, key);
                     self.write("topics", name, key, value)?;
                 }
-                Ok(())
+                self.let_end(name)
+            }
+            FindingKind::TopicGap => {
+                let value = self.of_topic(name, key);
+                self.write("topics", name, key, value)?;
+                self.let_end(name)
             }
             FindingKind::TopicQos => {
                 self.text.unset("topics", name, "qos")?;
@@ -307,10 +315,25 @@ impl Work<'_> {
         (longest > 0).then(|| length(two_digits(longest)))
     }
 
-    /// Whether the file lets a topic end.
+    /// Whether the file lets a topic end, or it ended in these runs.
     fn may_end(&self, pattern: &Pattern) -> bool {
         let mut topics = self.expectation.topics.iter();
         topics.any(|own| own.name == *pattern && own.facts.may_end.is_some())
+            || self.ended(pattern.as_str()).is_some()
+    }
+
+    /// The time range in which a topic ended in these runs, the draft's; `None` if it stayed.
+    fn ended(&self, name: &str) -> Option<String> {
+        let may_end = self.of_topic(name, "may_end")?;
+        (!may_end.starts_with('-')).then_some(may_end)
+    }
+
+    /// Lets a topic end that ended in these runs: its rate and gaps are checked until then.
+    fn let_end(&mut self, name: &str) -> Result<(), BadYaml> {
+        match self.ended(name) {
+            Some(value) => self.text.set("topics", name, "may_end", &value),
+            None => Ok(()),
+        }
     }
 }
 

@@ -45,6 +45,9 @@ pub(crate) const DIFF_FORMATS: &[DiffFormat] = &[
 /// The most bytes of a table, half of the limit of a summary.
 const MOST: usize = 128 << 10;
 
+/// The longest name in characters to which the values of other lines are aligned.
+const MOST_ALIGNED: usize = 32;
+
 fn sign(difference: &Difference) -> char {
     match (difference.is_known, difference.side) {
         (false, _) => '?',
@@ -98,7 +101,7 @@ fn known_first(all: &[Difference]) -> impl Iterator<Item = &Difference> {
 
 fn text(subject: &DiffSubject, all: &[Difference]) -> String {
     let long = all.iter().map(|d| visible(&d.name).chars().count()).max();
-    let width = long.unwrap_or(0).min(60);
+    let width = long.unwrap_or(0).min(MOST_ALIGNED);
     let mut out = String::new();
     for one in known_first(all) {
         let (sign, kind, name) = (sign(one), one.kind, visible(&one.name));

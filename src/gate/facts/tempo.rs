@@ -75,8 +75,8 @@ impl<'a> Facts<'a> {
         all
     }
 
-    /// The rates by which a topic is checked: of every window, or more than half of one, from its first message to the
-    /// mission's end, or to its last message if it `may_end`.
+    /// The rates by which a topic is checked: of every window, and of the last if it is longer than half of one or has
+    /// enough expected messages, from its first message to the mission's end, or to its last if it `may_end`.
     pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
         let Some(received) = self.received(topic) else {
             return Vec::new();
@@ -86,9 +86,9 @@ impl<'a> Facts<'a> {
         for window in &self.mission.windows {
             let row = rows.next_if(|(own, _)| own.index == window.index);
             let inside = during.start <= window.span.start && window.span.end <= during.end;
-            // A window cut by the mission's end has a rate if it is long enough.
+            // A window cut by the mission's end has a rate if it is long enough, or the topic was even until then.
             let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
-            if window.partial && is_short || !inside {
+            if window.partial && is_short && !is_enough(&all, window.span) || !inside {
                 continue;
             }
             let rate = |span| Rate {
@@ -192,6 +192,16 @@ impl<'a> Facts<'a> {
         let pauses = self.mission.sending.pauses.get(topic as usize);
         pauses.into_iter().flatten().copied()
     }
+}
+
+/// The fewest expected messages of an even topic by which a window cut by the mission's end is checked: one more or
+/// less is a twentieth.
+const ENOUGH: f64 = 20.0;
+
+/// Whether a topic with these rates before was even, and enough of its messages are expected in this time.
+fn is_enough(before: &[Rate], span: Span) -> bool {
+    let expected = |last: &Rate| last.hz() * span.nanos() as f64 / 1e9;
+    before.last().is_some_and(|last| expected(last) >= ENOUGH) && Rate::are_even(before)
 }
 
 /// The part of a window from a topic's first message on; `None` if that is less than half of it.

@@ -152,7 +152,9 @@ impl Judge<'_> {
         });
         let own: Vec<&str> = own.map(|topic| topic.name.as_str()).collect();
         let is_sent = |name: &&str| self.is_sent(&self.facts.topics(&Pattern::new(name)));
-        if own.is_empty() || own.iter().any(is_sent) {
+        let roles = self.facts.nodes(pattern);
+        let sends_others = roles.iter().any(|(_, nodes)| self.facts.is_sender(nodes));
+        if own.is_empty() || sends_others || own.iter().any(is_sent) {
             return None;
         }
         let topics = words::some_of(&own, NAMED);
