@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 
 use crate::source;
-use crate::support::{ORIGIN, Recording, rosbag1, sqlite3};
+use crate::support::{ORIGIN, Recording, rosbag1, small, sqlite3};
 
 /// Command, its arguments, and an option that changes the files or the results.
 #[rustfmt::skip]
@@ -380,7 +380,10 @@ fn folder() -> TempDir {
         &rosbag1::write(&large(), rosbag1::Pack::Lz4, 4 << 20),
     );
     put("bags/a.bag", &bag);
-    put("bags/b.bag", &bag);
+    put(
+        "bags/b.bag",
+        &rosbag1::write(&small(), rosbag1::Pack::None, 4000),
+    );
     put(
         "t.csv",
         b"Name,Publish,Subscribe,Node-start,Node-end\n/new,[],\"['/chat']\",,\n",
