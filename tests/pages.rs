@@ -293,6 +293,68 @@ fn merged_windows_are_shown_with_their_own_spans() {
     assert!(frame.contains(">0:08 – 0:18<"), "{frame}");
 }
 
+/// The value of a run list in a window.
+fn value_at(list: &Value, window: u64) -> usize {
+    let (mut from, mut value) = (0, 0);
+    let list: Vec<u64> = serde_json::from_value(list.clone()).unwrap_or_default();
+    for run in list.chunks(2) {
+        from += run[0];
+        if from > window {
+            break;
+        }
+        value = run[1];
+    }
+    usize::try_from(value).unwrap()
+}
+
+#[test]
+fn a_page_has_the_exact_rate_of_each_window() {
+    let folder = TempDir::new().unwrap();
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    render_with(&bag, folder.path(), &["html", "json"], &["--period", "10"]);
+    let graph = &data_of(&read(&folder, "x.html"))["graphs"][0];
+    let mission: Value = serde_json::from_str(&read(&folder, "x.json")).unwrap();
+    let names = graph["names"].as_array().unwrap();
+    let text = |value: usize| graph["labels"][value].as_str().unwrap();
+    let (mut compared, mut empty) = (0, 0);
+    for (w, window) in (0..).zip(mission["windows"].as_array().unwrap()) {
+        for topic in window["topics"].as_array().unwrap() {
+            let place = names.iter().rposition(|name| *name == topic["name"]);
+            let (Some(place), Some(hz)) = (place, topic["hz"].as_f64()) else {
+                continue;
+            };
+            let lists = &graph["lives"][place];
+            let state = graph["classes"][value_at(&lists[0], w)].as_str().unwrap();
+            if state == "off" || graph["kinds"][place] != 1 {
+                continue;
+            }
+            let exact: f64 = text(value_at(&lists[4], w)).parse().unwrap();
+            assert!((exact - hz).abs() <= 1e-5 * hz, "{w} {topic} {exact}");
+            let drawn = text(value_at(&lists[1], w));
+            // Silence ends a rate of at least five messages.
+            if hz == 0.0 && !state.contains("removed") {
+                assert_eq!(drawn, "", "{w} {topic}");
+                empty += 1;
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 500 && empty > 10, "{compared} {empty}");
+}
+
+#[test]
+fn pages_of_ros_2_do_not_mention_connections_of_ros_1() {
+    let (data, ..) = divided(&["--period", "10"]);
+    let words = data["words"].as_array().unwrap();
+    let has = |text: &str| {
+        words
+            .iter()
+            .any(|line| line.as_str().unwrap().contains(text))
+    };
+    assert!(has("known by connection: channels of the recording"));
+    assert!(!has("ROS 1 connection") && !has("known by unknown"));
+}
+
 #[test]
 fn an_animation_shows_every_rate_in_its_window() {
     let mission = running(&ROBOT, 50);
@@ -457,9 +519,9 @@ fn pages_stay_within_their_size() {
         .and_then(|s| s.split("</style>").next())
         .unwrap();
     assert!(fonts.starts_with("@font-face"));
-    // Including 66,000 of script and CSS.
+    // Including 69,000 of script and CSS.
     assert!(
-        page.len() - fonts.len() <= 125_000,
+        page.len() - fonts.len() <= 127_000,
         "{}",
         page.len() - fonts.len()
     );

@@ -129,7 +129,7 @@ const FEW: usize = 4;
 /// The properties that distinguish looks without marks.
 type LookKey = (
     (State, Confidence, bool, bool),
-    [Option<u64>; 3],
+    [Option<u64>; 5],
     (usize, Members),
     Vec<RowKey>,
     Option<Arc<str>>,
@@ -193,6 +193,7 @@ impl LooksWriter {
 
 fn key(shown: &Shown) -> LookKey {
     let bits = |hz: Option<f64>| hz.map(f64::to_bits);
+    let written = (shown.held.map(|held| held.0), shown.held.and_then(|h| h.1));
     (
         (
             shown.state,
@@ -200,7 +201,13 @@ fn key(shown: &Shown) -> LookKey {
             shown.is_paused,
             shown.is_starved,
         ),
-        [bits(shown.hz), bits(shown.steady_hz), shown.count],
+        [
+            bits(shown.hz),
+            bits(shown.steady_hz),
+            shown.count,
+            bits(written.0),
+            written.1,
+        ],
         (shown.each, shown.members),
         shown.topics.iter().map(TopicRow::key).collect(),
         shown.lifecycle.clone(),

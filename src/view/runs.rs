@@ -34,6 +34,9 @@ pub(crate) struct ElementRuns {
     /// Windows in which its rate changed, each with the old and the new rate: indices into [`Runs::labels`].
     /// Such a value applies to one window.
     pub turns: Vec<Run>,
+    /// Its messages per second in each window, as decimal numbers: indices into [`Runs::labels`]. While it is absent,
+    /// the last value stays.
+    pub hertz: Vec<Run>,
 }
 
 /// The whole sequence of a view as runs.
@@ -42,7 +45,7 @@ pub(crate) struct Runs {
     /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`:
     /// absent.
     pub classes: Vec<String>,
-    /// Rates and lifecycle states as they are written; the first is empty: unknown.
+    /// Rates and lifecycle states as they are written, and rates as numbers; the first is empty: unknown.
     pub labels: Vec<String>,
     /// The values of each item of the view.
     pub items: Vec<ElementRuns>,
@@ -77,7 +80,7 @@ impl Runs {
         // The most frequent value gets the shortest number.
         let both = || items.iter().chain(&arrows);
         let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes));
-        let texts = |l: &'_ ElementRuns| [&l.rates[..], &l.lifecycles[..], &l.turns[..]].concat();
+        let texts = |l: &'_ ElementRuns| [&l.rates[..], &l.lifecycles, &l.turns, &l.hertz].concat();
         let all_texts: Vec<Run> = both().flat_map(texts).collect();
         let new_labels = labels.by_frequency(&all_texts);
         for life in items.iter_mut().chain(&mut arrows) {
@@ -85,6 +88,7 @@ impl Runs {
             renumber(&mut life.rates, &new_labels);
             renumber(&mut life.lifecycles, &new_labels);
             renumber(&mut life.turns, &new_labels);
+            renumber(&mut life.hertz, &new_labels);
         }
         Self {
             classes: classes.sorted(&new_classes, |class| {
@@ -230,8 +234,9 @@ struct RunRecorder<'a, F> {
 impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
     fn runs(&mut self, looks: &Looks) -> ElementRuns {
         let mut life = ElementRuns::default();
-        // The label of each rate is cached: formatting takes time, and most rates recur.
+        // The text of each rate is cached: formatting takes time, and most rates recur.
         let mut known: BTreeMap<_, u32> = BTreeMap::new();
+        let mut numbers: BTreeMap<_, u32> = BTreeMap::new();
         let mut last_hz = None;
         for (window, shown) in looks.runs() {
             let Some(shown) = shown else {
@@ -241,12 +246,18 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
             let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
             let class = self.classes.place(Some(LookClass::of(shown, arrow)));
             push(&mut life.classes, window, class);
+            let each = shown.hz.map(|hz| hz / shown.each.max(1) as f64);
+            let number = *numbers.entry(each.map(f64::to_bits)).or_insert_with(|| {
+                let text = each.map(|hz| words::significant(hz, 6).to_string());
+                self.labels.place(text.unwrap_or_default())
+            });
+            push(&mut life.hertz, window, number);
             if shown.mark == Some(Mark::Removed) {
                 continue;
             }
-            let hz = shown.hz.map(|hz| {
+            let hz = shown.written_rate().map(|(hz, count)| {
                 let rows: Vec<_> = shown.topics.iter().map(TopicRow::key).collect();
-                (hz.to_bits(), shown.count, shown.each, rows)
+                (hz.to_bits(), count, shown.each, rows)
             });
             let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
             if hz != last_hz || (life.rates.is_empty() && arrow.is_some()) {
@@ -299,9 +310,15 @@ pub(crate) fn flat(list: &[Run]) -> Vec<u32> {
 }
 
 impl Serialize for ElementRuns {
-    /// `[classes, rates, lifecycles, turns]`, each [`flat`]; empty lists at the end are left out.
+    /// `[classes, rates, lifecycles, turns, hertz]`, each [`flat`]; empty lists at the end are left out.
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let lists = [&self.classes, &self.rates, &self.lifecycles, &self.turns];
+        let lists = [
+            &self.classes,
+            &self.rates,
+            &self.lifecycles,
+            &self.turns,
+            &self.hertz,
+        ];
         let reported = lists.iter().rposition(|list| !list.is_empty());
         let lists = &lists[..reported.map_or(0, |last| last + 1)];
         let all: Vec<Vec<u32>> = lists.iter().map(|list| flat(list)).collect();
@@ -381,9 +398,34 @@ mod tests {
         let runs = runs(&[Some((None, 9.8)); 50]);
         assert_eq!(
             serde_json::to_string(&runs.arrows).unwrap(),
-            "[[[0,1],[0,1]]]"
+            "[[[0,1],[0,2],[],[],[0,1]]]"
         );
         assert_eq!(reported(&runs, 50)[49], ("active w2", "10"));
+    }
+
+    #[test]
+    fn equal_rates_may_be_written_differently() {
+        let shown = |held: Option<f64>| Shown {
+            hz: Some(0.0),
+            held: held.map(|hz| (hz, None)),
+            ..Shown::plain(0, State::Active, Confidence::Measured)
+        };
+        let story = [shown(Some(7.1)), shown(None), shown(Some(7.1))];
+        let view = View {
+            items_shown: vec![Looks::of(story.iter().map(Some))],
+            ..View::default()
+        };
+        let label = |shown: &Shown, _: Option<&Arrow>| {
+            format!("{:.1}", shown.written_rate().map_or(0.0, |rate| rate.0))
+        };
+        let runs = Runs::of(&view, label);
+        let text = |list, w| &*runs.labels[at(list, w) as usize];
+        let [item] = &runs.items[..] else { panic!() };
+        assert_eq!(
+            [0, 1, 2].map(|w| text(&item.rates, w)),
+            ["7.1", "0.0", "7.1"]
+        );
+        assert_eq!([0, 1, 2].map(|w| text(&item.hertz, w)), ["0", "0", "0"]);
     }
 
     #[test]

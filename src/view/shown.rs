@@ -88,7 +88,7 @@ pub struct Shown {
     pub confidence: Confidence,
     /// Its change in the window, if any.
     pub mark: Option<Mark>,
-    /// Messages per second in the window, if known (0 for a ghost).
+    /// Messages per second in the window, if known.
     pub hz: Option<f64>,
     /// Messages per second, averaged over the time between the rate changes before and after this window.
     pub steady_hz: Option<f64>,
@@ -148,6 +148,11 @@ impl Shown {
             confidence,
             ..Self::default()
         }
+    }
+
+    /// The rate that is written, and its number of messages, if known.
+    pub(crate) fn written_rate(&self) -> Option<(f64, Option<u64>)> {
+        self.held.or(self.hz.map(|hz| (hz, self.count)))
     }
 
     /// Whether it ended in the window.

@@ -124,11 +124,12 @@ impl PresentLife {
         }
         let (sent, time) = self.sent;
         run.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
+        let seconds = lengths.of(run.from, run.from + 1) / 1e9;
         // A window with an event shows the event's number, and a few messages make no rate.
         let is_few = shown.count.is_some_and(|count| count < FEWEST);
         if shown.mark.is_some() || is_few && self.held.is_none() {
             self.held = None;
-        } else if self.held.is_none_or(|held| differs(held.0, shown)) {
+        } else if self.held.is_none_or(|held| differs(held.0, shown, seconds)) {
             self.held = shown.hz.map(|hz| (hz, shown.count)).filter(|_| !is_few);
         }
         run.held = self.held;
@@ -198,18 +199,12 @@ const DIFFERENT: (f64, f64) = (0.25, 2.0);
 /// The fewest messages in a window that make a rate.
 const FEWEST: u64 = 5;
 
-/// Whether the rate of a window differs from `held` by more than chance.
-fn differs(held: f64, shown: &Shown) -> bool {
-    let Some(hz) = shown.hz else {
-        return false;
-    };
-    let by = (hz - held).abs();
-    // Messages per hertz: the seconds of the window.
-    let seconds = match shown.count {
-        Some(count) if count > 0 && hz > 0.0 => count as f64 / hz,
-        _ => return by > DIFFERENT.0 * held && shown.count != Some(0),
-    };
-    by > DIFFERENT.0 * held && by * seconds > DIFFERENT.1 * libm::sqrt(held * seconds)
+/// Whether the rate of a window of so many seconds differs from `held` by more than chance.
+fn differs(held: f64, shown: &Shown, seconds: f64) -> bool {
+    let by = shown.hz.map_or(0.0, |hz| (hz - held).abs());
+    let is_chance =
+        shown.count.is_some() && by * seconds <= DIFFERENT.1 * libm::sqrt(held * seconds);
+    by > DIFFERENT.0 * held && !is_chance
 }
 
 fn is_rate(shown: &Shown) -> bool {
@@ -229,4 +224,34 @@ fn livelier(a: State, b: State) -> State {
         State::Declared => 3,
     };
     if rank(a) <= rank(b) { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::time::Stamp;
+
+    /// The rate that is written in each window of ten seconds with so many messages.
+    fn written_rates(counts: &[u64]) -> Vec<f64> {
+        let shown = |count: &u64| Shown {
+            hz: Some(*count as f64 / 10.0),
+            count: Some(*count),
+            ..Shown::plain(0, State::Active, Confidence::Measured)
+        };
+        let shown: Vec<Shown> = counts.iter().map(shown).collect();
+        let window = Span::new(Stamp(0), Stamp(10_000_000_000));
+        let lengths = Lengths::new(counts.iter().map(|_| window));
+        let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
+        let rate = |at| looks.at(at)?.written_rate();
+        (0..counts.len()).filter_map(rate).map(|r| r.0).collect()
+    }
+
+    #[test]
+    fn a_written_rate_ends_where_chance_does_not_explain_the_number() {
+        let by_chance = written_rates(&[71, 80, 64, 71]);
+        assert_eq!(by_chance, [7.1, 7.1, 7.1, 7.1]);
+        // No messages, and a few.
+        assert_eq!(written_rates(&[71, 0, 3, 70]), [7.1, 0.0, 0.3, 7.0]);
+        assert_eq!(written_rates(&[6, 5, 0, 6]), [0.6, 0.6, 0.0, 0.6]);
+    }
 }

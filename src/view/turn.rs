@@ -176,10 +176,8 @@ pub(super) fn marked(
         (true, true) if reported.came || reported.went => reported.mark.or(Some(Mark::Inside)),
         _ => reported.mark,
     };
-    let is_gone = mark == Some(Mark::Removed);
     Some(Shown {
         mark,
-        hz: if is_gone { Some(0.0) } else { shown.hz },
         rates: reported
             .rates
             .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),

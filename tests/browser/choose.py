@@ -22,6 +22,34 @@ def there(window):
     return {e["name"] for kind in ("nodes", "topics") for e in window[kind]}
 
 
+def compare_means(b, windows):
+    """Labels, card and table of a range: messages by time."""
+    length = lambda w: (w["end_ns"] - w["start_ns"]) / 1e9
+    def means(kind, key):
+        sums = {}
+        for w in windows:
+            for e in w[kind]:
+                sums[key(e)] = sums.get(key(e), 0) + (e["hz"] or 0) * length(w)
+        return {name: n / sum(map(length, windows)) for name, n in sums.items()}
+    topics, nodes = (means(kind, lambda e: e["name"]) for kind in ("topics", "nodes"))
+    drawn = {**nodes, **topics, **means("publishes", lambda e: e["node"] + " " + e["topic"])}
+    differs = lambda text, mean: abs(float(text.split(" ")[0]) - mean) > 0.06
+    labels = dict(b.js("return [...document.querySelectorAll('#graph :is([data-from], [data-name]):not(.off)')].map(g => [g.dataset.name ?? g.dataset.from + ' ' + g.dataset.to, g.querySelector('.r')?.textContent])"))
+    wrong = [(name, text, drawn[name]) for name, text in labels.items() if text and differs(text, drawn[name])]
+    assert not wrong and sum(map(bool, labels.values())) > 5, (wrong, labels)
+    b.keys("t")
+    rates = dict(b.js("return [...document.querySelectorAll('#sheet tbody tr[data-key]')].map(r => [r.dataset.key, r.children[2].textContent])"))
+    wrong = [(name, rates["topic:" + name], mean) for name, mean in topics.items() if differs(rates["topic:" + name], mean)]
+    assert not wrong and len(topics) > 5, wrong
+    b.keys(ESC)
+    name = max(topics, key=lambda name: name not in there(windows[0]))
+    b.js("document.querySelector(`#graph [data-name='${arguments[0]}'] text`).dispatchEvent(new MouseEvent('click', {bubbles: true}))", name)
+    state = b.js("return document.getElementById('state').textContent")
+    assert " in this range" in state and "window" not in state, state
+    assert not differs(next(part for part in state.split(" · ") if " Hz" in part), topics[name]), (state, topics[name])
+    b.keys(ESC)
+
+
 def ranges(b, url, evolution):
     windows = evolution["windows"]
     b.open("about:blank")
@@ -35,6 +63,7 @@ def ranges(b, url, evolution):
     assert wanted <= drawn <= wanted | there(windows[9]), (wanted - drawn, drawn - wanted)
     link = b.js("return location.hash")
     assert "t=100" in link and "e=210" in link, link
+    compare_means(b, windows[10:21])
     b.keys(ESC)
     assert "windows" not in b.js("return document.getElementById('where').textContent")
     b.open("about:blank")
@@ -55,6 +84,9 @@ def search(b):
     assert hits("lidar")[0] == "/sensors/lidar", hits("lidar")
     assert hits("planer")[0] == "/nav/planner", hits("planer")
     assert hits("ctrllr")[0].startswith("/nav/controller"), hits("ctrllr")
+    assert hits("caemra")[0] == "/sensors/camera" and hits("nav_planner")[0] == "/nav/planner", hits("nav_planner")
+    assert hits("snsrs cam")[0] == "/sensors/camera", hits("snsrs cam")
+    assert hits("ner -> out")[0] == "/nav/planner → /nav/planner/out", hits("ner -> out")
     assert not hits("zzzzzz")
     hits("")
     print("  search puts an exact last part first, and forgives letters")
@@ -65,8 +97,13 @@ def panel(b):
     assert b.js(count) > 0
     b.js("document.querySelector('#spaces').open = true; [...document.querySelectorAll('#spacelist label')].find(l => l.textContent.includes('/nav ')).querySelector('input').click()")
     assert b.js(count) == 0, "a namespace is left out"
+    left = "return [[...document.querySelectorAll('#graph .namespace')].filter(g => getComputedStyle(g).visibility == 'visible').length, [...document.querySelectorAll('#rownames .space')].filter(r => !r.hidden && r.textContent == '/nav').length, [...document.querySelectorAll('#news button')].filter(b => b.title.startsWith('/nav/')).length, document.getElementById('counts').textContent]"
+    hidden = b.js(left)
+    assert hidden[1:3] == [0, 0], hidden
     b.js("document.querySelector('#spacelist input:not(:checked)').click()")
     assert b.js(count) > 0
+    shown = b.js(left)
+    assert shown[0] == hidden[0] + 1 and shown[1] == 1, (shown, hidden)
     b.js("document.querySelector('#graph .topic:not(.off) rect').dispatchEvent(new MouseEvent('click', {bubbles: true}))")
     b.js("document.activeElement.blur()")
     b.keys("g")
@@ -89,6 +126,10 @@ def minimap(b):
     for name in names:
         b.js("location.hash = '#t=0&sel=' + arguments[0]", name)
         time.sleep(0.15)
+        gone, covers = b.js(COVERED)
+        assert gone or not covers, name
+        b.js("document.activeElement.blur()")
+        b.keys("c")
         gone, covers = b.js(COVERED)
         assert gone or not covers, name
     print("  the minimap covers nothing that is selected")
@@ -121,12 +162,21 @@ def timeline_page(b, url):
 
 
 def embedded(b, url, board):
+    b.open("about:blank")
+    b.open(url)
+    b.keys("f")
+    whole = b.js("return document.getElementById('graph').getAttribute('viewBox')")
+    b.open("about:blank")
+    b.open(url + "#bare")
+    assert b.js("return +document.getElementById('seek').value") == 0, "it begins with the first window"
+    assert b.js("return document.getElementById('graph').getAttribute('viewBox')") == whole, whole
     for page, part in ((url, "stage"), (board, "time")):
         b.open("about:blank")
         b.open(page + "#bare&loop")
         time.sleep(0.3)
-        assert b.js("return ['header', 'aside', '#buttons'].every(css => getComputedStyle(document.querySelector(css)).display == 'none' || document.querySelector(css).getBoundingClientRect().height <= 1)")
+        assert b.js("return ['h1', 'aside', '#buttons'].every(css => getComputedStyle(document.querySelector(css)).display == 'none' || document.querySelector(css).getBoundingClientRect().height <= 1)")
         assert b.js("return document.getElementById(arguments[0]).getBoundingClientRect().width", part) > 1000
+        assert b.js("const r = document.getElementById('where').getBoundingClientRect(); return r.height > 9 && r.width > 99 && document.elementFromPoint(r.left + 5, r.top + 5).id") == "where", "the time"
     b.js("const s = document.getElementById('seek'); s.value = s.max; s.dispatchEvent(new Event('input'))")
     b.keys(" ")
     time.sleep(1.4)

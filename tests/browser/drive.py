@@ -53,7 +53,7 @@ def compare_data(page, evolution):
     data, compared = data_of(page), 0
     graph = data["graphs"][0]
     facts = [" ".join(data["words"][f] for f in own) for own in graph["facts"]]
-    lives = [[lists[k] if k < len(lists) else [] for k in range(4)] for lists in graph["lives"]]
+    lives = [[lists[k] if k < len(lists) else [] for k in range(5)] for lists in graph["lives"]]
     items = {}
     for i, name in enumerate(graph["names"]):
         items.setdefault(name, []).append(i)
@@ -73,6 +73,8 @@ def compare_data(page, evolution):
             assert words[0] == element["state"], (w, element, words)
             if element["hz"] is not None:
                 assert label == hertz(element["hz"]) + " Hz", (w, element, label)
+                exact = float(graph["labels"][at(lives[i][4], w)])
+                assert abs(exact - element["hz"]) <= 1e-5 * element["hz"], (w, element, exact)
             there.add(i)
             compared += 1
         for i, life in enumerate(lives):
@@ -189,6 +191,10 @@ def drive(b, url, evolution, data):
     b.open("about:blank")
     b.open(f"{url}#t={seconds:g}&sel={node}")
     assert window(b) == 30 and b.js("return document.getElementById('name').textContent") == node
+    w, absent = next((w, n["name"]) for w in range(1, last) for n in windows[w - 1]["nodes"] if n["name"] not in {m["name"] for m in windows[w]["nodes"]})
+    b.open("about:blank")
+    b.open(f"{url}#t={(windows[w]['start_ns'] - windows[0]['start_ns']) / 1e9:g}&sel=node:{absent}")
+    assert window(b) == w and b.js("return document.getElementById('name').textContent") == absent, (window(b), w, absent)
     b.open("about:blank")
     b.open(f"{url}#t=0&sel=topic:{topic}")
     assert b.js("return document.getElementById('state').textContent").startswith("topic")

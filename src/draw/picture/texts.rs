@@ -69,7 +69,7 @@ pub(crate) fn inside(counts: &Counts) -> String {
 
 /// The rate that is written, with no more digits than its messages allow; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
-    let (hz, count) = shown.held.or(shown.hz.map(|hz| (hz, shown.count)))?;
+    let (hz, count) = shown.written_rate()?;
     measured(shown, hz, count)
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{HtmlPage, PageGraph};
+use crate::bag::Report;
 use crate::base::cast;
 use crate::base::digest;
 use crate::base::geometry::Rect;
@@ -78,10 +79,10 @@ struct GraphData<'a> {
     facts: Vec<Vec<u32>>,
     /// Class names of values of run lists.
     classes: &'a [String],
-    /// Rates, lifecycle states, and rate changes as text.
+    /// Rates, lifecycle states, and rate changes as text; rates as numbers.
     labels: &'a [String],
-    /// Per element, run lists: of classes, of rates, of lifecycle states, and of rate changes, whose values apply to
-    /// one window. Empty lists at the end are left out.
+    /// Per element, run lists: of classes, of rates as drawn, of lifecycle states, of rate changes, whose values apply
+    /// to one window, and of the messages per second of each window. Empty lists at the end are left out.
     lives: Vec<&'a ElementRuns>,
     /// Per item of the picture: its members.
     holds: Vec<Vec<u32>>,
@@ -392,7 +393,8 @@ fn facts_of(
     let evidence = members
         .iter()
         .fold(Evidence::NONE, |all, m| all.and(elements.evidence(*m)));
-    facts.extend(evidence.lines().map(|line| format!("known by {line}")));
+    let is_ros1 = page.sequence.mission.bags.iter().any(is_ros1);
+    facts.extend(evidence.lines().map(|line| known_by(&line, is_ros1)));
     if is_item {
         let lives = members.iter().map(|m| elements.life(*m));
         let first = lives.clone().filter_map(|l| l.0).min();
@@ -422,6 +424,21 @@ fn facts_of(
         .into_iter()
         .map(|f| words.place(visible(&f).into_owned()))
         .collect()
+}
+
+fn is_ros1(bag: &Report) -> bool {
+    bag.format == "rosbag1"
+}
+
+/// The line about a kind of evidence, in words that suit the format of the recording.
+fn known_by(line: &str, is_ros1: bool) -> String {
+    match line.split_once(": ") {
+        Some(("connection", _)) if !is_ros1 => {
+            "known by connection: channels of the recording".to_owned()
+        }
+        Some(("unknown", about)) => format!("name unknown: {about}"),
+        _ => format!("known by {line}"),
+    }
 }
 
 /// The types of topics, and the quality of service with which they are offered.

@@ -36,11 +36,16 @@ const NONE = [];
 class Graph {
 	constructor({ names, kinds, arrows, facts, boxes, classes, labels, lives, holds }, svg) {
 		Object.assign(this, { names, kinds, arrows, boxes, classes, labels, holds, svg, N: names.length, count: names.length + arrows.length });
-		this.lives = lives.map(lists => [0, 1, 2, 3].map(k => lists[k] ?? NONE));
+		this.lives = lives.map(lists => [0, 1, 2, 3, 4].map(k => lists[k] ?? NONE));
 		for (const list of lives.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
 		this.facts = facts.map(list => list.map(f => words[f]));
 		this.els = svg ? [...svg.querySelectorAll('.items > g, .arrows > g')] : [];
 		if (svg) this.els = [...svg.querySelector('.items').children, ...svg.querySelector('.arrows').children];
+		// The frames of namespaces, with the items inside.
+		this.spaces = [...svg?.querySelectorAll('.spaces > g') ?? []].map(frame => {
+			const [x, y, w, h] = ['x', 'y', 'width', 'height'].map(key => +frame.querySelector('rect').getAttribute(key));
+			return [frame, [...names.keys()].filter(i => boxes[i][0] >= x - 1 && boxes[i][1] >= y - 1 && boxes[i][0] + boxes[i][2] <= x + w + 1 && boxes[i][1] + boxes[i][3] <= y + h + 1)];
+		}).filter(([, held]) => held.length);
 		this.base = this.els.map(e => e.classList[0] + ' ');
 		this.live = this.els.map(e => e.querySelector('.r'));
 		this.cur = this.els.map(() => '');
@@ -65,14 +70,27 @@ class Graph {
 	type(i) { return this.facts[i].find(f => f.startsWith('type ')) ?? ''; }
 	class(i, w) { return at(this.lives[i][0], w); }
 	isThere(i, w) { return this.there[this.class(i, w)]; }
-	rate(i, w) {
-		const k = this.class(i, w);
-		return this.there[k] && !/^(silent|latched|declared)/.test(this.classes[k]) ? this.labels[at(this.lives[i][1], w)] : '';
+	// Messages in some windows, the time in seconds, and whether any are known.
+	sent(i, from, to = from) {
+		let sum = 0, time = 0, isKnown = false;
+		for (let w = from; w <= to; w++) {
+			const number = this.class(i, w) && this.labels[at(this.lives[i][4], w)], seconds = ends[w] - starts[w];
+			time += seconds;
+			sum += (+number || 0) * seconds;
+			isKnown ||= !!number;
+		}
+		return [sum, time, isKnown];
 	}
-	// Messages per second, as in the label.
-	hz(i, w) {
-		const [, number, unit] = this.rate(i, w).match(/([\d.]+) (Hz|kHz|msg)( each)?$/) ?? [];
-		return number ? number * ({ kHz: 1e3, msg: 1 / (ends[w] - starts[w]) }[unit] ?? 1) : 0;
+	// Messages per second over some windows: as a number, and in words.
+	hz(i, from, to) {
+		const [sum, time] = this.sent(i, from, to);
+		return sum && sum / time;
+	}
+	rate(i, from, to = from) {
+		const [sum, time, isKnown] = this.sent(i, from, to), hz = sum && sum / time;
+		if (!isKnown || !sum && /^(latched|declared)/.test(this.classes[this.class(i, to)])) return '';
+		const each = / each$/.test(this.labels[at(this.lives[i][1], to)]) ? ' each' : '';
+		return (Math.abs(sum - 1) < .01 ? '1 msg' : spell(hz < 999.5 ? hz : hz / 1e3) + (hz < 999.5 ? ' Hz' : ' kHz')) + each;
 	}
 	lifecycle(i, w) { return this.labels[at(this.lives[i][2], w)]; }
 	turn(i, w) {
@@ -85,7 +103,7 @@ class Graph {
 		if (!a && !b) return NONE;
 		if (!a) return ['added', this.rate(i, to)];
 		if (!b) return ['removed', this.rate(i, from)];
-		const before = this.hz(i, from), after = this.hz(i, to), change = `${this.rate(i, from) || '0 Hz'} → ${this.rate(i, to) || '0 Hz'}`;
+		const before = this.hz(i, from), after = this.hz(i, to), change = `${this.rate(i, from)} → ${this.rate(i, to)}`;
 		if (Math.abs(after - before) > data.change * (before || after) * (1 + 1e-9)) return [after > before ? 'changed faster' : 'changed slower', change];
 		const [x, y] = [from, to].map(w => this.lifecycle(i, w));
 		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;

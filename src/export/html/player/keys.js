@@ -75,16 +75,20 @@ addEventListener('resize', arrange);
 arrange();
 // Printed pages show the whole graph, with names and lifelines, regardless of the screen.
 onbeforeprint = () => {
-	beforePrint = [view, $.deck.classList.contains('small')];
+	beforePrint = [view, $.deck.classList.contains('small'), $.notes.open];
+	$.notes.open = true;
 	if (!isBoard) fit(homeOf());
 	svg().classList.remove('norates', 'notopics', 'nonodes');
 	$.deck.classList.remove('small');
 	$.time.style.width = '42rem';
 	drawTime();
+	// On one sheet, so that names and lives stay side by side.
+	$.time.style.zoom = Math.max(.4, Math.min(1, 600 / $.time.offsetHeight));
 };
 onafterprint = () => {
-	const [box, isSmall] = beforePrint;
-	beforePrint = $.time.style.width = '';
+	const [box, isSmall, isOpen] = beforePrint;
+	$.notes.open = isOpen;
+	beforePrint = $.time.style.width = $.time.style.zoom = '';
 	livesOn(!isSmall);
 	fit(box);
 };

@@ -18,18 +18,18 @@ function fill(id, all, row, most = MANY) {
 	}
 	if (kept && !list.contains(document.activeElement)) $.title.focus({ preventScroll: true });
 }
-const signOf = i => base < 0 ? KINDS[whole.marks[whole.class(i, now)]] ?? (whole.isThere(i, now) ? '' : 'away') : whole.difference(i, base, now)[0] ?? '';
+const signOf = i => range ? (([look]) => look == 'off' ? 'away' : KINDS.find(kind => look.endsWith(kind)) ?? '')(looksOf(whole)[i]) : base < 0 ? KINDS[whole.marks[whole.class(i, now)]] ?? (whole.isThere(i, now) ? '' : 'away') : whole.difference(i, base, now)[0] ?? '';
 // An element with its rate, or with its difference.
 function element(i) {
-	const [, differs] = base < 0 ? [0, whole.turn(i, now)] : whole.difference(i, base, now);
-	const rate = differs || whole.rate(i, now);
-	return entry(i, whole.name(i) + (rate ? '  ' + rate.replace(/^.* over /, '') : ''), signOf(i));
+	const [, differs] = range ? NONE : base < 0 ? [0, whole.turn(i, now)] : whole.difference(i, base, now);
+	const rate = differs || whole.rate(i, ...range ?? [now]);
+	return entry(i, whole.name(i) + (rate ? '  ' + rate : ''), signOf(i));
 }
 function listNews() {
 	if (base < 0) {
 		say('newstitle', data.sides ? 'Differences' : range ? 'Changes in these windows' : 'Changes in this window');
 		const all = told.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
-		const n = all.reduce((sum, [, n]) => sum + n, 0), lines = all.flatMap(([, , , lines]) => lines);
+		const lines = all.flatMap(([w]) => linesOf(w)), n = all.reduce((sum, [, n, , lines]) => sum + n - lines.length, lines.length);
 		// Still empty.
 		if (!n && $.news.firstChild?.textContent == 'None.') return;
 		fill('news', lines, ([s, sign, i, text, id]) => {
@@ -49,35 +49,39 @@ function listNews() {
 onSeek.push(listNews);
 
 // Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then
-// names that begin with the text, then names that contain it; without any, similar names.
+// names that begin with the text, then names that contain it; without any, names with other separators, similar
+// names, and names with the letters of each word in order.
 function found(text) {
 	const q = text.toLowerCase().trim();
 	if (!q) return NONE;
 	const ends = q.split(/\s*(?:->|→)\s*/), has = (name, part) => part.split(/\s+/).every(word => name.includes(word));
-	const items = [...whole.names.keys()], lower = whole.names.map(name => name.toLowerCase());
+	const items = [...whole.names.keys()], lower = whole.names.map(name => name.toLowerCase()), parted = name => name.replace(/[\s/_-]+/g, ' ').trim();
+	const rank = (i, q) => {
+		const tail = lower[i].slice(lower[i].lastIndexOf('/') + 1);
+		return lower[i] == q || tail == q ? 0 : tail.startsWith(q) ? 1 : tail.includes(q) ? 2 : has(lower[i], q) ? 3 : 4;
+	};
+	const sorted = (all, rank) => all.map(i => [rank(i), whole.name(i).length, i]).sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2]).map(([, , i]) => i);
 	if (ends.length > 1) {
-		return [...Array(whole.count - whole.N).keys()].map(k => k + whole.N).filter(i => {
-			const [a, b] = whole.ends(i).map(end => lower[end]);
-			return has(a, ends[0]) && has(b, ends[1]);
-		});
+		const all = [...Array(whole.count - whole.N).keys()].map(k => k + whole.N).filter(i => whole.ends(i).every((end, k) => has(lower[end], ends[k])));
+		return sorted(all, i => whole.ends(i).reduce((sum, end, k) => sum + rank(end, ends[k]), 0));
 	}
-	const tail = i => lower[i].slice(lower[i].lastIndexOf('/') + 1);
-	const rank = i => lower[i] == q || tail(i) == q ? 0 : tail(i).startsWith(q) ? 1 : tail(i).includes(q) ? 2 : has(lower[i], q) ? 3 : 4;
-	const sorted = (all, rank) => all.map(i => [rank(i), lower[i].length, i]).sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2]).map(([, , i]) => i);
 	const all = items.filter(i => has(lower[i] + ' ' + whole.type(i).slice(5).toLowerCase(), q));
-	if (all.length || q.length < 3) return sorted(all, rank);
+	if (all.length || q.length < 3) return sorted(all, i => rank(i, q));
 	const most = Math.min(2, Math.ceil(q.length / 4)), apart = i => Math.min(...[lower[i], ...lower[i].split('/')].map(part => distance(q, part)));
-	const close = items.filter(i => apart(i) <= most);
-	return close.length ? sorted(close, apart) : sorted(items.filter(i => isInOrder(q, lower[i])), () => 0);
+	const ways = [i => parted(q) && has(parted(lower[i]), parted(q)), i => apart(i) <= most, i => q.split(/\s+/).every(word => isInOrder(word, lower[i]))];
+	return sorted(ways.map(way => items.filter(way)).find(some => some.length) ?? NONE, apart);
 }
-// The edit distance.
+// The edit distance; two letters in the wrong order count once.
 function distance(a, b) {
 	if (Math.abs(a.length - b.length) > 2) return 9;
-	let row = [...Array(b.length + 1).keys()];
+	let row = [...Array(b.length + 1).keys()], before = row;
 	for (let i = 1; i <= a.length; i++) {
 		const next = [i];
-		for (let j = 1; j <= b.length; j++) next[j] = Math.min(row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] != b[j - 1]));
-		row = next;
+		for (let j = 1; j <= b.length; j++) {
+			next[j] = Math.min(row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] != b[j - 1]));
+			if (i > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) next[j] = Math.min(next[j], before[j - 2] + 1);
+		}
+		[before, row] = [row, next];
 	}
 	return row[b.length];
 }
@@ -113,7 +117,7 @@ function listSpaces() {
 	$.spaces.hidden = counts.size < 2;
 	$.spacelist.replaceChildren(...[...counts].sort().map(([space, n]) => make('label', {}, make('input', { type: 'checkbox', checked: !without.has(space), onchange: e => {
 		without[e.target.checked ? 'delete' : 'add'](space);
-		dress();
+		seek(now, 1);
 		drawTime();
 		save();
 	} }), ` ${space == '/' ? 'no namespace' : space} (${n})`)));

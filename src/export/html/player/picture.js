@@ -11,23 +11,20 @@ const isOut = (g, i) => without.size > 0 && (i < g.N ? [i] : g.ends(i)).some(k =
 const onSeek = [], stage = $.stage;
 const calm = matchMedia('(prefers-reduced-motion)');
 
-// Class and label of every element over the range: all that existed at any time, marked if the end differs
-// from the beginning; rates are means over the range.
+// Class and rate of every element over the range: all that existed at any time, marked if the end differs
+// from the beginning.
 function looksOf(g) {
 	if (rangeLooks.has(g)) return rangeLooks.get(g);
-	const [from, to] = range, length = ends[to] - starts[from], looks = [];
+	const [from, to] = range, looks = [];
 	for (let i = 0; i < g.count; i++) {
 		const list = g.lives[i][0], first = g.class(i, from), after = g.isThere(i, to);
-		let last = -1, sum = 0;
+		let last = -1;
 		for (let p = Math.max(0, place(list, from) - 2); p < list.length && list[p] <= to; p += 2) {
-			const end = Math.min(list[p + 2] ?? W, to + 1);
-			if (!list[p + 1]) continue;
-			last = list[p + 1];
-			for (let w = Math.max(from, list[p]); w < end; w++) sum += g.hz(i, w) * (ends[w] - starts[w]);
+			if (list[p + 1]) last = list[p + 1];
 		}
 		// Elements that begin in the first window did not exist before it; class 0 means absent.
 		const was = first > 0 && g.marks[first] != 0, mark = was == after ? '' : after ? ' added' : ' removed';
-		looks.push(last < 0 ? ['off', ''] : [g.plain[last] + mark, sum ? spell(sum / length) + ' Hz' : '']);
+		looks.push(last < 0 ? ['off', ''] : [g.plain[last] + mark, g.rate(i, from, to)]);
 	}
 	rangeLooks.set(g, looks);
 	return looks;
@@ -48,11 +45,11 @@ function classOf(g, i, w) {
 	return (g.there[k] ? g.plain[k] : 'off') + (difference ? ' ' + difference : '');
 }
 function labelOf(g, i, w) {
-	if (range) return looksOf(g)[i][1];
-	if (base >= 0) return g.difference(i, base, w)[1] ?? g.rate(i, w);
-	const lifecycle = g.lives[i][2].length && g.lifecycle(i, w);
-	const topic = i >= g.N && g.arrows[i - g.N][2], turn = g.turn(i, w);
-	return lifecycle || (turn && topic ? topic + ' ' : '') + turn || g.labels[at(g.lives[i][1], w)];
+	const topic = i >= g.N && g.arrows[i - g.N][2], named = text => (topic ? topic + ' ' : '') + (text == NIL ? '' : text);
+	if (range) return named(looksOf(g)[i][1]);
+	if (base >= 0) return named(g.difference(i, base, w)[1] ?? g.rate(i, w));
+	const lifecycle = g.lives[i][2].length && g.lifecycle(i, w), turn = g.turn(i, w);
+	return lifecycle || turn && named(turn) || g.labels[at(g.lives[i][1], w)];
 }
 // Updates the elements of the stage to the current window; returns those that look different.
 function dress() {
@@ -68,19 +65,23 @@ function dress() {
 		const says = labelOf(g, i, now);
 		if (text.says != says) text.textContent = text.says = says;
 	});
+	g.spaces.forEach(([frame, held]) => frame.classList.toggle('without', held.every(i => /^off|without/.test(g.cur[i]))));
 	g.svg?.classList.toggle('filtered', only && !!hits);
 	g.svg?.classList.toggle('pinned', near.size > 0);
 	return moved;
 }
 // The elements that are marked in the current window, or differ from the base.
 function marked(g = shown) {
-	const all = [];
-	if (range) return looksOf(g).flatMap(([look], i) => /added|removed/.test(look) ? i : NONE);
-	for (let i = 0; i < g.count; i++) if (base < 0 ? g.marks[g.class(i, now)] >= 0 : g.difference(i, base, now).length) all.push(i);
-	return all;
+	const isMarked = i => range ? /added|removed/.test(looksOf(g)[i][0]) : base < 0 ? g.marks[g.class(i, now)] >= 0 : g.difference(i, base, now).length;
+	return [...Array(g.count).keys()].filter(i => isMarked(i) && !isOut(g, i));
 }
+// The headlines of a window about elements that are not hidden.
+const linesOf = w => (news.get(w)?.lines ?? NONE).filter(line => line[2] < 0 || !isOut(whole, line[2]));
 function countsOf() {
-	if (base < 0 && !range) return news.get(now)?.counts ?? [];
+	if (base < 0 && !range) {
+		const all = linesOf(now), n = [0, 1, 2].map(sign => all.filter(line => line[1] == sign).length);
+		return all.length == news.get(now)?.lines.length ? news.get(now).counts : n.map((n, k) => n && ['+' + n, '−' + n, n + ' changed'][k]).map(text => text || '');
+	}
 	const sum = { added: [0, 0, 0], removed: [0, 0, 0], changed: [0, 0, 0] };
 	marked(whole).forEach(i => sum[range ? looksOf(whole)[i][0].split(' ').at(-1) : whole.difference(i, base, now)[0].split(' ')[0]][i < whole.N ? +(whole.kinds[i] % 3 > 0) : 2]++);
 	const spell = (sign, counts) => counts.map((n, k) => n && `${sign}${n} ${['node', 'topic', 'edge'][k]}${n > 1 ? 's' : ''}`).filter(Boolean).join(' ');
@@ -95,7 +96,7 @@ function seek(w, quiet) {
 	header();
 	onSeek.forEach(tell => tell());
 	if (quiet) return;
-	const lines = news.get(now)?.lines ?? [];
+	const lines = linesOf(now);
 	say('live', [clock(starts[now]), `window ${now + 1} of ${W}`, ...lines.slice(0, 5).map(line => line[3])].join(', '));
 	save();
 }
@@ -109,7 +110,7 @@ function header() {
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
 	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
-	if (base < 0 && !range) $.counts.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
+	if (base < 0 && !range) $.counts.dataset.entries = linesOf(now).map(line => line[4]).join(' ');
 	else delete $.counts.dataset.entries;
 	$.counts.replaceChildren(...counts.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;

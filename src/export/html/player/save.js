@@ -17,7 +17,7 @@ function load(hash = '') {
 	const to = new URLSearchParams(hash), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
 	$.q.value = to.get('q') ?? '';
 	base = against >= 0 ? windowAt(against) : -1;
-	now = time >= 0 ? windowAt(time) : data.still;
+	now = time >= 0 ? windowAt(time) : to.has('bare') ? 0 : data.still;
 	const end = parseFloat(to.get('e'));
 	span(end > time ? [now, windowAt(end - 1e-3)] : null);
 	for (const space of to.get('out')?.split(',') ?? []) without.add(space);
@@ -29,7 +29,7 @@ function load(hash = '') {
 	else compare(base);
 	const name = to.get('sel'), i = ['', 'node:', 'topic:', 'topics:', 'edge:'].map(kind => whole.keys.get(kind + name)).find(i => i >= 0);
 	firstView();
-	pick(name === null ? -1 : i ?? -1, 1);
+	pick(name === null ? -1 : i ?? -1, 1, 0, time >= 0);
 	fresh = name === null;
 	if (!(i >= 0) && folded?.keys.has(name)) pickGroup(folded.keys.get(name));
 	search();

@@ -7,10 +7,10 @@ function near_of(i) {
 // The element of the whole graph for an element on the stage: the same one, or the first of its members.
 const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key(i)) ?? -1 : -1;
 // Selects an element of the whole graph; `look` brings it into view, `from` means that a list did.
-function pick(i, look, fromList) {
+function pick(i, look, fromList, isTimed) {
 	sel = i;
 	group = -1;
-	if (i >= 0 && look && !whole.isThere(i, now) && base < 0 && !range) toLife(i);
+	if (i >= 0 && look && !isTimed && !whole.isThere(i, now) && base < 0 && !range) toLife(i);
 	if (i >= 0 && look && shown == folded && !near_of(i).size) show(whole);
 	near = near_of(i);
 	dress();
@@ -74,19 +74,20 @@ function stand([x, y, w, h], there) {
 	fit([x + w / 2 - left / k, y + h / 2 - top / k, wide / k, high / k]);
 }
 $.unfold.onclick = unfold;
-const STATES = { active: 'active', silent: 'silent: running, no message in this window', latched: 'latched: its last message is still valid', declared: 'declared: known from a header only', off: 'not present in this window' };
+const STATES = { active: 'active', silent: 'silent: running, no message in this window', latched: 'latched: its last message is still valid', declared: 'declared: known from a header only', off: 'not present in this window' }, NIL = '0 Hz';
 const DEGREES = { stated: 'stated by a log, graph or file', inferred: 'inferred by a rule', declared: 'declared only' };
-// The facts about an element in a window, line by line.
-function explain(g, i, w) {
-	const [state, ...rest] = g.classes[g.class(i, w)].split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
-	const told = g.turn(i, w) || g.rate(i, w), sign = g.marks[g.class(i, w)], lifecycle = g.lifecycle(i, w);
-	const now = [sign == 1 ? 'ended in this window' : STATES[state], sign == 0 && 'began in this window', told && (g.turn(i, w) ? 'rate ' + told : told + ' in this window'), lifecycle && 'state ' + lifecycle, rest.includes('starved') && 'gets nothing (quality of service)', state != 'off' && degree];
-	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, now.filter(Boolean).join(' · '), ...g.facts[i]];
+// The facts about an element in some windows, line by line.
+function explain(g, i, [from, to] = range ?? [now, now]) {
+	const isRange = from < to, [state, ...rest] = (isRange ? looksOf(g)[i][0] : g.classes[g.class(i, from)]).split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
+	const turn = !isRange && g.turn(i, from), rate = g.rate(i, from, to), lifecycle = g.lifecycle(i, to), has = word => rest.includes(word);
+	const now = [has('removed') ? 'ended in this window' : STATES[isRange && state == 'silent' && rate != NIL ? 'active' : state], has('added') && 'began in this window', turn && 'rate ' + turn, rate && (rate == NIL ? state == 'active' && 'no message in this window' : rate + ' in this window'), lifecycle && 'state ' + lifecycle, has('starved') && 'gets nothing (quality of service)', state != 'off' && degree];
+	const text = now.filter(Boolean).join(' · ');
+	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, isRange ? text.replaceAll('this window', 'this range') : text, ...g.facts[i]];
 }
 function card() {
 	const g = group < 0 ? whole : folded, i = group < 0 ? sel : group;
 	if ($.card.hidden = i < 0) return;
-	const [title, state, ...facts] = explain(g, i, now), differs = base < 0 ? NONE : g.difference(i, base, now);
+	const [title, state, ...facts] = explain(g, i), differs = base < 0 ? NONE : g.difference(i, base, now);
 	say('name', g.name(i));
 	$.title.className = 'is-' + g.kind(i);
 	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · compared with window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
@@ -159,7 +160,7 @@ const elementAt = e => shown.dom.get(e.target.closest?.('.items > g, .arrows > g
 stage.addEventListener('pointermove', e => {
 	const i = e.pointerType == 'touch' || e.buttons ? -1 : elementAt(e);
 	if (i < 0) $.tip.hidden = true;
-	else hover(e, explain(shown, i, now));
+	else hover(e, explain(shown, i));
 });
 stage.addEventListener('pointerleave', () => { $.tip.hidden = true; });
 for (const g of [whole, folded]) if (g?.svg) g.svg.onclick = e => {

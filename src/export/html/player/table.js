@@ -1,12 +1,14 @@
 // All elements as a table: kind, name, rate, difference, rate over time, first and last time; sorted and
 // filtered.
 const COLUMNS = [
-	['Kind', i => whole.kind(i)], ['Name', i => whole.name(i)], ['Now', i => whole.hz(i, now)], ['Change', i => change(i)],
-	['Course', i => mean(i)], ['First', i => times(i)[0]], ['Last', i => times(i)[1]], ['State', i => whole.classes[whole.class(i, now)].split(' ')[0]],
+	['Kind', i => whole.kind(i)], ['Name', i => whole.name(i)], ['Now', i => whole.hz(i, ...range ?? [now])], ['Change', i => change(i)],
+	['Course', i => mean(i)], ['First', i => times(i)[0]], ['Last', i => times(i)[1]], ['State', i => classNow(i).split(' ')[0]],
 ];
 let sortBy = 1, upward = true, most = 200;
 const before = () => base < 0 ? Math.max(0, now - 1) : base;
-const change = i => whole.hz(i, now) - whole.hz(i, before());
+const change = i => range ? 0 : whole.hz(i, now) - whole.hz(i, before());
+const classNow = i => range ? looksOf(whole)[i][0] : whole.classes[whole.class(i, now)];
+const isHere = i => range ? classNow(i) != 'off' : whole.isThere(i, now);
 const ofLife = new Map();
 // The times at which it existed, and its rates in at most 60 steps.
 function course(i) {
@@ -14,7 +16,7 @@ function course(i) {
 		const list = whole.lives[i][0], there = [];
 		for (let k = 0; k < list.length; k += 2) if (whole.there[list[k + 1]]) there.push([starts[list[k]], starts[list[k + 2]] ?? total]);
 		const steps = Math.min(W, 60), rates = Array.from({ length: steps }, (_, k) => whole.hz(i, Math.floor((k + .5) * W / steps)));
-		ofLife.set(i, { first: there[0]?.[0] ?? Infinity, last: there.at(-1)?.[1] ?? 0, rates, mean: rates.reduce((a, b) => a + b, 0) / steps });
+		ofLife.set(i, { first: there[0]?.[0] ?? Infinity, last: there.at(-1)?.[1] ?? 0, rates, mean: whole.hz(i, 0, last) });
 	}
 	return ofLife.get(i);
 }
@@ -30,19 +32,19 @@ function chosen() {
 	return edges.filter(i => {
 		const of = whole.kind(i).replace('topics', 'topic').replace('namespace', 'node');
 		const state = $.tstate.value;
-		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? whole.isThere(i, now) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.turn(i, now) : whole.difference(i, base, now).length));
+		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : range ? /added|removed/.test(looksOf(whole)[i][0]) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.turn(i, now) : whole.difference(i, base, now).length));
 	});
 }
 function cells(i) {
-	const delta = change(i), { first, last: end, rates } = course(i), away = !whole.isThere(i, now);
+	const delta = change(i), { first, last: end, rates } = course(i), away = !isHere(i);
 	const cell = (text, className = '') => make('td', { textContent: text, className });
 	const spark = make('td', { innerHTML: sparkline(rates), title: `${spell(mean(i))} Hz on average over the mission` });
 	return [
 		make('td', {}, shape(i), whole.kind(i)), make('td', {}, make('button', { textContent: whole.name(i), onclick: () => { table(false); pick(i, 1, 1); } })),
-		cell(away ? '–' : whole.rate(i, now).replace(/^.* over .* (?=[\d.]+ k?Hz)/, '') || '–', 'n'),
+		cell(!away && whole.rate(i, ...range ?? [now]) || '–', 'n'),
 		cell(Math.abs(delta) < 1e-9 ? '' : (delta > 0 ? '+' : '−') + spell(Math.abs(delta)), 'n ' + (delta > 0 ? 'up' : 'down')),
 		spark, cell(first == Infinity ? '–' : clock(Math.floor(first)), 'n'), cell(end ? clock(Math.floor(end)) : '–', 'n'),
-		cell(away ? 'absent' : whole.classes[whole.class(i, now)].split(' ')[0] + (signOf(i) ? ', ' + signOf(i).split(' ').at(-1) : '')),
+		cell(away ? 'absent' : classNow(i).split(' ')[0] + (signOf(i) ? ', ' + signOf(i).split(' ').at(-1) : '')),
 	];
 }
 function fillTable() {
@@ -54,7 +56,7 @@ function fillTable() {
 	});
 	const [head, body] = $.sheet.querySelectorAll('thead, tbody');
 	head.replaceChildren(make('tr', {}, ...COLUMNS.map(([title], k) => {
-		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Since previous' : `Since window ${base + 1}`) : k == 2 ? 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
+		const button = make('button', { textContent: k == 3 ? (base < 0 ? 'Since previous' : `Since window ${base + 1}`) : k == 2 ? range ? 'Mean rate' : 'Rate now' : title, onclick: () => { upward = sortBy == k ? !upward : k < 2 || k > 4; sortBy = k; fillTable(); $.sheet.querySelectorAll('thead button')[k].focus(); } });
 		const cell = make('th', { scope: 'col' }, button);
 		cell.ariaSort = sortBy == k ? (upward ? 'ascending' : 'descending') : 'none';
 		return cell;

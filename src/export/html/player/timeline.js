@@ -15,11 +15,17 @@ const rowNames = rows.map(([i, label, inside]) => i < 0
 		...isBoard ? [make('span', { textContent: label }), make('span', { className: 'type', textContent: whole.type(i).slice(5), title: whole.type(i) }), make('span', { className: 'hz' })] : [label]));
 $.rownames.append(...rowNames);
 const tellRates = () => isBoard && rows.forEach(([i], r) => {
-	if (i >= 0) rowNames[r].lastChild.textContent = (range ? looksOf(whole)[i][1] : whole.rate(i, now)) || '–';
+	if (i >= 0) rowNames[r].lastChild.textContent = whole.rate(i, ...range ?? [now]) || '–';
 });
 onSeek.push(tellRates);
 // The position of each row; rows of hidden namespaces have none.
-const isRowOut = ([i]) => i >= 0 && isOut(whole, i);
+const isRowOut = ([i, , inside], r) => i >= 0 ? isOut(whole, i) : isTitleOut(r);
+// A title without any rows below it is hidden, too.
+function isTitleOut(r) {
+	let k = r + 1;
+	while (k < rows.length && rows[k][2] && isRowOut(rows[k], k)) k++;
+	return k > r + 1 && !rows[k]?.[2];
+}
 let placeOf = [];
 
 const bit = (x, y, w, h) => `M${x.toFixed(1)} ${y.toFixed(1)}h${w.toFixed(1)}v${h.toFixed(1)}h${(-w).toFixed(1)}z`;
@@ -36,7 +42,7 @@ function drawTime() {
 	const small = !isBoard && !beforePrint && ($.deck.classList.contains('small') || innerWidth <= 760), wide = $.axis.clientWidth, x = s => part(s) * wide;
 	pitch = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
 	let count = 0;
-	placeOf = rows.map(row => isRowOut(row) ? -1 : count++);
+	placeOf = rows.map((row, r) => isRowOut(row, r) ? -1 : count++);
 	rowNames.forEach((name, r) => { name.hidden = placeOf[r] < 0; });
 	const high = pitch * count, d = { life: '', guess: '', bar: '' }, signs = [];
 	rows.forEach(([, , , lives, bars, events], r) => {
@@ -142,7 +148,7 @@ $.axis.onpointermove = e => {
 		return;
 	}
 	const i = e.target.closest('#lives') ? rowAt(e) : -1, w = e.target.closest('#marks') ? markAt(e) : -1;
-	if (i >= 0) hover(e, explain(whole, i, windowAt(timeAt(e))));
+	if (i >= 0) hover(e, explain(whole, i, [windowAt(timeAt(e)), windowAt(timeAt(e))]));
 	else if (w >= 0) hover(e, [`${clock(starts[w])} – ${clock(ends[w])}`, ...news.get(w).lines.slice(0, 8).map(line => line[3])]);
 	else $.tip.hidden = true;
 };

@@ -71,10 +71,10 @@ function densest(boxes, w, h) {
 	}
 	return best.slice(1);
 }
-// The whole graph if its names are legible, else the changes of this window.
+// The whole graph if its names are legible or nobody can zoom out, else the changes of this window.
 function firstView() {
 	if (isBoard) return;
-	if (scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
+	if (scaleOf(homeOf()) >= TOPIC || document.body.classList.contains('bare')) return fit(homeOf());
 	const all = marked();
 	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
 	bring(some, scaleOf(around(boxesOf(some))) >= RATE ? RATE : TOPIC);
@@ -101,7 +101,7 @@ function minimap() {
 }
 // The minimap is in the first corner in which it covers no selected element; if there is none, it fades.
 function outOfTheWay() {
-	const k = scaleOf(view), { offsetWidth: w, offsetHeight: h } = $.mini, edge = 14;
+	const k = scaleOf(view), { width: w, height: h } = $.mini.getBoundingClientRect(), edge = 14;
 	const left = view[0] + view[2] / 2 - wide / k / 2, top = view[1] + view[3] / 2 - high / k / 2;
 	const boxes = boxesOf([...near].filter(i => i < shown.N)).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
 	const isFree = ([x, y]) => !boxes.some(b => b[0] < x + w + edge && b[0] + b[2] > x - edge && b[1] < y + h + edge && b[1] + b[3] > y - edge);
