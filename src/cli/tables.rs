@@ -53,14 +53,6 @@ fn summary(done: &Tabled) -> String {
         (done.incomplete, "damaged"),
         (done.kept, "already there"),
         (done.refused.len(), "not available"),
-        (
-            done.copies,
-            if done.copies == 1 {
-                "copy left out"
-            } else {
-                "copies left out"
-            },
-        ),
     ];
     let of: Vec<String> = of
         .iter()

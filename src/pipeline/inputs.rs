@@ -111,23 +111,13 @@ pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
     Ok(all)
 }
 
-/// Refuses bags with the same messages, which would be counted twice.
+/// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes and remote bags are
+/// not checked.
 fn refuse_copies(inputs: &[Input]) -> Result<()> {
-    let Some((copy, original)) = copies(inputs).pop_first() else {
-        return Ok(());
-    };
-    let (own, other) = (inputs[copy].name(), inputs[original].name());
-    let what =
-        format!("`{own}` contains the same messages as `{other}`, which would be counted twice");
-    Err(Error::usage(what, "give only one of them"))
-}
-
-/// The bags with the same messages as an earlier one, copies and conversions, each with that one. Pipes and remote bags
-/// are not checked.
-pub(super) fn copies(inputs: &[Input]) -> BTreeMap<usize, usize> {
-    let near = inputs.iter().enumerate();
-    let near = near.filter(|(_, i)| matches!(i, Input::Path(_)) && !i.is_pipe());
-    let near: Vec<usize> = near.map(|(at, _)| at).collect();
+    let near = inputs
+        .iter()
+        .filter(|i| matches!(i, Input::Path(_)) && !i.is_pipe());
+    let near: Vec<&Input> = near.collect();
     // Errors of opening are reported when the bag is read.
     let open = |input: &Input| bag::open(input, &OpenOptions::default()).ok();
     // Copies have the same time span or, if that is unknown, the same size.
@@ -141,26 +131,26 @@ pub(super) fn copies(inputs: &[Input]) -> BTreeMap<usize, usize> {
         open(input)?.read(None, &mut contents).ok()?;
         Some((contents.messages, contents.sum)).filter(|(messages, _)| *messages > 0)
     };
-    let mut alike: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    let mut alike: BTreeMap<_, Vec<&Input>> = BTreeMap::new();
     if near.len() > 1 {
-        for at in near {
-            alike.entry(ends(&inputs[at])).or_default().push(at);
+        for input in near {
+            alike.entry(ends(input)).or_default().push(input);
         }
     }
-    let mut copies = BTreeMap::new();
-    for places in alike.values().filter(|places| places.len() > 1) {
+    for inputs in alike.values().filter(|inputs| inputs.len() > 1) {
         let mut known = BTreeMap::new();
-        for at in places {
-            let Some(own) = contents(&inputs[*at]) else {
-                continue;
-            };
-            let original = *known.entry(own).or_insert(*at);
-            if original != *at {
-                copies.insert(*at, original);
+        for input in inputs {
+            let other = contents(input).and_then(|own| known.insert(own, input.name()));
+            if let Some(other) = other {
+                let own = input.name();
+                let what = format!(
+                    "`{own}` contains the same messages as `{other}`, which would be counted twice"
+                );
+                return Err(Error::usage(what, "give only one of them"));
             }
         }
     }
-    copies
+    Ok(())
 }
 
 /// The number of messages in a bag, and an order-independent checksum of their topics and times.

@@ -22,7 +22,6 @@ use crate::export::check::check_folder;
 use crate::export::sink::OutputSink;
 use crate::export::tables::{TableFormat, writer::Writer};
 use crate::export::target::Target;
-use crate::pipeline::inputs::copies;
 use crate::pipeline::read::files;
 use crate::pipeline::{Stage, Watch};
 
@@ -77,8 +76,6 @@ pub struct Tabled {
     pub bags: usize,
     /// The number of bags whose tables existed already.
     pub kept: usize,
-    /// The number of bags left out because an earlier one of the plan contains the same messages.
-    pub copies: usize,
     /// The number of written bags that could not be read.
     pub unreadable: usize,
     /// The number of written bags with losses.
@@ -101,7 +98,6 @@ const FAR_JOBS: usize = 8;
 pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
     watch.stage(Stage::Count);
     let mut plan = plan(&job.sources, &job.planning)?;
-    let copies = leave_out_copies(&mut plan, watch);
     if let Some((index, count)) = job.shard {
         plan = plan.shard(index, count)?;
     }
@@ -124,10 +120,7 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
             scope.spawn(move || work.run(&to));
         }
         drop(to);
-        let mut done = Tabled {
-            copies,
-            ..Tabled::default()
-        };
+        let mut done = Tabled::default();
         let mut outcome = Ok(());
         for (at, one) in from.into_iter().enumerate() {
             watch.progress(at as u64 + 1, plan.bags.len() as u64);
@@ -142,26 +135,6 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
         done.refused.sort();
         outcome.map(|()| done)
     })
-}
-
-/// The most copies reported one by one.
-const MOST_REPORTED: usize = 8;
-
-/// Removes all but the first of several local bags with the same messages, so that none is counted twice, with a note
-/// for each; returns their number.
-fn leave_out_copies(plan: &mut FleetPlan, watch: &mut dyn Watch) -> usize {
-    let inputs: Vec<Input> = plan.bags.iter().map(PlannedBag::input).collect();
-    let copies = copies(&inputs);
-    for (copy, original) in copies.iter().take(MOST_REPORTED) {
-        let (own, other) = (&plan.bags[*copy].uri, &plan.bags[*original].uri);
-        watch.note(&format!(
-            "`{own}` contains the same messages as `{other}` and is left out"
-        ));
-    }
-    let mut places = 0..;
-    plan.bags
-        .retain(|_| places.next().is_none_or(|at| !copies.contains_key(&at)));
-    copies.len()
 }
 
 fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
