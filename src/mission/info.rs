@@ -236,7 +236,7 @@ pub fn info(mission: &Mission) -> Info {
 }
 
 /// Whether the bags are from ROS 1, in any format; `None` for a mission that was not recorded.
-fn is_ros1(mission: &Mission) -> Option<bool> {
+pub(crate) fn is_ros1(mission: &Mission) -> Option<bool> {
     let bag = mission.bags.first()?;
     let mut facts = bag.facts.iter();
     let profile = facts.any(|(key, value)| key == "profile" && value == "ros1");

@@ -259,7 +259,6 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 let rows: Vec<_> = shown.topics.iter().map(TopicRow::key).collect();
                 (hz.to_bits(), count, shown.each, rows)
             });
-            let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
             if hz != last_hz || (life.rates.is_empty() && arrow.is_some()) {
                 last_hz.clone_from(&hz);
                 let place = known.entry(hz).or_insert_with(|| {

@@ -115,12 +115,7 @@ impl Painter {
     /// [`Error::Usage`] if the picture would have no pixels, a side of more than 65,535, or more than 64
     /// million pixels.
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
-        let mut sheet = PixelSheet::of(scene, scale)?;
-        for group in &scene.groups {
-            let group = self.read(scene, group, &sheet)?;
-            sheet.draw(&group);
-        }
-        Ok(sheet.pixels)
+        Ok(PixelSheet::covered(self, scene, scale, drop)?.pixels)
     }
 
     /// The group in pixels, from the cache if it was drawn before.
@@ -180,19 +175,20 @@ impl PixelSheet {
         Ok(Self { pixels, scale })
     }
 
-    /// A page with the whole scene, and the scene's groups.
+    /// A page with the whole scene; `keep` takes each of its groups once that is drawn.
     fn covered(
         painter: &Painter,
         scene: &Scene,
         scale: f64,
-    ) -> Result<(Self, Vec<Arc<RasterGroup>>)> {
+        mut keep: impl FnMut(Arc<RasterGroup>),
+    ) -> Result<Self> {
         let mut sheet = Self::of(scene, scale)?;
-        let read = |group| painter.read(scene, group, &sheet);
-        let groups: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
-        for group in &groups {
-            sheet.draw(group);
+        for group in &scene.groups {
+            let group = painter.read(scene, group, &sheet)?;
+            sheet.draw(&group);
+            keep(group);
         }
-        Ok((sheet, groups))
+        Ok(sheet)
     }
 
     /// Draws the whole scene over the former pixels.

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{HtmlPage, PageGraph};
-use crate::bag::Report;
 use crate::base::cast;
 use crate::base::digest;
 use crate::base::geometry::Rect;
@@ -20,6 +19,7 @@ use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
 use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
+use crate::mission::info::is_ros1;
 use crate::mission::{EventId, Mission};
 use crate::view::runs::ElementRuns;
 use crate::view::{Arrow, ArrowKind, Frame, Item};
@@ -393,7 +393,7 @@ fn facts_of(
     let evidence = members
         .iter()
         .fold(Evidence::NONE, |all, m| all.and(elements.evidence(*m)));
-    let is_ros1 = page.sequence.mission.bags.iter().any(is_ros1);
+    let is_ros1 = is_ros1(page.sequence.mission).unwrap_or(false);
     facts.extend(evidence.lines().map(|line| known_by(&line, is_ros1)));
     if is_item {
         let lives = members.iter().map(|m| elements.life(*m));
@@ -424,10 +424,6 @@ fn facts_of(
         .into_iter()
         .map(|f| words.place(visible(&f).into_owned()))
         .collect()
-}
-
-fn is_ros1(bag: &Report) -> bool {
-    bag.format == "rosbag1"
 }
 
 /// The line about a kind of evidence, in words that suit the format of the recording.

@@ -93,9 +93,9 @@ impl<'a> Canvas<'a> {
 
 impl Last {
     fn first(scene: Scene, painter: &Painter, scale: f64) -> Result<Self> {
-        let (sheet, drawn) = PixelSheet::covered(painter, &scene, scale)?;
+        let mut drawn = Vec::with_capacity(scene.groups.len());
         Ok(Self {
-            sheet,
+            sheet: PixelSheet::covered(painter, &scene, scale, |group| drawn.push(group))?,
             scratch: PixelSheet::of(&scene, scale)?,
             scene,
             drawn,
