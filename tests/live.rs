@@ -48,20 +48,23 @@ fn string(text: &str) -> String {
     format!("<value><string>{text}</string></value>")
 }
 
-/// Answers like `rosmaster`: `/talker` and `/listener` share `/chat`; the talker exists while `there`.
-fn answer(stream: &mut TcpStream, there: bool) {
+/// An entry of the master's state: a topic, or a service, with one node.
+fn entry(name: &str, node: &str) -> String {
+    array(&[string(name), array(&[string(node)])])
+}
+
+/// Answers like `rosmaster`: these publish, and `/listener` subscribes to `/chat`.
+fn answer(stream: &mut TcpStream, publishers: &[String]) {
     let mut asked = [0; 4096];
     let mut got = 0;
     while !String::from_utf8_lossy(&asked[..got]).contains("</methodCall>") {
         got += stream.read(&mut asked[got..]).unwrap();
     }
     let asked = String::from_utf8_lossy(&asked[..got]).into_owned();
-    let at = |topic: &str, node: &str| array(&[string(topic), array(&[string(node)])]);
     let what = if asked.contains("getSystemState") {
-        let talker = there.then(|| at("/chat", "/talker"));
-        let publishers = array(talker.as_slice());
-        let services = array(&[at("/listener/get_loggers", "/listener")]);
-        array(&[publishers, array(&[at("/chat", "/listener")]), services])
+        let subscribers = array(&[entry("/chat", "/listener")]);
+        let services = array(&[entry("/listener/get_loggers", "/listener")]);
+        array(&[array(publishers), subscribers, services])
     } else {
         assert!(asked.contains("getTopicTypes"), "{asked}");
         array(&[array(&[string("/chat"), string("std_msgs/String")])])
@@ -89,7 +92,8 @@ fn a_ros_1_master_is_watched() {
             if passed > Duration::from_secs(5) {
                 break;
             }
-            answer(&mut stream.unwrap(), passed < Duration::from_millis(2500));
+            let talker = (passed < Duration::from_millis(2500)).then(|| entry("/chat", "/talker"));
+            answer(&mut stream.unwrap(), talker.as_slice());
         }
     });
     let folder = TempDir::new().unwrap();
@@ -104,6 +108,27 @@ fn a_ros_1_master_is_watched() {
     assert!(nodes.iter().eq(["/listener", "/talker"]), "{nodes:?}");
     assert!(edges.contains("/talker → /chat"), "{edges:?}");
     assert!(edges.contains("/listener ← /chat"), "{edges:?}");
+}
+
+#[test]
+fn a_crowd_that_starts_at_once_is_not_listed_whole() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("ros1://{}", listener.local_addr().unwrap());
+    spawn(move || {
+        let named = |at| entry(&format!("/topic{at}"), &format!("/node{at}"));
+        let all: Vec<_> = (0..1100).map(named).collect();
+        // Two calls each second: empty at first, since what is there from the start did not start.
+        for (round, stream) in listener.incoming().enumerate().take(14) {
+            answer(&mut stream.unwrap(), if round < 6 { &[] } else { &all });
+        }
+    });
+    let folder = TempDir::new().unwrap();
+    let done = follow_for("2500ms", folder.path(), &[&address]);
+    let (printed, said) = (done.stdout, String::from_utf8_lossy(&done.stderr));
+    let printed = String::from_utf8(printed).unwrap();
+    assert!(printed.lines().count() <= 1000 + 10, "{}", printed.len());
+    assert!(said.contains("more events"), "{said}");
+    assert!(graph(folder.path()).0.len() > 1100, "all are written");
 }
 
 /// The first line about the connection to an address.
