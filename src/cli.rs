@@ -21,15 +21,15 @@ use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use clap::FromArgMatches as _;
+use clap::{ColorChoice, FromArgMatches as _, ValueEnum as _};
 
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::words::visible;
-use crate::cli::terminal::Terminal;
+use crate::cli::terminal::{Terminal, has_colour};
 use crate::mission::Mission;
 use applies::Given;
-use args::{Command, ExtractArgs, Typed};
+use args::{Colour, Command, ExtractArgs, Typed};
 
 const DONE: u8 = 0;
 const FAILED: u8 = 1;
@@ -131,13 +131,31 @@ fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     let shown = args
         .iter()
         .map(|arg| visible(&arg.to_string_lossy()).into_owned());
-    let error = parsed(shown).err().unwrap_or(error);
+    let colour = if has_colour(asked_colour(args), error.use_stderr()) {
+        ColorChoice::Always
+    } else {
+        ColorChoice::Never
+    };
+    let coloured = Typed::grammar().color(colour).try_get_matches_from(shown);
+    let error = coloured.err().unwrap_or(error);
     match error.print().and_then(|()| std::io::stdout().flush()) {
         _ if error.use_stderr() => USAGE,
         // A closed pipe is not an error.
         Err(lost) if lost.kind() != std::io::ErrorKind::BrokenPipe => FAILED,
         _ => DONE,
     }
+}
+
+/// The value of `--color` in a command line that may have errors.
+fn asked_colour(args: &[OsString]) -> Colour {
+    let typed = args.iter().map(|arg| arg.to_string_lossy());
+    let mut typed = typed.take_while(|arg| arg != "--");
+    let value = typed.find_map(|arg| arg.strip_prefix("--color").map(str::to_owned));
+    let value = match value.as_deref() {
+        Some("") => typed.next().unwrap_or_default().into_owned(),
+        other => other.unwrap_or_default().trim_start_matches('=').to_owned(),
+    };
+    Colour::from_str(&value, true).unwrap_or_default()
 }
 
 /// The exit code for a mission.

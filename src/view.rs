@@ -51,7 +51,7 @@ pub use frame::{Frame, Headline};
 pub(crate) use lasting::Lasting;
 pub use looks::Looks;
 pub(crate) use looks::TopicRow;
-pub(crate) use nothing::{nothing, unmatched};
+pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
 pub(crate) use shown::Members;
 use shown::sum;

@@ -17,7 +17,7 @@ use self::law::held;
 use self::recorders::{Chance, OPTIMISED, RECORDERS, RESILIENT, Recorder, made, options};
 use crate::support::mission::mission;
 use crate::support::rosbag1::{self, Pack};
-use crate::support::{browser, mcap, small, sqlite3};
+use crate::support::{Recording, browser, mcap, small, sqlite3};
 
 fn bagreel(folder: &Path, args: &[&str]) -> Command {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
@@ -279,4 +279,35 @@ fn the_newest_recording_of_a_folder_is_followed() {
         output(empty.path(), &["follow", "."]).status.code(),
         Some(0)
     );
+}
+
+#[test]
+fn an_empty_log_is_said_to_be_empty() {
+    let folder = TempDir::new().unwrap();
+    let mut steady = Recording::default();
+    let place = steady.publisher("/talker", "/chat", "std_msgs/String");
+    steady.send(place, (0, 30_000), 100, b"\x05\0\0\0hello");
+    fs::write(
+        folder.path().join("r.bag"),
+        rosbag1::write(&steady, Pack::None, 20_000),
+    )
+    .unwrap();
+    for args in [
+        &["events", "r.bag"][..],
+        &["events", "r.bag", "--format", "ndjson"],
+        &["follow", "r.bag"],
+        &["follow", "r.bag", "--format", "ndjson"],
+    ] {
+        let said = output(folder.path(), args);
+        assert!(
+            said.status.success() && said.stdout.is_empty(),
+            "{args:?}: {said:?}"
+        );
+        assert_eq!(
+            String::from_utf8_lossy(&said.stderr),
+            "note: no events: nothing started, stopped or changed\n"
+        );
+        let quiet = output(folder.path(), &[args, &["-q"]].concat());
+        assert!(quiet.stderr.is_empty(), "{args:?}: {quiet:?}");
+    }
 }

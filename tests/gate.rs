@@ -6,6 +6,7 @@ mod mission;
 mod reports;
 mod times;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,60 @@ fn run(folder: &Path, args: &[&str]) -> (i32, String) {
     let output = bagreel(folder, args);
     let errors = String::from_utf8(output.stderr.clone()).unwrap();
     (output.status.code().unwrap(), said(&output) + &errors)
+}
+
+#[test]
+fn commands_name_the_files_that_they_wrote_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    bag(here, "again.bag", &recording(HEALTHY, 1));
+    for (args, wrote) in [
+        (
+            "baseline run.bag again.bag -o g.yaml",
+            "wrote g.yaml: 3 nodes, 4 topics, in ",
+        ),
+        (
+            "check run.bag --expect g.yaml -o c.xml -o md/c.md",
+            "wrote c.xml, md/c.md: 0 findings, in ",
+        ),
+        (
+            "diff run.bag again.bag -o d.json -o d.svg",
+            "wrote d.json, d.svg: 0 differences, in ",
+        ),
+    ] {
+        let args: Vec<&str> = args.split(' ').collect();
+        let said = String::from_utf8(bagreel(here, &args).stderr).unwrap();
+        let last = said.lines().last().unwrap_or_default();
+        assert!(last.starts_with(wrote), "{args:?}: {said}");
+        let lines: BTreeSet<&str> = said.lines().collect();
+        assert_eq!(
+            lines.len(),
+            said.lines().count(),
+            "a line is repeated: {said}"
+        );
+        let quiet = bagreel(here, &[&args[..], &["-q"]].concat());
+        assert!(quiet.stderr.is_empty(), "{args:?}");
+    }
+}
+
+#[test]
+fn reversed_ranges_are_refused_with_their_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    for fact in [
+        "hz: 5..4",
+        "mean_hz: 5..4",
+        "within: 2m..1:30",
+        "may_end: -10s..-20s",
+    ] {
+        let text = format!("schema: bagreel.expect/1\ntopics:\n  /scan: {{{fact}}}\n");
+        fs::write(here.join("g.yaml"), &text).unwrap();
+        let (code, said) = run(here, &["check", "run.bag", "--expect", "g.yaml"]);
+        let is_named = said.contains("`g.yaml` line 3, column ") && said.contains(fact);
+        assert!(code == 2 && is_named && said.contains("first"), "{said}");
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Tests of the command on a terminal: the final screen, the width of results, colours.
 #![cfg(target_os = "linux")]
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::Read as _;
 use std::path::Path;
@@ -26,6 +27,22 @@ enum On {
 
 /// All output of the command to a terminal of this many columns.
 fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> String {
+    written_by(folder, args, on, columns, |command| {
+        command.env("TERM", "xterm").env_remove("NO_COLOR");
+        if !colour {
+            command.env("NO_COLOR", "1");
+        }
+    })
+}
+
+/// As [`typed`], in an environment that `set` changes.
+fn written_by(
+    folder: &Path,
+    args: &[&str],
+    on: On,
+    columns: u16,
+    set: impl FnOnce(&mut Command),
+) -> String {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
     unlockpt(&master).unwrap();
@@ -55,12 +72,8 @@ fn typed(folder: &Path, args: &[&str], on: On, columns: u16, colour: bool) -> St
         .args(args)
         .stdin(Stdio::null())
         .stdout(terminal(on != On::Errors))
-        .stderr(terminal(on != On::Output))
-        .env("TERM", "xterm")
-        .env_remove("NO_COLOR");
-    if !colour {
-        command.env("NO_COLOR", "1");
-    }
+        .stderr(terminal(on != On::Output));
+    set(&mut command);
     let mut child = command.spawn().unwrap();
     drop((command, slave));
     let mut all = Vec::new();
@@ -242,12 +255,15 @@ fn results_fit_the_terminal() {
             "events W --parts",
             "events C",
             "follow W",
+            "check C --expect expected.yaml",
+            "check --explain topic-gap",
             "render W -o x.svg",
+            "render C -o x.svg --view board --line-width bytes",
         ] {
-            // Messages are one line each; a terminal of 80 columns has room for those about a whole run.
-            let on = match columns {
-                80.. if line.starts_with("render") => On::Errors,
-                _ => On::Output,
+            let on = if line.starts_with("render") {
+                On::Errors
+            } else {
+                On::Output
             };
             let written = typed(folder.path(), &words(line), on, columns, true);
             let widest = screen(&written, 1000)
@@ -281,6 +297,117 @@ fn table_headers_align_with_their_columns() {
     assert_eq!(end("messages", head), end("1627", row), "{head}\n{row}");
     assert!(head.contains("rate") && head.contains("activity"), "{head}");
     assert!(lines.iter().any(|line| line.starts_with("  node ")));
+}
+
+#[test]
+fn the_start_of_a_recording_is_whole_in_a_narrow_table() {
+    let folder = folder();
+    for day in 1..4 {
+        let name = format!("2024-03-0{day}_morning_round_of_the_warehouse_robot.mcap");
+        fs::copy(COURIER, folder.path().join(name)).unwrap();
+    }
+    for (columns, start) in [
+        (60, "2024-01-01 "),
+        (80, "2024-01-01 "),
+        (100, "2024-01-01T00:00 "),
+        (120, "2024-01-01T00:00:00 "),
+    ] {
+        let written = typed(folder.path(), &["info", "."], On::Output, columns, true);
+        let lines = screen(&written, 1000);
+        let names: BTreeSet<&str> = lines.iter().map(|line| line.split_at(22).0).collect();
+        assert!(
+            lines[1..].iter().all(|line| line.contains(start)),
+            "{lines:#?}"
+        );
+        assert_eq!(
+            names.len(),
+            4,
+            "a name cannot be told from another: {lines:#?}"
+        );
+    }
+}
+
+#[test]
+fn long_messages_are_broken_between_words() {
+    let folder = folder();
+    let written = typed(
+        folder.path(),
+        &["render", "gone.bag", "--colour"],
+        On::Errors,
+        60,
+        false,
+    );
+    let wide = typed(
+        folder.path(),
+        &["render", "gone.bag", "--colour"],
+        On::Errors,
+        500,
+        false,
+    );
+    assert!(
+        screen(&written, 1000)
+            .iter()
+            .all(|line| line.chars().count() <= 60),
+        "{written}"
+    );
+    assert_eq!(
+        written.split_whitespace().collect::<Vec<_>>(),
+        wide.split_whitespace().collect::<Vec<_>>()
+    );
+    let args = [
+        "render", COURIER, "-o", "x.svg", "--view", "graph", "--hide", "services",
+    ];
+    let written = typed(folder.path(), &args, On::Errors, 50, false);
+    let lines = screen(&written, 1000);
+    assert!(
+        lines.iter().any(|line| line.starts_with("      ")),
+        "{lines:#?}"
+    );
+    assert!(
+        lines.iter().all(|line| line.chars().count() <= 50),
+        "{lines:#?}"
+    );
+}
+
+#[test]
+fn colours_follow_one_rule() {
+    let folder = folder();
+    let has_colour = |line: &str, color: &str, term: &str, no_color: Option<&str>| {
+        let mut args = words(line);
+        args.extend(color.split_whitespace());
+        let written = written_by(folder.path(), &args, On::Both, 80, |command| {
+            command.env("TERM", term).env_remove("NO_COLOR");
+            command.env("CLICOLOR_FORCE", "1");
+            command.envs(no_color.map(|value| ("NO_COLOR", value)));
+        });
+        written.contains("\u{1b}[1m")
+            || written.contains("\u{1b}[3")
+            || written.contains("\u{1b}[1;3")
+    };
+    for line in [
+        "--help",
+        "render --help",
+        "render --nosuch",
+        "events C",
+        "follow C",
+        "info gone.bag",
+    ] {
+        for (color, term, no_color, is_coloured) in [
+            ("", "xterm", None, true),
+            ("", "xterm", Some(""), true),
+            ("", "xterm", Some("1"), false),
+            ("", "dumb", None, false),
+            ("--color always", "dumb", Some("1"), true),
+            ("--color=always", "xterm", Some("1"), true),
+            ("--color never", "xterm", None, false),
+        ] {
+            assert_eq!(
+                has_colour(line, color, term, no_color),
+                is_coloured,
+                "{line} {color} TERM={term} NO_COLOR={no_color:?}"
+            );
+        }
+    }
 }
 
 #[test]

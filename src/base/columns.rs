@@ -1,5 +1,7 @@
 //! Text fitted to a terminal: tables whose columns shrink to its width, and lines with a hanging indent.
 
+use std::collections::BTreeSet;
+
 /// A column of a table for people.
 pub(crate) struct Column {
     /// Its header; empty if the cells need none.
@@ -40,11 +42,11 @@ impl Cell {
         }
     }
 
-    fn fitted(&self, width: usize) -> String {
+    fn fitted(&self, width: usize, thirds: usize) -> String {
         match self {
-            Self::Text(text) => middle(text, width),
+            Self::Text(text) => middle(text, width, thirds),
             Self::Type(text) if text.chars().count() > width => {
-                middle(text.rsplit('/').next().unwrap_or(text), width)
+                middle(text.rsplit('/').next().unwrap_or(text), width, thirds)
             }
             Self::Type(text) => text.clone(),
             Self::Bars(numbers) => bars(numbers, width),
@@ -65,18 +67,21 @@ pub(crate) fn table(columns: &[Column], rows: &[Vec<Cell>], width: Option<usize>
     if let Some(width) = width {
         shrink(columns, &mut widths, width);
     }
+    let cuts: Vec<usize> = (0..columns.len())
+        .map(|at| cut(rows, at, widths[at]))
+        .collect();
     let heads = columns.iter().map(|c| Cell::Text(c.head.to_owned()));
     let heads: Vec<Cell> = heads.collect();
     let mut out = String::new();
     let lines = std::iter::once(&heads).filter(|_| columns.iter().any(|c| !c.head.is_empty()));
     for cells in lines.chain(rows) {
         let mut line = String::new();
-        for ((cell, column), width) in cells.iter().zip(columns).zip(&widths) {
+        for (((cell, column), width), cut) in cells.iter().zip(columns).zip(&widths).zip(&cuts) {
             if *width == 0 {
                 continue;
             }
             line.push_str("  ");
-            let text = cell.fitted(*width);
+            let text = cell.fitted(*width, *cut);
             let blank = " ".repeat(width.saturating_sub(text.chars().count()));
             let (before, after) = if column.is_right {
                 (&*blank, "")
@@ -116,14 +121,29 @@ fn shrink(columns: &[Column], widths: &mut [usize], room: usize) {
     }
 }
 
-/// `text` in at most `width` characters, cut in the middle: the end of a name is more informative than its beginning.
-fn middle(text: &str, width: usize) -> String {
+/// The thirds of the width of a column that show the beginnings of its cut texts: one, unless more texts can be told
+/// apart with two or three.
+fn cut(rows: &[Vec<Cell>], at: usize, width: usize) -> usize {
+    let distinct = |thirds: usize| {
+        let texts = rows.iter().filter_map(|row| match row.get(at) {
+            Some(Cell::Text(text)) => Some(middle(text, width, thirds)),
+            _ => None,
+        });
+        texts.collect::<BTreeSet<String>>().len()
+    };
+    let best = (1..=3).rev().max_by_key(|thirds| distinct(*thirds));
+    best.unwrap_or(1)
+}
+
+/// `text` in at most `width` characters, cut where `thirds` of them are shown: the end of a name is in general more
+/// informative than its beginning.
+fn middle(text: &str, width: usize, thirds: usize) -> String {
     let length = text.chars().count();
     if length <= width {
         return text.to_owned();
     }
     let kept = width.saturating_sub(1);
-    let head = kept / 3;
+    let head = kept * thirds / 3;
     let start: String = text.chars().take(head).collect();
     let end: String = text.chars().skip(length - (kept - head)).collect();
     format!("{start}…{end}")
@@ -154,6 +174,12 @@ fn bars(numbers: &[u64], width: usize) -> String {
 /// `lead` and `text` on lines of at most `width` characters, broken at spaces; all lines but the first are indented by
 /// `indent`. A word longer than a line gets its own. Ends with a newline.
 pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) -> String {
+    broken((lead, text), indent, width, "")
+}
+
+/// As [`hang`], with `end` after every line but the last.
+fn broken((lead, text): (&str, &str), indent: usize, width: Option<usize>, end: &str) -> String {
+    let width = width.map(|width| width.saturating_sub(end.len()));
     let mut out = lead.to_owned();
     let mut used = lead.chars().count();
     let mut is_first = true;
@@ -162,7 +188,7 @@ pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) 
         let space = usize::from(!is_first);
         if width.is_some_and(|width| used + space + length > width) && used > indent {
             out.truncate(out.trim_end().len());
-            out.push('\n');
+            out.extend([end, "\n"]);
             out.push_str(&" ".repeat(indent));
             used = indent;
         } else if !is_first {
@@ -179,7 +205,7 @@ pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) 
 }
 
 /// The text with lines of at most `width` characters; the rest of a longer one is below the start of the last
-/// column that begins in its first half.
+/// column that begins in its first half. A command can still be copied.
 pub(crate) fn fitted(text: &str, width: usize) -> String {
     let mut out = String::new();
     for line in text.lines() {
@@ -188,7 +214,9 @@ pub(crate) fn fitted(text: &str, width: usize) -> String {
         let indent = half
             .rfind("  ")
             .map_or(2, |at| half[..at + 2].chars().count());
-        out.push_str(&hang("", line, indent, Some(width)));
+        let is_command = cfg!(unix) && line.contains(": bagreel ");
+        let end = if is_command { " \\" } else { "" };
+        out.push_str(&broken(("", line), indent, Some(width), end));
     }
     out
 }
@@ -213,6 +241,10 @@ mod tests {
         let expected = "+ node  /é  only in\n        the first of\n        two\nshort\n";
         assert_eq!(fitted(text, 22), expected);
         assert_eq!(fitted(text, 40), text);
+        let command = "   =  accept: bagreel baseline run.bag --only /a\n";
+        let expected = "   =  accept: bagreel \\\n      baseline run.bag \\\n      --only /a\n";
+        #[cfg(unix)]
+        assert_eq!(fitted(command, 25), expected);
     }
 
     #[test]
@@ -254,6 +286,29 @@ mod tests {
         );
         assert_eq!(at(Some(20)), "  topic      n  type\n  /l…/name  12  s…ng\n");
         assert_eq!(at(Some(12)), "  topic    n\n  /…name  12\n");
+    }
+
+    #[test]
+    fn names_are_cut_where_they_can_be_told_apart() {
+        let columns = [Column {
+            head: "",
+            is_right: false,
+            least: 6,
+            gives: (0, 0),
+        }];
+        let row = |text: &str| vec![Cell::Text(text.to_owned())];
+        let shown = |texts: [&str; 2]| table(&columns, &texts.map(row), Some(14));
+        let shown = [
+            shown(["/robot1/camera_left", "/robot1/camera_right"]),
+            shown(["2024-03-01_morning_run", "2024-03-02_morning_run"]),
+        ];
+        assert_eq!(
+            shown,
+            [
+                "  /ro…era_left\n  /ro…ra_right\n",
+                "  2024-03-01_…\n  2024-03-02_…\n",
+            ]
+        );
     }
 
     #[test]

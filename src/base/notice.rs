@@ -79,7 +79,7 @@ impl Notices {
         Self::default()
     }
 
-    /// Adds a notice, or increases the count of an equal one.
+    /// Adds a notice, or increases the count of an equal one; one choice for several recordings is still one.
     pub fn add(&mut self, notice: Notice) {
         let full = self.0.len() >= NOTICES;
         let key = (notice.kind, notice.text);
@@ -88,7 +88,9 @@ impl Notices {
         } else {
             key
         };
-        *self.0.entry(key).or_default() += notice.count;
+        let is_choice = key.0 == NoticeKind::Chosen;
+        let count = self.0.entry(key).or_default();
+        *count = if is_choice { 1 } else { *count + notice.count };
     }
 
     /// Adds all of `others`.

@@ -90,9 +90,14 @@ fn plays(output: &Output) -> bool {
 
 const RULES: &[AppliesTo] = &[
     AppliesTo {
-        options: "style view for size width line-width fit expand orientation layout layout-from font",
+        options: "style view for size line-width fit expand orientation layout layout-from font",
         takes: |_, output| is_picture(output),
         what: "it applies to pictures, such as `x.gif`",
+    },
+    AppliesTo {
+        options: "width",
+        takes: |_, output| is_picture(output) && !plays(output) && output.format.word != "html",
+        what: "it is a width on paper, for `x.pdf`, `x.svg` and `x.png`; `--size` sets that of other pictures",
     },
     AppliesTo {
         options: "title",

@@ -3,7 +3,7 @@
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::notice::Notices;
-use crate::base::words::visible;
+use crate::base::words;
 use crate::cli::args::ExtractArgs;
 use crate::cli::terminal::Terminal;
 use crate::export::tables::TableFormat;
@@ -23,21 +23,16 @@ pub(super) fn extract(
     }
     let done = pipeline::extract(&job, terminal)?;
     terminal.notices(&done.notices);
-    if let Some(filter) = args.topic_filter.as_ref().filter(|_| done.rows == 0) {
-        let filter = visible(filter);
-        terminal.say(&format!("no message in that time matches `{filter}`"));
-    }
     if job.target != Target::Stdout {
         let tables = match (job.fields, done.tables) {
             (false, _) => String::new(),
             (true, 1) => "1 table, ".to_owned(),
             (true, count) => format!("{count} tables, "),
         };
-        let (path, rows) = (job.target.path().display(), done.rows);
+        let rows = usize::try_from(done.rows).unwrap_or(usize::MAX);
+        let (path, rows) = (job.target.path().display(), words::count(rows, "row"));
         let seconds = terminal.seconds();
-        terminal.say(&format!(
-            "wrote {path}: {tables}{rows} rows, in {seconds:.1} s"
-        ));
+        terminal.say(&format!("wrote {path}: {tables}{rows}, in {seconds:.1} s"));
     }
     Ok((done.notices, done.undecoded))
 }

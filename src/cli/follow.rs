@@ -5,7 +5,9 @@ use std::path::Path;
 use super::args::follow::{FollowArgs, FollowFormat};
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::reading::reading;
+use super::render;
 use super::serve::Server;
+use super::show::NO_EVENTS;
 use super::terminal::Terminal;
 use super::{DONE, code, gate};
 use crate::bag::Growth;
@@ -73,6 +75,8 @@ struct Follower<'a> {
     server: Option<Server>,
     events: Pace,
     whole: Pace,
+    /// Whether no event has been printed.
+    is_silent: bool,
 }
 
 /// Follows a recording to its end.
@@ -118,6 +122,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         job,
         events: Pace::new(),
         whole: Pace::new(),
+        is_silent: true,
     };
     follower.run(terminal)
 }
@@ -201,7 +206,8 @@ impl Follower<'_> {
             lines.truncate(MOST_LINES);
             terminal.note(&format!("… and {more} more events"));
         }
-        terminal.lines(&lines, format)
+        self.is_silent &= lines.is_empty();
+        terminal.log(&lines, format)
     }
 
     /// Prints new findings and updates the page.
@@ -235,7 +241,7 @@ impl Follower<'_> {
             }
             Ok(judged.unwrap_or_default())
         });
-        terminal.lines(&lines?, format).map(drop)
+        terminal.log(&lines?, format).map(drop)
     }
 
     /// Checks the recording as it is now and writes the outputs.
@@ -243,6 +249,9 @@ impl Follower<'_> {
         terminal.note_signals(false);
         self.live.iter_mut().for_each(Live::finish);
         self.report(terminal);
+        if self.is_silent {
+            terminal.note(NO_EVENTS);
+        }
         let job = Render {
             reading: self.follow.closed(),
             ..self.job
@@ -250,7 +259,7 @@ impl Follower<'_> {
         let mut done = DONE;
         if !job.outputs.is_empty() {
             let rendered = crate::pipeline::render(&job, terminal)?;
-            terminal.notices(&rendered.notices);
+            render::report(&rendered, false, terminal);
             done = code(&rendered.mission);
         }
         let Some(expect) = &self.args.expect else {

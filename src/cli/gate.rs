@@ -13,10 +13,12 @@ use super::{DONE, FAILED, SKIPPED, USAGE, code, look};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::nearest::suggestion;
+use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::Output;
 use crate::export::target::Target;
 use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
+use crate::mission::Mission;
 use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
 use crate::pipeline::{Body, Drawing, Reading};
 
@@ -34,19 +36,48 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
     }
     let done = gate::diff(&job, terminal)?;
     let text = (args.format.write)(&job.subject, &done.differences);
-    match args.format.word {
-        "text" => terminal.fitted(&text)?,
-        _ => terminal.results(&text)?,
-    }
+    print(&text, args.format.word, terminal)?;
     for remark in &done.remarks {
         terminal.note(remark);
     }
-    for mission in &done.missions {
-        terminal.notices(&mission.notices);
-    }
+    terminal.notices(&notices(&done.missions));
+    let reports = job.reports.iter().map(|(target, _)| target);
+    let targets = reports.chain(job.pictures.iter().map(|picture| &picture.target));
+    let what = words::count(done.differences.len(), "difference");
+    wrote(targets, &what, terminal);
     let is_different = done.differences.iter().any(|d| d.is_known);
     let worst = done.missions.iter().map(code).max().unwrap_or(DONE);
     Ok(if is_different { FAILED } else { worst })
+}
+
+/// Prints a report; only text fits the terminal.
+fn print(report: &str, format: &str, terminal: &mut Terminal) -> Result<()> {
+    match format {
+        "text" => terminal.fitted(report),
+        _ => terminal.results(report),
+    }
+}
+
+/// The notices of several missions.
+fn notices(missions: &[Mission]) -> Notices {
+    let mut all = Notices::new();
+    all.extend(missions.iter().flat_map(|mission| mission.notices.iter()));
+    all
+}
+
+/// Prints the files written, what is in them, and the time taken, in one line.
+fn wrote<'a>(targets: impl Iterator<Item = &'a Target>, what: &str, terminal: &mut Terminal) {
+    let files = targets.filter(|target| **target != Target::Stdout);
+    let files: Vec<String> = files
+        .map(|target| target.path().display().to_string())
+        .collect();
+    if !files.is_empty() {
+        let seconds = terminal.seconds();
+        terminal.say(&format!(
+            "wrote {}: {what}, in {seconds:.1} s",
+            files.join(", ")
+        ));
+    }
 }
 
 fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
@@ -157,9 +188,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         terminal.make_room();
     }
     let done = gate::baseline(&job, terminal)?;
-    for mission in &done.missions {
-        terminal.notices(&mission.notices);
-    }
+    terminal.notices(&notices(&done.missions));
     if done.left_out > 0 {
         let names = words::count(done.left_out, "name");
         terminal.note(&format!(
@@ -176,6 +205,10 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         };
         let changed = words::count(done.changed, "fact");
         terminal.say(&format!("{}: {changed} updated{left}", path.display()));
+    } else {
+        let counts = [(done.nodes, "node"), (done.topics, "topic")];
+        let what = counts.map(|(count, word)| words::count(count, word));
+        wrote([&job.output].into_iter(), &what.join(", "), terminal);
     }
     let codes = done.missions.iter().map(code);
     Ok(codes.max().unwrap_or(DONE))
@@ -184,7 +217,8 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
 /// Checks a mission against an expectation.
 pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     if let Some(word) = &args.explain {
-        let Some(text) = explain(word) else {
+        let width = terminal.width().unwrap_or(80).min(80);
+        let Some(text) = explain(word, width) else {
             return Err(unknown_kind(word));
         };
         terminal.results(&text)?;
@@ -243,10 +277,17 @@ fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Res
     let done = gate::check(job, terminal)?;
     let subject = job.subject(&done.mission);
     if let Some(format) = format {
-        terminal.results(&(format.write)(&subject, &done.verdict))?;
+        print(
+            &(format.write)(&subject, &done.verdict),
+            format.word,
+            terminal,
+        )?;
     }
     terminal.notices(&done.mission.notices);
     let verdict = &done.verdict;
+    let what = words::count(verdict.findings().len(), "finding");
+    let targets = job.reports.iter().map(|report| &report.target);
+    wrote(targets, &what, terminal);
     Ok(match code(&done.mission) {
         _ if verdict.count(Severity::Error) > 0 => FAILED,
         _ if verdict.is_blind() => USAGE,

@@ -131,6 +131,7 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
         ("--rqt-defaults", view.rqt_defaults),
         ("--show-recorder", view.show_recorder),
         ("--orientation", look.orientation != "auto"),
+        ("--line-width", look.line_width.is_some()),
         ("--layout", look.layout != "layered"),
         ("--layout-from", look.layout_from.is_some()),
         ("--strip", args.sequence.strip.is_some()),

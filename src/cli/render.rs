@@ -164,7 +164,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
 }
 
 /// Prints the files written, the number of windows and changes, and the time taken.
-fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+pub(super) fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
     }

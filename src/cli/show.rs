@@ -21,6 +21,9 @@ use crate::pipeline::{Survey, explain, is_survey, read, survey, survey_file};
 /// The number of parts of a mission for which `info` shows the activity.
 const PARTS: u32 = 32;
 
+/// The note about an empty log.
+pub(super) const NO_EVENTS: &str = "no events: nothing started, stopped or changed";
+
 /// Prints the log of a mission.
 pub(super) fn events(
     args: &EventsArgs,
@@ -49,9 +52,13 @@ pub(super) fn events(
         EventsFormat::Json => LogFormat::Json,
         EventsFormat::Markdown => LogFormat::Markdown,
     };
-    match args.format {
-        EventsFormat::Text => terminal.log(&lines(&mission, options))?,
+    let lines = lines(&mission, options);
+    match format {
+        LogFormat::Text => drop(terminal.log(&lines, format)?),
         _ => terminal.results(&log(&mission, format, options))?,
+    }
+    if lines.is_empty() {
+        terminal.note(NO_EVENTS);
     }
     // The log is the same for every period.
     terminal.notices(&mission.notices.without(NoticeKind::Chosen));

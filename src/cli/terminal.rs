@@ -7,9 +7,11 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use terminal_size::{Height, Width, terminal_size_of};
+
 use super::args::{Colour, Typed};
 use super::stop::Stop;
-use crate::base::columns::fitted;
+use crate::base::columns::{fitted, hang};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words::{self, visible};
@@ -30,22 +32,14 @@ pub(crate) struct Terminal {
 }
 
 impl Terminal {
-    /// A terminal as set by the common options. Colours only if the stream is a terminal and `NO_COLOR` is not set,
-    /// unless
-    /// `--color` overrides it.
+    /// A terminal as set by the common options.
     pub(super) fn new(typed: &Typed) -> Self {
-        let is_asked = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-        let colour = |is_terminal: bool| match typed.color {
-            Colour::Auto => is_terminal && is_asked,
-            Colour::Always => true,
-            Colour::Never => false,
-        };
         Self {
             quiet: typed.quiet,
             verbose: typed.verbose,
             colours: (
-                colour(io::stderr().is_terminal()),
-                colour(io::stdout().is_terminal()),
+                has_colour(typed.color, true),
+                has_colour(typed.color, false),
             ),
             progress: Progress::new(!typed.quiet),
             stop: Stop::listen(report_stop),
@@ -58,8 +52,7 @@ impl Terminal {
         reason = "only code with access to the terminal may measure it"
     )]
     pub(crate) fn width(&self) -> Option<usize> {
-        let size = terminal_size::terminal_size_of(io::stdout());
-        size.map(|(width, _)| usize::from(width.0).max(LEAST_WIDTH))
+        columns(terminal_size_of(io::stdout()))
     }
 
     /// Prints an error and its hint.
@@ -114,7 +107,8 @@ impl Terminal {
         self.progress.end();
         if !self.quiet {
             // Nothing can be reported if standard error is closed.
-            let _ = writeln!(io::stderr(), "{}", visible(text));
+            let line = hang("", &visible(text), 2, error_width());
+            let _ = io::stderr().write_all(line.as_bytes());
         }
     }
 
@@ -150,23 +144,6 @@ impl Terminal {
         }
     }
 
-    /// Prints lines on standard output, those for people as [`Terminal::fitted`]; false if it was closed.
-    ///
-    /// # Errors
-    /// As [`Terminal::results`].
-    pub(crate) fn lines(&mut self, lines: &[String], format: LogFormat) -> Result<bool> {
-        self.progress.end();
-        let text = lines
-            .iter()
-            .flat_map(|line| [line.as_str(), "\n"])
-            .collect::<String>();
-        let text = match self.width().filter(|_| format == LogFormat::Text) {
-            Some(width) => fitted(&text, width),
-            None => text,
-        };
-        print(printable(&text).as_bytes())
-    }
-
     /// Sets whether the next signal is only recorded, for [`Terminal::take_signal`]; a second one still ends the
     /// process.
     pub(crate) fn note_signals(&self, on: bool) {
@@ -178,19 +155,21 @@ impl Terminal {
         self.stop.take()
     }
 
-    /// As [`Terminal::results`], for a log: each line with a hanging indent, in the colour of its kind.
+    /// Prints lines of a log on standard output, those for people with a hanging indent, in the colour of their kind; false
+    /// if it was closed.
     ///
     /// # Errors
     /// As [`Terminal::results`].
-    pub(crate) fn log(&mut self, lines: &[LogLine]) -> Result<()> {
+    pub(crate) fn log(&mut self, lines: &[LogLine], format: LogFormat) -> Result<bool> {
         self.progress.end();
-        let width = self.width();
-        let (_, is_coloured) = self.colours;
+        let is_text = format == LogFormat::Text;
+        let width = self.width().filter(|_| is_text);
+        let is_coloured = self.colours.1 && is_text;
         let mut text = String::new();
         for line in lines {
-            let colour = line.kind.map_or("1", colour);
             let shown = printable(&line.text(width));
             if is_coloured {
+                let colour = line.kind.map_or("1", colour);
                 let start = line.lead().len().min(shown.len());
                 let end = shown[start..]
                     .find([':', '\n'])
@@ -201,7 +180,7 @@ impl Terminal {
                 text.push_str(&shown);
             }
         }
-        print(text.as_bytes()).map(drop)
+        print(text.as_bytes())
     }
 
     /// Hides the progress bar if something else writes results to standard output and that is the terminal.
@@ -246,13 +225,43 @@ impl Terminal {
     }
 
     fn line(&self, colour: &str, label: &str, text: &str) {
-        let text = visible(text);
-        let label = match self.colours {
-            (true, _) => format!("\u{1b}[1;{colour}m{label}\u{1b}[0m"),
-            (false, _) => label.to_owned(),
+        let lead = format!("{label}: ");
+        let line = hang(&lead, &visible(text), lead.len(), error_width());
+        let line = match self.colours {
+            (true, _) => format!("\u{1b}[1;{colour}m{label}\u{1b}[0m{}", &line[label.len()..]),
+            (false, _) => line,
         };
-        let _ = writeln!(io::stderr(), "{label}: {text}");
+        let _ = io::stderr().write_all(line.as_bytes());
     }
+}
+
+/// Whether standard error, or standard output, has colours: only on a terminal that has them, and if `NO_COLOR` is not set,
+/// unless `--color` overrides it.
+pub(super) fn has_colour(asked: Colour, is_error: bool) -> bool {
+    let is_terminal = || {
+        if is_error {
+            io::stderr().is_terminal()
+        } else {
+            io::stdout().is_terminal()
+        }
+    };
+    match asked {
+        Colour::Auto => {
+            let is_refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+            !is_refused && !progress::is_dumb() && is_terminal()
+        }
+        Colour::Always => true,
+        Colour::Never => false,
+    }
+}
+
+/// The width of standard error as of [`Terminal::width`].
+fn error_width() -> Option<usize> {
+    columns(terminal_size_of(io::stderr()))
+}
+
+fn columns(size: Option<(Width, Height)>) -> Option<usize> {
+    size.map(|(width, _)| usize::from(width.0).max(LEAST_WIDTH))
 }
 
 /// The width below which results are not fitted: so narrow a terminal shows nothing useful anyway.

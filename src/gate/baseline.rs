@@ -22,7 +22,9 @@ const HEAD: usize = 1 << 16;
 #[derive(Debug, Default)]
 pub(crate) struct Written {
     pub(crate) text: String,
-    /// The number of nodes and topics that did not fit.
+    /// The numbers of nodes and topics written, and of both that did not fit.
+    pub(crate) nodes: usize,
+    pub(crate) topics: usize,
     pub(crate) left_out: usize,
 }
 
@@ -56,8 +58,11 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
          policy: {{unexpected_nodes: {others}, unexpected_topics: allow, unexpected_publishers: error}}\n\
          {note}{nodes}{topics}"
     );
+    let entries = |section: &str| section.lines().count().saturating_sub(1);
     Written {
         text,
+        nodes: entries(&nodes),
+        topics: entries(&topics),
         left_out: room.left_out,
     }
 }

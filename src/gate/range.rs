@@ -92,7 +92,7 @@ impl During {
         self.to.is_some_and(|to| to.on(mission) > mission.end)
     }
 
-    /// Parses a time range; `None` if it is not one.
+    /// Parses a time range; `None` if it is not one or ends before it starts.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
         let moment = |text: &str| match text.trim() {
@@ -103,7 +103,14 @@ impl During {
             from: moment(from)?,
             to: moment(to)?,
         };
-        (during.from.is_some() || during.to.is_some()).then_some(during)
+        let is_ordered = match (during.from, during.to) {
+            (Some(Moment::AfterStart(from)), Some(Moment::AfterStart(to))) => from <= to,
+            (Some(Moment::BeforeEnd(from)), Some(Moment::BeforeEnd(to))) => from >= to,
+            (Some(Moment::Absolute(from)), Some(Moment::Absolute(to))) => from <= to,
+            (None, None) => false,
+            _ => true,
+        };
+        is_ordered.then_some(during)
     }
 
     /// The time range in a mission, clipped to its time.
@@ -148,5 +155,9 @@ mod tests {
         assert_eq!(on("..500"), (100, 200));
         assert_eq!(During::parse("soon.."), None);
         assert_eq!(During::parse(".."), None);
+        for reversed in ["2m..1:30", "-10s..-20s"] {
+            assert_eq!(During::parse(reversed), None, "{reversed}");
+        }
+        assert_eq!(on("10..-20s"), (110, 180));
     }
 }

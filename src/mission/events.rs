@@ -87,17 +87,13 @@ pub(crate) fn headlines(mission: &Mission, format: LogFormat) -> Vec<LogRow<'_>>
     }
 }
 
-/// Rows of the log, each as [`LogFormat::Ndjson`] or as text, without a new line.
-pub(crate) fn texts(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -> Vec<String> {
+/// Rows of the log, each as [`LogFormat::Ndjson`] or as text.
+pub(crate) fn row_lines(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -> Vec<LogLine> {
     if format == LogFormat::Ndjson {
-        return ndjson(mission, rows).lines().map(str::to_owned).collect();
+        return ndjson(mission, rows).lines().map(LogLine::plain).collect();
     }
     let parts = mission.log.all_parts();
-    let text = |row| {
-        let (when, words) = when_and_what(mission, &parts, row);
-        format!("{when:>13}  {words}")
-    };
-    rows.iter().map(text).collect()
+    rows.iter().map(|row| line(mission, &parts, row)).collect()
 }
 
 /// The rows with an additional row before each mode switch, which is not an event of its own.
@@ -166,23 +162,31 @@ fn title(at: usize, phase: &Phase) -> String {
     format!("phase {}: {}", at + 1, visible(&phase.name))
 }
 
-/// A line of the log for people.
-#[derive(Debug)]
-pub(crate) struct LogLine {
-    /// The kind of event; `None` for the title of a phase and for what the recorder did.
+/// A line of the log for people, or an object for programs.
+#[derive(Clone, Debug, Default)]
+pub struct LogLine {
+    /// The kind of event; `None` for the title of a phase, for what the recorder did, and for an object.
     pub(crate) kind: Option<Kind>,
     lead: String,
-    words: String,
+    pub(crate) words: String,
 }
 
 impl LogLine {
+    /// A line without a time of its own.
+    pub(crate) fn plain(words: &str) -> Self {
+        Self {
+            words: words.to_owned(),
+            ..Self::default()
+        }
+    }
+
     /// The time with the space after it.
     pub(crate) fn lead(&self) -> &str {
         &self.lead
     }
 
-    /// The line, broken to `width` characters with a hanging indent.
-    pub(crate) fn text(&self, width: Option<usize>) -> String {
+    /// The line, broken to `width` characters with a hanging indent; ends in a new line.
+    pub fn text(&self, width: Option<usize>) -> String {
         hang(&self.lead, &self.words, self.lead.chars().count(), width)
     }
 }
@@ -191,21 +195,23 @@ impl LogLine {
 pub(crate) fn lines(mission: &Mission, options: LogOptions) -> Vec<LogLine> {
     let rows = with_switches(mission, chosen(mission, options));
     let parts = mission.log.all_parts();
-    let shown = sorted(&rows).into_iter().map(|row| {
-        let (when, words) = when_and_what(mission, &parts, row);
-        let (kind, inner, words) = match row {
-            LogRow::Phase(..) => (None, "", format!("── {words} ──")),
-            LogRow::Interruption(_) | LogRow::Switch(_) => (None, "", words),
-            LogRow::Event(_, event) => (Some(event.kind), "", words),
-            LogRow::Part(_, event) => (Some(event.kind), "  ", words),
-        };
-        LogLine {
-            kind,
-            lead: format!("{when:>13}  {inner}"),
-            words,
-        }
-    });
-    shown.collect()
+    let shown = sorted(&rows).into_iter();
+    shown.map(|row| line(mission, &parts, row)).collect()
+}
+
+fn line(mission: &Mission, parts: &Parts, row: &LogRow<'_>) -> LogLine {
+    let (when, words) = when_and_what(mission, parts, row);
+    let (kind, inner, words) = match row {
+        LogRow::Phase(..) => (None, "", format!("── {words} ──")),
+        LogRow::Interruption(_) | LogRow::Switch(_) => (None, "", words),
+        LogRow::Event(_, event) => (Some(event.kind), "", words),
+        LogRow::Part(_, event) => (Some(event.kind), "  ", words),
+    };
+    LogLine {
+        kind,
+        lead: format!("{when:>13}  {inner}"),
+        words,
+    }
 }
 
 /// The time of a row and its words for people.

@@ -4,6 +4,7 @@ mod definitions;
 mod fields;
 mod messages;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::inputs::{each_once, known_span};
@@ -11,13 +12,14 @@ use super::read::files;
 use super::{Stage, Watch};
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Report, Sink, Want};
 use crate::base::error::{Error, Result};
-use crate::base::notice::{Notice, Notices};
+use crate::base::name::TopicName;
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Moment, Span, Stamp};
 use crate::export::check::{check, check_folder, make_folder};
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
 use crate::graph::window::{self, Division};
-use crate::view::NameFilter;
+use crate::view::{NameFilter, unmatched_topics};
 
 /// The whole job of `bagreel extract`.
 #[derive(Clone, Debug)]
@@ -55,6 +57,8 @@ pub struct Extracted {
     pub undecoded: u64,
     /// The notices for the user.
     pub notices: Notices,
+    /// All topics of the bags.
+    topics: BTreeSet<TopicName>,
 }
 
 /// Reads bags and writes their messages as tables, atomically.
@@ -79,6 +83,13 @@ pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
         messages::extract(&once, watch)?
     };
     done.notices.extend(twice);
+    let topics: Vec<&str> = done.topics.iter().map(TopicName::as_str).collect();
+    let unmatched = unmatched_topics(&job.topics, &topics);
+    if unmatched.is_empty() && done.rows == 0 {
+        let text = "no message of these topics is in that time";
+        done.notices.add(Notice::new(NoticeKind::Note, text));
+    }
+    done.notices.extend(unmatched);
     Ok(done)
 }
 

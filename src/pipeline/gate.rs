@@ -1,5 +1,6 @@
 //! Checking: reads the expectation and the mission, compares them, writes the findings.
 
+use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -116,7 +117,7 @@ pub(crate) struct Compared {
     pub(crate) missions: Vec<Mission>,
     pub(crate) differences: Vec<Difference>,
     /// Remarks for the user about the pictures.
-    pub(crate) remarks: Vec<String>,
+    pub(crate) remarks: BTreeSet<String>,
 }
 
 /// Compares two missions, and writes every report and picture.
@@ -141,7 +142,7 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
         .iter()
         .cloned()
         .partition(|o| MOVING.contains(&o.format.word));
-    let mut remarks = Vec::new();
+    let mut remarks = BTreeSet::new();
     for (outputs, side) in [(moving, Side::Each), (standing, Side::Both)] {
         if outputs.is_empty() {
             continue;
@@ -185,7 +186,9 @@ pub(crate) struct BaselineWritten {
     pub(crate) changed: usize,
     /// The number of remaining findings.
     pub(crate) left: usize,
-    /// The number of nodes and topics left out because they did not fit.
+    /// The numbers of nodes and topics written in a new expectation, and of both that did not fit.
+    pub(crate) nodes: usize,
+    pub(crate) topics: usize,
     pub(crate) left_out: usize,
 }
 
@@ -222,6 +225,8 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
         missions,
         changed: 0,
         left: 0,
+        nodes: 0,
+        topics: 0,
         left_out: 0,
     };
     let text = if let Some((path, text, _)) = old {
@@ -231,7 +236,7 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
         new.text
     } else {
         let new = written(&done.missions, job.runs.iter().any(is_part));
-        done.left_out = new.left_out;
+        (done.nodes, done.topics, done.left_out) = (new.nodes, new.topics, new.left_out);
         new.text
     };
     put(&target, &text)?;

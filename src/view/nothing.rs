@@ -4,13 +4,14 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::ViewOptions;
+use super::names::{is_params, is_tf};
+use super::{Hide, NameFilter, ViewOptions};
 use crate::base::error::Error;
 use crate::base::name::{is_within, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
-use crate::graph::Elements;
+use crate::graph::{Elements, Topic};
 
 /// The error of a view without any of these elements.
 pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
@@ -20,20 +21,29 @@ pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
         ("--ns-filter", &options.ns_filter, &nodes),
         ("--topic-filter", &options.topic_filter, &topics),
     ];
-    for (flag, filter, names) in filters {
-        let passes = |name: &&str| filter.passes(name);
-        if !filter.passes_all() && !names.iter().any(passes) {
-            return Error::usage(
-                format!("`{flag}` matches none of {}", among(names.len())),
-                meant(&filter.wanted(), names),
-            );
-        }
+    let mut unfit = filters
+        .iter()
+        .filter_map(|(flag, filter, names)| none_pass(flag, filter, names));
+    if let Some(error) = unfit.next() {
+        return error;
     }
     let all = words::count(nodes.len() + topics.len(), "name");
     Error::usage(
         format!("nothing is left to draw of {all}"),
         "show more with `--hide none`, `--show-recorder` or wider filters",
     )
+}
+
+/// The error of a filter that none of these names passes.
+pub(crate) fn none_pass(flag: &str, filter: &NameFilter, names: &[&str]) -> Option<Error> {
+    let passes = |name: &&str| filter.passes(name);
+    let is_unfit = !filter.passes_all() && !names.iter().any(passes);
+    is_unfit.then(|| {
+        Error::usage(
+            format!("`{flag}` matches none of {}", among(names.len())),
+            meant(&filter.wanted(), names),
+        )
+    })
 }
 
 /// Notices about the names and patterns in these options that match nothing.
@@ -49,6 +59,7 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
         let unused = spaces.iter().filter(|space| !is_used(space));
         unused.map(ToString::to_string).collect()
     };
+    let hide = options.hide;
     let options = [
         (
             "--ns-filter",
@@ -65,17 +76,46 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
         ("--collapse", "name", without(&options.collapse), &both),
         ("--expand", "name", without(&options.expand), &both),
     ];
-    let mut notices = Vec::new();
-    for (flag, what, unused, names) in options {
-        for text in unused {
-            let meant = meant(&[text.trim_start_matches('-')], names);
-            // A filter's syntax is not accepted for namespaces.
-            let meant = meant.split(": ").next().unwrap_or_default();
-            let text = format!("`{flag} {text}` matches no {what}; {meant}");
-            notices.push(Notice::new(NoticeKind::Note, text));
-        }
-    }
-    notices
+    let unused = options.iter().flat_map(|(flag, what, unused, names)| {
+        let each = unused.iter();
+        each.map(|text| unused_text(flag, text, what, names))
+    });
+    unused.chain(not_hidden(elements, hide)).collect()
+}
+
+/// Notices about the parts of a topic filter that match none of these names.
+pub(crate) fn unmatched_topics(filter: &NameFilter, names: &[&str]) -> Vec<Notice> {
+    let unused = filter.unused(names).into_iter();
+    unused
+        .map(|text| unused_text("--topic-filter", &text, "topic", names))
+        .collect()
+}
+
+fn unused_text(flag: &str, text: &str, what: &str, names: &[&str]) -> Notice {
+    let meant = meant(&[text.trim_start_matches('-')], names);
+    // A filter's syntax is not accepted for namespaces.
+    let meant = meant.split(": ").next().unwrap_or_default();
+    let text = format!("`{flag} {text}` matches no {what}; {meant}");
+    Notice::new(NoticeKind::Note, text)
+}
+
+/// Notices about kinds of topics to hide of which the mission has none.
+fn not_hidden(elements: &Elements, hide: Hide) -> Vec<Notice> {
+    let is_default = hide == ViewOptions::rqt_defaults().hide;
+    let names: BTreeSet<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
+    let params = |topic: &Topic| is_params(topic.name.as_str(), |other| names.contains(other));
+    let tf = |topic: &Topic| is_tf(topic.name.as_str());
+    let has = |is_one: &dyn Fn(&Topic) -> bool| elements.topics.iter().any(is_one);
+    let unused = [
+        ("tf", hide.tf && !has(&tf)),
+        ("params", hide.params && !is_default && !has(&params)),
+        ("services", hide.services && !has(&Topic::is_service)),
+    ];
+    let unused = unused.iter().filter(|(_, is_unused)| *is_unused);
+    let text = |word| format!("`--hide {word}` leaves nothing out; the mission has no such topic");
+    unused
+        .map(|(word, _)| Notice::new(NoticeKind::Note, text(word)))
+        .collect()
 }
 
 fn among(names: usize) -> String {
@@ -115,6 +155,28 @@ mod tests {
     use super::*;
     use crate::view::testing::mission;
     use crate::view::{NameFilter, outline};
+
+    #[test]
+    fn kinds_that_the_mission_lacks_are_reported() {
+        let mission = mission(&["/a>/tf /a>/t"]);
+        let reported = |hide: Hide| {
+            let options = ViewOptions {
+                hide,
+                ..ViewOptions::default()
+            };
+            let notices = unmatched(&mission.elements, &options);
+            notices
+                .into_iter()
+                .map(|notice| notice.text)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            reported(Hide::parse("tf,services").unwrap()),
+            ["`--hide services` leaves nothing out; the mission has no such topic"]
+        );
+        assert!(reported(ViewOptions::rqt_defaults().hide).is_empty());
+        assert!(reported(Hide::default()).is_empty());
+    }
 
     fn hint(filter: &str) -> String {
         let options = ViewOptions {

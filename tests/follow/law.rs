@@ -89,7 +89,7 @@ impl Follower {
             && let Some(known) = self.follow.so_far(u64::MAX, Length::All).unwrap()
         {
             for line in self.feed.news(&known, LogFormat::Text) {
-                self.printed += &(line + "\n");
+                self.printed += &line.text(None);
             }
         }
         growth

@@ -27,7 +27,7 @@ impl Progress {
     /// Progress, shown only if standard error is a terminal and `is_shown`.
     pub(super) fn new(is_shown: bool) -> Self {
         Self {
-            is_shown: is_shown && io::stderr().is_terminal(),
+            is_shown: is_shown && io::stderr().is_terminal() && !is_dumb(),
             bar: None,
             stage: None,
             spent: BTreeMap::new(),
@@ -108,6 +108,11 @@ impl Progress {
         };
         self.spent.iter().map(line).collect()
     }
+}
+
+/// Whether the terminal can neither move its cursor nor show colours.
+pub(super) fn is_dumb() -> bool {
+    std::env::var_os("TERM").is_some_and(|term| term == "dumb")
 }
 
 /// A spinner until the total is known.

@@ -182,7 +182,7 @@ impl<'a> Fields<'a> {
     pub(super) fn range(&self, key: &str) -> Result<Option<At<Range>>> {
         self.read(
             key,
-            "write a range: `13.5..16.5`, `5..` or `..1`",
+            "write a range: `13.5..16.5`, `5..` or `..1`, the smaller number first",
             Range::parse,
         )
     }
@@ -198,7 +198,7 @@ impl<'a> Fields<'a> {
             "false" => Some(None),
             text => During::parse(text).map(Some),
         };
-        let hint = "write `true`, or the time from which it may end: `1:30..`, `-20s..`";
+        let hint = "write `true`, or when it may end: `1:30..`, `-20s..`, the earlier time first";
         let found = self.read("may_end", hint, parse)?;
         Ok(found.and_then(|At { at, value }| Some(At { at, value: value? })))
     }
@@ -216,12 +216,12 @@ impl<'a> Fields<'a> {
                 value: During::until(length.value),
             }));
         }
-        let hint = "write an interval: `1:30..2m`, `..20s`";
+        let hint = "write an interval: `1:30..2m`, `..20s`, the earlier time first";
         self.read("within", hint, During::parse)
     }
 
     pub(super) fn during(&self) -> Result<Option<During>> {
-        let hint = "write an interval: `1:30..2m`, `-30s..`";
+        let hint = "write an interval: `1:30..2m`, `-30s..`, the earlier time first";
         Ok(self.read("during", hint, During::parse)?.map(|d| d.value))
     }
 

@@ -107,19 +107,19 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
         gives: (goes, goes),
     };
     let columns = [
-        column("bag", false, 20, 0),
+        column("bag", false, width.unwrap_or(0).clamp(60, 144) / 3, 0),
         column("format", false, WHOLE, 4),
-        column("size", true, WHOLE, 6),
-        column("start", false, 10, 5),
+        column("size", true, WHOLE, 5),
+        column("start", false, WHOLE, 7),
         column("span", true, WHOLE, 0),
         column("messages", true, WHOLE, 0),
-        column("topics", true, WHOLE, 0),
+        column("topics", true, WHOLE, 6),
         column("nodes", true, WHOLE, 0),
         column("pub", true, WHOLE, 2),
         column("sub", true, WHOLE, 3),
         column("evidence", false, 12, 1),
     ];
-    let read: Vec<Vec<Cell>> = rows.iter().filter_map(text_row).collect();
+    let read: Vec<Vec<Cell>> = rows.iter().filter_map(|row| text_row(row, width)).collect();
     let mut out = String::new();
     if !read.is_empty() {
         out = table(&columns, &read, width);
@@ -133,15 +133,24 @@ pub fn survey_text(rows: &[SurveyRow], width: Option<usize>) -> String {
     out
 }
 
-/// The row of a bag that was read.
-fn text_row(row: &SurveyRow) -> Option<Vec<Cell>> {
+/// The row of a bag that was read; a narrow one has its date alone, or without seconds.
+fn text_row(row: &SurveyRow, width: Option<usize>) -> Option<Vec<Cell>> {
+    let date = match width {
+        Some(0..96) => "YYYY-MM-DD",
+        Some(96..112) => "YYYY-MM-DDTHH:MM",
+        _ => "YYYY-MM-DDTHH:MM:SS",
+    };
     let info = row.info.as_ref().filter(|_| row.error.is_none())?;
     let bag = info.bags.first();
     let cells = [
         visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
         row.file_bytes.map(words::bytes).unwrap_or_default(),
-        Stamp(info.start_ns).to_string().chars().take(19).collect(),
+        Stamp(info.start_ns)
+            .to_string()
+            .chars()
+            .take(date.len())
+            .collect(),
         words::offset_seconds(info.end_ns.saturating_sub(info.start_ns)),
         info.messages.to_string(),
         info.topics.len().to_string(),

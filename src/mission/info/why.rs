@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
+use crate::base::nearest::nearest;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;
@@ -139,33 +140,38 @@ fn describe(
     )
 }
 
-/// The most similar names that are offered.
+/// The largest number of similar names that are offered.
 const OFFERED: usize = 5;
 
 fn unknown(mission: &Mission, names: &[String]) -> Error {
     let all = &mission.elements;
-    let known = all
-        .nodes
+    let nodes = || all.nodes.iter().map(|n| n.name.as_str());
+    let known = || nodes().chain(all.topics.iter().map(|t| t.name.as_str()));
+    let Some(name) = names
         .iter()
-        .map(|n| n.name.as_str())
-        .chain(all.topics.iter().map(|t| t.name.as_str()));
+        .find(|name| known().all(|known| known != *name))
+    else {
+        let what = format!("nothing connects `{}`", names.join("` and `"));
+        return Error::usage(what, "`--why NAME` explains one of them");
+    };
+    let hint = match nearest(name, known()) {
+        Some(near) => format!("the nearest name is `{near}`"),
+        None => similar(name, known()),
+    };
+    Error::usage(format!("there is no node or topic `{name}`"), hint)
+}
+
+/// The hint for a name unlike any other in its spelling: names that contain its last part.
+fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_lowercase();
-    let close = known.filter(|known| {
-        names
-            .iter()
-            .any(|n| !last(n).is_empty() && known.to_lowercase().contains(&last(n)))
-    });
+    let last = last(name);
+    let close = known.filter(|known| !last.is_empty() && known.to_lowercase().contains(&last));
     let close: Vec<&str> = close.take(OFFERED).collect();
-    let hint = if close.is_empty() {
+    if close.is_empty() {
         "`bagreel info` lists every name".to_owned()
     } else {
         format!("similar names: {}", close.join(", "))
-    };
-    let what = match names {
-        [name] => format!("there is no node or topic `{name}`"),
-        names => format!("nothing connects `{}`", names.join("` and `")),
-    };
-    Error::usage(what, hint)
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 use super::{Extract, Extracted, definitions, of_report, stop};
 use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
-use crate::base::name::NodeName;
+use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::base::time::Stamp;
@@ -17,6 +17,7 @@ use crate::export::tables::folder::{Folder, Part, file_stem};
 use crate::export::tables::writer::Writer;
 use crate::pipeline::Watch;
 use crate::pipeline::collect::no_messages;
+use crate::view::none_pass;
 
 /// The columns before a message's fields: its log time, and its publisher if known.
 const TIME: &str = "time_ns";
@@ -70,6 +71,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         rows,
         undecoded: lost.messages,
         notices: lost.notices,
+        topics: lost.topics,
     })
 }
 
@@ -84,6 +86,10 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
         .first()
         .map_or_else(String::new, Input::name)
         .into();
+    let topics: Vec<&str> = lost.topics.iter().map(TopicName::as_str).collect();
+    if let Some(error) = none_pass("--topic-filter", &job.topics, &topics) {
+        return error;
+    }
     if lost.types.is_empty() {
         let hint = "`bagreel info` lists its topics and times".to_owned();
         return Error::NoMessages { path, hint };
@@ -104,9 +110,11 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
     }
 }
 
-/// The messages that could not be decoded: their number, their types with a reason each, and notices about them.
+/// What the tables lack: the messages that could not be decoded, their types with a reason each, and notices; and all
+/// topics, of which some may not have been requested.
 #[derive(Default)]
 struct Lost {
+    topics: BTreeSet<TopicName>,
     messages: u64,
     types: BTreeMap<String, String>,
     notices: Notices,
@@ -366,6 +374,7 @@ impl OfBag<'_> {
 impl Sink for OfBag<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         let (topic, type_name) = (connection.topic.as_str(), &*connection.type_name);
+        self.lost.topics.insert(connection.topic.clone());
         let is_wanted = self.job.topics.passes(topic);
         let mut older = None;
         let table = is_wanted.then(|| {

@@ -12,6 +12,7 @@ use crate::export::sink::OutputSink;
 use crate::export::tables::writer::Writer;
 use crate::pipeline::Watch;
 use crate::view::NameFilter;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -41,6 +42,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
         rows,
         undecoded: 0,
         notices: taken.notices,
+        topics: taken.topics,
     })
 }
 
@@ -61,6 +63,8 @@ struct Taken {
     sources: Vec<RowSource>,
     series: Vec<SeriesId>,
     notices: Notices,
+    /// All topics of the bags.
+    topics: BTreeSet<TopicName>,
 }
 
 impl Taken {
@@ -91,6 +95,7 @@ struct OfBag<'a> {
 impl Takes for OfBag<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         let is_wanted = self.filter.passes(connection.topic.as_str());
+        self.taken.topics.insert(connection.topic.clone());
         let mut series = |is_sized| self.taken.add(connection, is_sized);
         self.sources
             .push(is_wanted.then(|| [series(true), series(false)]));

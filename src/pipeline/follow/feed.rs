@@ -11,7 +11,7 @@ use crate::base::words::worded;
 use crate::gate::{Severity, Verdict};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, InterruptionKind, Kind};
-use crate::mission::events::{LogFormat, LogRow, headlines, quoted, texts};
+use crate::mission::events::{LogFormat, LogLine, LogRow, headlines, quoted, row_lines};
 
 worded! {
     /// The certainty of a line.
@@ -28,16 +28,17 @@ worded! {
 
 impl Certainty {
     /// A line of text, or an object, with its certainty.
-    fn mark(self, line: &str, format: LogFormat) -> String {
+    fn mark(self, mut line: LogLine, format: LogFormat) -> LogLine {
         match (format, self) {
             (LogFormat::Ndjson, _) => {
-                let rest = line.strip_prefix('{').unwrap_or("}");
-                format!("{{\"state\":\"{}\",{rest}", self.word())
+                let rest = line.words.strip_prefix('{').unwrap_or("}");
+                line.words = format!("{{\"state\":\"{}\",{rest}", self.word());
             }
-            (_, Self::Sure) => line.to_owned(),
-            (_, Self::SoFar) => format!("{line} (so far)"),
-            (_, Self::Withdrawn) => format!("{line} (withdrawn)"),
+            (_, Self::Sure) => {}
+            (_, Self::SoFar) => line.words += " (so far)",
+            (_, Self::Withdrawn) => line.words += " (withdrawn)",
         }
+        line
     }
 }
 
@@ -63,7 +64,7 @@ struct Printed {
     key: Key,
     time: Stamp,
     certainty: Certainty,
-    line: String,
+    line: LogLine,
     /// Whether it is in the newest log.
     is_there: bool,
 }
@@ -80,7 +81,7 @@ const SURE_NS: i64 = CLOSING_NS;
 
 impl Feed {
     /// The new lines in `known`, in the order of the log.
-    pub fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<String> {
+    pub fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<LogLine> {
         let mission = &known.mission;
         // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
@@ -115,7 +116,7 @@ impl Feed {
                     key,
                     time,
                     certainty,
-                    line: String::new(),
+                    line: LogLine::default(),
                     is_there: true,
                 });
                 self.printed.len() - 1
@@ -129,9 +130,9 @@ impl Feed {
             }
         }
         let mut lines = Vec::new();
-        for (place, line) in places.into_iter().zip(texts(mission, &rows, format)) {
+        for (place, line) in places.into_iter().zip(row_lines(mission, &rows, format)) {
             let printed = &mut self.printed[place];
-            lines.push(printed.certainty.mark(&line, format));
+            lines.push(printed.certainty.mark(line.clone(), format));
             printed.line = line;
         }
         // Events before the kept messages are final and can be dropped.
@@ -139,7 +140,7 @@ impl Feed {
             .retain(|printed| printed.time >= from || printed.is_there);
         let gone = |printed: &mut Printed| !printed.is_there;
         let gone = self.printed.extract_if(.., gone);
-        lines.extend(gone.map(|printed| Certainty::Withdrawn.mark(&printed.line, format)));
+        lines.extend(gone.map(|printed| Certainty::Withdrawn.mark(printed.line, format)));
         lines
     }
 }
@@ -196,12 +197,17 @@ fn certainty(event: &Event, now: Stamp) -> Certainty {
 /// The findings of an expectation so far, by fingerprint: since when, and the line once it was printed.
 #[derive(Default)]
 pub(crate) struct FindingFeed {
-    seen: BTreeMap<String, (Stamp, Option<String>)>,
+    seen: BTreeMap<String, (Stamp, Option<LogLine>)>,
 }
 
 impl FindingFeed {
     /// The lines about findings that have become certain, and about those that no longer apply.
-    pub(crate) fn news(&mut self, verdict: &Verdict, now: Stamp, format: LogFormat) -> Vec<String> {
+    pub(crate) fn news(
+        &mut self,
+        verdict: &Verdict,
+        now: Stamp,
+        format: LogFormat,
+    ) -> Vec<LogLine> {
         let mut lines = Vec::new();
         let mut there = BTreeMap::new();
         for finding in verdict.findings() {
@@ -222,14 +228,15 @@ impl FindingFeed {
                 } else {
                     format!("{severity}[{kind}]: {}", finding.says)
                 };
-                lines.push(Certainty::Sure.mark(&line, format));
-                printed = Some(line);
+                let line = LogLine::plain(&line);
+                printed = Some(line.clone());
+                lines.push(Certainty::Sure.mark(line, format));
             }
             there.insert(key, (since, printed));
         }
         let gone = std::mem::replace(&mut self.seen, there).into_values();
         let gone = gone.filter_map(|(_, printed)| printed);
-        lines.extend(gone.map(|line| Certainty::Withdrawn.mark(&line, format)));
+        lines.extend(gone.map(|line| Certainty::Withdrawn.mark(line, format)));
         lines
     }
 }
