@@ -52,7 +52,8 @@ impl Lifetime {
         });
     }
 
-    /// Sets the beginning of a first lifetime: with a rhythm it began shortly before its first sign.
+    /// Sets the beginning of a first lifetime: with a rhythm it began shortly before its first sign, and in any case after
+    /// its last known absence.
     /// `recording` is the start of its own recording, one of several; without evidence it began before.
     pub(super) fn begin(
         &mut self,
@@ -66,7 +67,8 @@ impl Lifetime {
             (self.from, self.began) = (mission, None);
         } else if let Some(began) = &mut self.began {
             let sooner = DISCOVERY_NS.saturating_add(late);
-            began.earliest = period.map_or(mission, |_| self.from.plus(-sooner));
+            let possible = period.map_or(mission, |_| self.from.plus(-sooner));
+            began.earliest = began.earliest.max(possible);
         }
     }
 
@@ -137,6 +139,19 @@ mod tests {
         let stamps = |list: &[i64]| list.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
         let lives = lives(&stamps(signs), &stamps(ends));
         lives.iter().map(|l| (l.from.0, l.to.0)).collect()
+    }
+
+    #[test]
+    fn a_beginning_is_not_before_the_last_known_absence() {
+        let stamp = |seconds: i64| Stamp(seconds * 1_000_000_000);
+        let earliest = |ends: &[Stamp], period| {
+            let mut life = lives(&[stamp(30)], ends)[0];
+            life.begin(stamp(0), stamp(0), period, true);
+            life.began.unwrap().earliest
+        };
+        assert_eq!(earliest(&[stamp(4), stamp(20)], None), stamp(20));
+        assert_eq!(earliest(&[stamp(29)], Some(5_000_000_000)), stamp(29));
+        assert_eq!(earliest(&[], None), stamp(0));
     }
 
     #[test]
