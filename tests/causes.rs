@@ -67,6 +67,27 @@ fn a_flapping_connection_is_one_line() {
 }
 
 #[test]
+fn a_client_refused_at_one_moment_did_not_restart() {
+    let mut bag = minute(&[("/view", "/state", 0, 60)]);
+    let log = bag.publisher("/base", "/rosout", "rosgraph_msgs/Log");
+    LOG.clone_into(&mut bag.publishers[log].definition);
+    let refusal =
+        "Client [/bad] wants topic /beat to have datatype/md5sum [a/b], but our version has [c/d].";
+    let record = log1("/base", refusal, "publication.cpp", &["/beat"]);
+    at(&mut bag, log, 30, record);
+    bag.messages.sort_by_key(|m| m.1);
+    let text = shown(&bag);
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    assert_eq!(
+        lines,
+        [
+            "00:00–00:30  /bad started: subscribes to /beat",
+            "00:30–00:59  /bad stopped: subscribes to /beat",
+        ],
+    );
+}
+
+#[test]
 fn topics_that_a_node_begins_together_are_one_line() {
     let text = shown(&minute(&[
         ("/base", "/a", 30, 60),

@@ -66,21 +66,32 @@ fn kind(turn: Turn) -> Kind {
     }
 }
 
-/// The turns of a role, sorted by time.
-type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
+/// The turns of a role, sorted: by time, rank and node.
+type RoleTurns = Vec<((Stamp, u8, NodeId), (Turn, Bound))>;
 
-/// The turns of all nodes by role: anonymous nodes share a role, any other node is its own.
+/// The turns of all nodes by role: anonymous nodes share a role, any other node is its own. At one time, one ends
+/// before the next begins; a node known from a single moment begins before it ends.
 fn turns_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
     let nodes = (0..).zip(&context.elements.nodes);
     for (id, node) in nodes.filter(|(id, _)| !context.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
-        of.extend(
-            turns(context.lives(Element::Node(id))).map(|(turn, at)| (at.time, turn, id, at)),
-        );
+        for life in context.lives(Element::Node(id)) {
+            let (began, ended) = (life.began, life.ended);
+            let is_moment = began.zip(ended).is_some_and(|(b, e)| b.time == e.time);
+            let turns = turns(std::slice::from_ref(life));
+            of.extend(turns.map(|(turn, at)| {
+                let rank = if is_moment {
+                    1
+                } else {
+                    2 * u8::from(turn == Turn::Begins)
+                };
+                ((at.time, rank, id), (turn, at))
+            }));
+        }
     }
     for turns in all.values_mut() {
-        turns.sort_by_key(|(time, turn, node, _)| (*time, std::cmp::Reverse(*turn), *node));
+        turns.sort_by_key(|(order, _)| *order);
     }
     all
 }
@@ -88,11 +99,11 @@ fn turns_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
 /// Adds the events of one role: an end followed by a beginning is a restart.
 fn add_role(context: &LogInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &RoleTurns) {
     let mut rest = turns.as_slice();
-    while let Some((&(_, turn, node, at), after)) = rest.split_first() {
+    while let Some((&((.., node), (turn, at)), after)) = rest.split_first() {
         let back = after
             .first()
-            .filter(|next| turn == Turn::Ends && next.1 == Turn::Begins);
-        let Some(&(_, _, heir, again)) = back else {
+            .filter(|(_, next)| turn == Turn::Ends && next.0 == Turn::Begins);
+        let Some(&((.., heir), (_, again))) = back else {
             let kind = match turn {
                 Turn::Begins => Kind::Started,
                 Turn::Ends => Kind::Stopped,
