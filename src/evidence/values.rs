@@ -8,6 +8,29 @@ use crate::base::name::SERVICE;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::observation::{Name, Observation, Observations};
 
+/// The states of a node in transition, each with the state to which it leads.
+const STEPS: [(&str, &str); 5] = [
+    ("configuring", "inactive"),
+    ("activating", "active"),
+    ("deactivating", "inactive"),
+    ("cleaningup", "unconfigured"),
+    ("shuttingdown", "finalized"),
+];
+/// Two transitions within this time may be recorded in either order: simulated time advances in steps.
+const UNORDERED_NS: i64 = 50_000_000;
+
+/// Puts each transition before its result where both were recorded at about the same time.
+fn arrange(states: &mut [(Stamp, Arc<str>)]) {
+    for at in 1..states.len() {
+        let ((before, result), (after, step)) = (&states[at - 1], &states[at]);
+        let is_result = STEPS.contains(&(&**step, &**result));
+        if is_result && after.since(*before) <= UNORDERED_NS {
+            let swapped = (step.clone(), result.clone());
+            (states[at - 1].1, states[at].1) = swapped;
+        }
+    }
+}
+
 /// Stated values by node or topic.
 #[derive(Debug, Default)]
 pub(crate) struct StatedValues {
@@ -42,6 +65,7 @@ impl StatedValues {
         }
         for states in all.states.values_mut() {
             states.sort();
+            arrange(states);
         }
         Ok(all)
     }
@@ -78,5 +102,40 @@ impl StatedValues {
     pub(crate) fn quality(&self, topic: Name) -> Option<Arc<str>> {
         let all: Vec<&str> = self.qualities.get(&topic)?.iter().map(|q| &**q).collect();
         Some(all.join(", ").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transition_precedes_its_result() {
+        let arranged = |states: &[(i64, &str)]| {
+            let states = states.iter();
+            let mut states: Vec<(Stamp, Arc<str>)> = states
+                .map(|(ms, state)| (Stamp(ms * 1_000_000), (*state).into()))
+                .collect();
+            arrange(&mut states);
+            let states = states
+                .into_iter()
+                .map(|(time, state)| format!("{} {state}", time.0 / 1_000_000));
+            states.collect::<Vec<_>>().join(", ")
+        };
+        let mixed = [
+            (0, "configuring"),
+            (1, "inactive"),
+            (2, "active"),
+            (5, "activating"),
+        ];
+        assert_eq!(
+            arranged(&mixed),
+            "0 configuring, 1 inactive, 2 activating, 5 active"
+        );
+        // The messages between them are not recorded.
+        assert_eq!(
+            arranged(&[(0, "active"), (60, "activating")]),
+            "0 active, 60 activating"
+        );
     }
 }

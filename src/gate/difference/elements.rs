@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::sending::rates;
 use super::{Difference, Where};
 use crate::base::rhythm::CLOSING_NS;
-use crate::base::time::Stamp;
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
+use crate::graph::history::Bound;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::event_log::Kind;
 
@@ -99,19 +99,16 @@ fn node(
         ));
     }
     let (one, other) = (a.lifecycle(first), b.lifecycle(second));
-    // A node in transition is in both states, to within the accuracy of the order of messages.
-    let is_step = |state: &&str| state.ends_with("ing");
     if let (Some(one), Some(other)) = (&one, &other)
         && one != other
-        && !is_step(one)
-        && !is_step(other)
     {
         all.push(Difference::changed("lifecycle", name, *one, *other));
     }
-    let (one, other) = (a.ended(first), b.ended(second));
+    let (one, other) = (a.ended(first, CLOSING_NS), b.ended(second, CLOSING_NS));
     // An intermittent topic may be silent at the end: it only ended if the silence far exceeds the uncertainty.
-    let is_over = |facts: &Facts<'_>, (end, doubt): (Stamp, i64)| {
-        let rest = facts.mission.span.end.since(end);
+    let is_over = |facts: &Facts<'_>, end: Bound| {
+        let rest = facts.mission.span.end.since(end.time);
+        let doubt = end.latest.since(end.earliest);
         doubt <= CLOSING_NS || doubt.saturating_mul(DOUBTS) <= rest
     };
     let ended = match (one, other) {
@@ -120,8 +117,8 @@ fn node(
         _ => false,
     };
     if ended {
-        let outcome = |facts: &Facts<'_>, end: Option<(Stamp, i64)>| match end {
-            Some((end, _)) => format!("ends at {}", facts.clock(end)),
+        let outcome = |facts: &Facts<'_>, end: Option<Bound>| match end {
+            Some(end) => format!("ends at {}", facts.clock(end.time)),
             None => "stays".to_owned(),
         };
         all.push(Difference::changed(
