@@ -87,7 +87,7 @@ proptest! {
 }
 
 /// Some nodes, each of which publishes on a topic for some time and may return.
-fn recording() -> impl Strategy<Value = Recording> {
+pub(crate) fn recording() -> impl Strategy<Value = Recording> {
     let times = (0..90_000_i64, 500..60_000_i64);
     let period = prop::sample::select(vec![50_i64, 200, 1000, 7000]);
     let sender = (0..5_u8, 0..4_u8, times, period);

@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::pattern::Pattern;
 use crate::base::name::is_quiet;
 use crate::base::notice::NoticeKind;
-use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
@@ -361,15 +360,20 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The time at which a role was last present, if before the mission's shutdown, and its uncertainty in nanoseconds.
-    pub(crate) fn ended(&self, nodes: &[NodeId]) -> Option<(Stamp, i64)> {
-        let end = self.lives(nodes).last()?.end;
-        if self.mission.span.end.since(end) <= CLOSING_NS {
+    /// The time at which a role was last present, with its bounds, if more than `closing` before the mission's end.
+    pub(crate) fn ended(&self, nodes: &[NodeId], closing: i64) -> Option<Bound> {
+        let time = self.lives(nodes).last()?.end;
+        if self.mission.span.end.since(time) <= closing {
             return None;
         }
         let stopped = self.events(nodes, Kind::Stopped);
-        let doubt = stopped.last().map_or(0, |e| e.latest.since(e.earliest));
-        Some((end, doubt))
+        let bounds = stopped.last().map(|e| (e.earliest, e.latest));
+        let (earliest, latest) = bounds.unwrap_or((time, time));
+        Some(Bound {
+            time,
+            earliest,
+            latest,
+        })
     }
 
     /// Whether a role is only known from its log: nothing else of it was recorded, and no evidence lists all nodes.

@@ -3,8 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{HEALTHY, bag, recording, run};
-use crate::support::{Recording, shared};
+use proptest::prelude::*;
+
+use super::{HEALTHY, bag, findings, recording, run};
+use crate::edges::log1;
+use crate::pairs::LOG;
+use crate::support::{ORIGIN, Recording, shared};
 
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
@@ -117,6 +121,78 @@ fn every_available_bag_passes_its_own_expectation() {
         judged += 1;
     }
     assert!(bags.is_empty() || judged > 40, "{judged}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn any_run_passes_its_own_expectation(run_of in crate::properties::recording(), latched: u8) {
+        let mut run_of = run_of;
+        for (place, publisher) in run_of.publishers.iter_mut().enumerate() {
+            publisher.latching = latched >> (place % 8) & 1 == 1;
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let here = dir.path();
+        bag(here, "run.bag", &run_of);
+        let (code, said) = run(here, &["baseline", "run.bag", "-o", "g.yaml"]);
+        prop_assert_eq!(code, 0, "{}", said);
+        let (code, said) = run(here, &["check", "run.bag", "--expect", "g.yaml"]);
+        prop_assert!(code == 0 && said.contains("no findings"), "{}", said);
+    }
+}
+
+#[test]
+fn a_latched_topic_with_a_rate_may_end_as_it_did() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let until = |end: i64| {
+        let mut robot = recording(HEALTHY, 0);
+        let pose = robot.publisher("/base", "/pose", "geometry_msgs/Pose");
+        robot.publishers[pose].latching = true;
+        robot.send(pose, (1_000, end), 100, &[5; 48]);
+        robot
+    };
+    bag(here, "run.bag", &until(90_000));
+    bag(here, "early.bag", &until(40_000));
+    assert_eq!(run(here, &["baseline", "run.bag", "-o", "g.yaml"]).0, 0);
+    assert!(findings(here, "run.bag", "g.yaml").is_empty());
+    assert_eq!(findings(here, "early.bag", "g.yaml"), ["topic-gone"]);
+}
+
+#[test]
+fn a_topic_that_ends_a_little_earlier_than_in_the_only_run_passes() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    for (name, end) in [("run.bag", 175_200), ("next.bag", 174_600)] {
+        let mut robot = recording(HEALTHY, 0);
+        let keys = robot.publisher("/keys", "/keys", "geometry_msgs/Twist");
+        robot.send(keys, (10_000, end), 700, &[5; 48]);
+        bag(here, name, &robot);
+    }
+    assert_eq!(run(here, &["baseline", "run.bag", "-o", "g.yaml"]).0, 0);
+    assert_eq!(findings(here, "next.bag", "g.yaml"), [""; 0]);
+}
+
+/// The last sign of a refused client does not show when it ended.
+#[test]
+fn a_node_known_from_one_moment_is_not_gone() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut robot = recording(HEALTHY, 0);
+    let log = robot.publisher("/base", "/rosout", "rosgraph_msgs/Log");
+    LOG.clone_into(&mut robot.publishers[log].definition);
+    let refusal =
+        "Client [/bad] wants topic /odom to have datatype/md5sum [a/b], but our version has [c/d].";
+    let record = log1("/base", refusal, "publication.cpp", &["/odom"]);
+    robot.messages.push((log, ORIGIN + 30_000_000_000, record));
+    robot.messages.sort_by_key(|m| m.1);
+    bag(here, "run.bag", &robot);
+    let text = "schema: bagreel.expect/1\nnodes:\n  /bad: {restarts: ..0}\n";
+    fs::write(here.join("g.yaml"), text).unwrap();
+    let (code, said) = run(here, &["check", "run.bag", "--expect", "g.yaml"]);
+    let why = "cannot tell when /bad ended: its last sign is at 00:30";
+    assert!(code == 0 && said.contains(why), "{said}");
 }
 
 #[test]

@@ -24,6 +24,10 @@ const INTERVALS: i64 = 4;
 /// A rate may also differ by this multiple of the spread between windows.
 const SPREADS: f64 = 3.0;
 
+/// What is silent for longer before the end of a run may end: with a little less of it, in the next run, it would be
+/// missed.
+const ENDED_NS: i64 = CLOSING_NS / 2;
+
 /// The time range for a first message at any time.
 const ANY_TIME: &str = "0..";
 
@@ -110,9 +114,12 @@ fn node(seen: &[NodeInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let since = |run: &NodeInRun<'_>, at: Stamp| at.since(run.facts.mission.span.start);
     let ends = seen
         .iter()
-        .filter_map(|s| Some((s, s.facts.ended(s.nodes)?)));
+        .filter_map(|s| Some((s, s.facts.ended(s.nodes, ENDED_NS)?)));
     let ends: Vec<(i64, bool)> = ends
-        .map(|(s, (end, doubt))| (since(s, end), doubt <= CLOSING_NS))
+        .map(|(s, end)| {
+            let doubt = end.latest.since(end.earliest);
+            (since(s, end.time), doubt <= CLOSING_NS)
+        })
         .collect();
     let is_sure = ends.iter().all(|(_, is_sure)| *is_sure);
     let ends: Vec<i64> = ends.into_iter().map(|(end, _)| end).collect();
@@ -259,12 +266,9 @@ fn topic(seen: &[TopicInRun<'_>], times: &Times, is_optional: bool) -> Line {
     let is_even = rates.iter().all(|own| Rate::are_even(own));
     let hz = band(&rates.concat(), is_even).filter(|_| is_rated);
     let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
-    // Messages sent once on request have no times of their own.
-    let is_regular = hz.is_some()
-        || seen
-            .iter()
-            .all(|s| s.facts.messages(s.id) >= FEWEST_OF_MEAN);
-    let is_timed = !is_latched && is_regular;
+    // Messages sent once, on request or for late subscribers, have no times of their own.
+    let is_many = |s: &TopicInRun<'_>| s.facts.messages(s.id) >= FEWEST_OF_MEAN;
+    let is_timed = hz.is_some() || !is_latched && seen.iter().all(is_many);
     // An even topic stays; for others, the last message shows whether they do.
     let tails = received().map(|(s, received)| s.facts.mission.span.end.since(received.end));
     let stays = times
@@ -377,7 +381,7 @@ fn longest(seen: &[TopicInRun<'_>], may_end: bool) -> Option<i64> {
 impl TopicInRun<'_> {
     fn ends(&self) -> bool {
         let received = self.facts.received(self.id);
-        received.is_some_and(|h| self.facts.mission.span.end.since(h.end) > CLOSING_NS)
+        received.is_some_and(|h| self.facts.mission.span.end.since(h.end) > ENDED_NS)
     }
 
     fn types(&self) -> BTreeSet<String> {

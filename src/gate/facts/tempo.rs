@@ -76,19 +76,22 @@ impl<'a> Facts<'a> {
     }
 
     /// The rates by which a topic is checked: of every window, and of the last if it is longer than half of one or has
-    /// enough expected messages, from its first message to the mission's end, or to its last if it `may_end`.
+    /// enough expected messages of one sender, from its first message to the mission's end, or to its last if it `may_end`.
     pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
         let Some(received) = self.received(topic) else {
             return Vec::new();
         };
         let mut rows = self.rows(topic).peekable();
+        // Several senders end one after the other when the robot shuts down.
+        let ends_in_turn = self.mission.sending.of_topic(topic).len() > 1;
         let (mut all, mut first) = (Vec::new(), None);
         for window in &self.mission.windows {
             let row = rows.next_if(|(own, _)| own.index == window.index);
             let inside = during.start <= window.span.start && window.span.end <= during.end;
             // A window cut by the mission's end has a rate if it is long enough, or the topic was even until then.
             let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
-            if window.partial && is_short && !is_enough(&all, window.span) || !inside {
+            let is_cut = window.partial && is_short;
+            if is_cut && (ends_in_turn || !is_enough(&all, window.span)) || !inside {
                 continue;
             }
             let rate = |span| Rate {

@@ -185,7 +185,7 @@ impl Judge<'_> {
         let allowed = may_end.value.on(self.facts.mission.span);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let found = roles.iter().filter_map(|(role, nodes)| {
-            let (end, _) = self.facts.ended(nodes)?;
+            let end = self.facts.ended(nodes, CLOSING_NS)?.time;
             let is_off = end < allowed.start || end > allowed.end;
             is_off.then(|| self.gone(role, nodes, &expected, may_end.at))?
         });
@@ -194,8 +194,14 @@ impl Judge<'_> {
 
     fn gone(&self, role: &str, nodes: &[NodeId], expected: &str, at: YamlPlace) -> Option<Finding> {
         let whole = self.facts.mission.span;
-        let (end, _) = self.facts.ended(nodes)?;
+        let ended = self.facts.ended(nodes, CLOSING_NS)?;
+        let end = ended.time;
         let clock = self.facts.clock(end);
+        // It may have ended in the robot's shutdown.
+        if whole.end.since(ended.latest) <= CLOSING_NS {
+            let says = format!("cannot tell when {role} ended: its last sign is at {clock}");
+            return Some(Finding::unknown(FindingKind::NodeGone, role, at, says));
+        }
         let finding = Finding::new(
             FindingKind::NodeGone,
             role,
