@@ -19,6 +19,7 @@ mod remote;
 mod rosbag1;
 mod rosbag2;
 pub(crate) mod source;
+mod split;
 #[cfg(feature = "sqlite")]
 mod sqlite3;
 pub(crate) mod straight;
@@ -30,7 +31,7 @@ use std::path::{Path, PathBuf};
 use crate::base::error::{Error, Result};
 
 pub(crate) use deferred::open_each;
-pub(crate) use folder::recordings;
+pub(crate) use folder::{Recording, parts_of, recordings};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{closed, head, place};
@@ -42,6 +43,7 @@ pub use model::{
 };
 pub(crate) use model::{ETAG, Growing};
 pub(crate) use object::{list, version};
+pub(crate) use split::parts as split_parts;
 use unknown::explain;
 
 /// Every format that can be read.
@@ -106,16 +108,20 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
 }
 
 /// Follows a recording that is still being written, recognized by its first bytes; in a folder that is not a
-/// recording, the newest one.
+/// recording, the newest one below it.
 ///
 /// # Errors
 /// As [`open`], and [`Error::Unsupported`] for inputs that do not grow: pipes, objects, and bags
 /// compressed as a whole.
 pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
+    let grows = |path: &Path| {
+        let kind = sniff(&Input::Path(path.to_owned()));
+        matches!(kind, Ok(InputKind::Bag(row)) if row.follow.is_some())
+    };
     let within = match input {
-        Input::Path(path) if path.is_dir() && !folder::has_storage(path) => {
-            let newest = newest(path).ok_or_else(|| explain(path, &[], true))?;
-            Some(newest)
+        Input::Path(path) if path.is_dir() && !folder::is_growing(path) => {
+            let newest = folder::newest(path, grows).ok_or_else(|| explain(path, &[], true))?;
+            Some(Input::Path(newest))
         }
         Input::Path(path) => closed(path).map(Input::Path),
         _ => None,
@@ -131,22 +137,6 @@ pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
         },
         _ => Err(fixed(input)),
     }
-}
-
-/// The most recently written recording in a folder.
-fn newest(folder: &Path) -> Option<Input> {
-    let entries = folder.read_dir().ok()?.flatten();
-    let bags = entries
-        .map(|entry| Input::Path(entry.path()))
-        .filter(|input| match input {
-            Input::Path(path) if path.is_dir() => folder::has_storage(path),
-            _ => matches!(sniff(input), Ok(InputKind::Bag(row)) if row.follow.is_some()),
-        });
-    let written = |input: &Input| match input {
-        Input::Path(path) => path.metadata().and_then(|meta| meta.modified()).ok(),
-        _ => None,
-    };
-    bags.max_by_key(written)
 }
 
 fn fixed(input: &Input) -> Error {

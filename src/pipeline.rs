@@ -2,6 +2,7 @@
 
 use crate::base::words::worded;
 mod collect;
+mod contents;
 #[cfg(feature = "render")]
 mod draw;
 #[cfg(feature = "render")]

@@ -22,7 +22,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["csv"],
     ]),
     ("bag", &[
-        &["checksum", "decompress", "model", "unknown"],
+        &["checksum", "decompress", "model", "split", "unknown"],
         &["source"],
         &["adapters", "input", "moved", "straight"],
         &["remote"],
@@ -75,6 +75,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["baseline", "difference", "report"],
     ]),
     ("pipeline", &[
+        &["contents"],
         &["inputs"],
         &["collect", "draw", "phases", "purpose"],
         &["figure", "fit", "probe", "unfolded", "verify"],

@@ -18,7 +18,7 @@ use bagreel::{Mission, Reading, read};
 use parquet::record::{Field, Row};
 use proptest::prelude::*;
 
-use crate::support::{self, parquet_rows, rosbag1};
+use crate::support::{self, mcap, parquet_rows, rosbag1};
 
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
@@ -161,6 +161,50 @@ fn every_bag_has_exactly_one_row() {
         &["tables", "bags", "-o", "u", "--on-error", "fail"],
         1,
     );
+}
+
+#[test]
+fn copies_and_conversions_are_counted_and_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let bags = dir.path().join("bags");
+    fs::create_dir(&bags).unwrap();
+    let bag = support::small();
+    let mut other = bag.clone();
+    let last = other.messages.last_mut().unwrap();
+    last.1 += 1;
+    for (name, bytes) in [
+        ("a.bag", rosbag1::write(&bag, rosbag1::Pack::None, 4000)),
+        ("b.bag", rosbag1::write(&bag, rosbag1::Pack::Lz4, 9000)),
+        ("c.mcap", mcap::write(&bag, &mcap::Options::default())),
+        ("d.bag", rosbag1::write(&other, rosbag1::Pack::None, 4000)),
+        (
+            "empty.bag",
+            rosbag1::write(&support::Recording::default(), rosbag1::Pack::None, 4000),
+        ),
+    ] {
+        fs::write(bags.join(name), bytes).unwrap();
+    }
+    let said = ends(dir.path(), &["tables", "bags", "-o", "t"], 0);
+    let note = "note: 3 of 5 bags contain the same messages as another, and all are counted: \
+        bags/a.bag, bags/b.bag and bags/c.mcap\n";
+    assert!(said.contains(note), "{said}");
+    let table = dir.path().join("t");
+    let uris = texts(&table, "bags", "uri");
+    let contents = texts(&table, "bags", "content");
+    let of = |name: &str| {
+        let at = uris.iter().position(|uri| uri.ends_with(name)).unwrap();
+        contents[at].as_str()
+    };
+    assert!(
+        of("a.bag") == of("b.bag") && of("a.bag") == of("c.mcap"),
+        "{contents:?}"
+    );
+    assert!(
+        of("d.bag") != of("a.bag") && of("d.bag").len() == 16,
+        "{contents:?}"
+    );
+    assert_eq!(of("empty.bag"), "");
+    assert_eq!(sum(&table, "bags", "messages"), sum(&table, "counts", "n"));
 }
 
 #[test]

@@ -34,6 +34,13 @@ fn mcap2(path: &Path, number: i64) {
 
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - run_0.mcap\n";
 
+/// Two parts of one ROS 1 recording, and the first of the next.
+const PARTS: [&str; 3] = [
+    "r_2024-05-03-14-03-22_0.bag",
+    "r_2024-05-03-14-08-22_1.bag",
+    "r_2024-05-03-15-00-00_0.bag",
+];
+
 /// How commands that take one mission treat a folder.
 enum Is {
     /// One recording.
@@ -66,6 +73,12 @@ const FOLDERS: &[Row] = &[
     ("two names", |f| { mcap2(&f.join("a_0.mcap"), 1); mcap2(&f.join("b_0.mcap"), 2); }, Is::Refused("2 recordings: a_0.mcap and b_0.mcap"), 2),
     ("copies", |f| { mcap2(&f.join("a.mcap"), 1); mcap2(&f.join("b.mcap"), 1); }, Is::Refused("2 recordings: a.mcap and b.mcap"), 2),
     ("two below", |f| { mcap2(&f.join("x/a.mcap"), 1); bag1(&f.join("y/b.bag"), 2); }, Is::Refused("2 recordings: x/a.mcap and y/b.bag"), 2),
+    ("split bags", |f| { bag1(&f.join(PARTS[0]), 1); bag1(&f.join(PARTS[1]), 2); }, Is::One, 0),
+    ("split bags twice", |f| {
+        for (number, name) in (1..).zip(PARTS) { bag1(&f.join("day").join(name), number); }
+    }, Is::Refused("2 recordings: day/r_2024-05-03-14-03-22_0.bag to r_2024-05-03-14-08-22_1.bag and day/r_2024-05-03-15-00-00_0.bag"), 2),
+    ("a split bag is missing", |f| { bag1(&f.join(PARTS[0]), 1); bag1(&f.join("r_2024-05-03-14-08-22_2.bag"), 2); },
+        Is::Refused("2 recordings: r_2024-05-03-14-03-22_0.bag and r_2024-05-03-14-08-22_2.bag"), 2),
     ("empty", |f| fs::write(f.join("notes.txt"), "no bag").unwrap(), Is::Refused("a folder without a recording"), 0),
 ];
 
@@ -151,18 +164,79 @@ fn a_folder_of_one_recording_has_the_counts_of_its_files() {
 }
 
 #[test]
+fn a_folder_of_split_bags_is_the_mission_of_its_parts() {
+    let all = made();
+    let parts = [PARTS[0], PARTS[1]].map(|part| format!("split bags/{part}"));
+    let run = |inputs: &[&str]| {
+        let args = ["render", "-o", "-", "--format", "json", "-q"];
+        let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .current_dir(all.path())
+            .args(args.iter().chain(inputs))
+            .output()
+            .unwrap();
+        assert!(done.status.success() && done.stderr.is_empty(), "{done:?}");
+        String::from_utf8(done.stdout).unwrap()
+    };
+    assert_eq!(run(&["split bags"]), run(&[&parts[0], &parts[1]]));
+}
+
+#[test]
+fn a_missing_part_is_a_loss() {
+    let all = tempfile::tempdir().unwrap();
+    for (folder, number, said) in [
+        (
+            "one",
+            2,
+            "part 1 is missing between `run_0.mcap` and `run_2.mcap`",
+        ),
+        (
+            "many",
+            12,
+            "parts 1 to 11 are missing between `run_0.mcap` and `run_12.mcap`",
+        ),
+    ] {
+        mcap2(&all.path().join(folder).join("run_0.mcap"), 1);
+        mcap2(
+            &all.path().join(folder).join(format!("run_{number}.mcap")),
+            2,
+        );
+        for line in [
+            "render F -o out.json",
+            "events F",
+            "info F",
+            "extract F -o out.csv",
+            "tables F -o fleet",
+        ] {
+            let (code, errors, text) = bagreel(all.path(), line, folder);
+            assert_eq!(code, 3, "{line}: {errors}");
+            assert!(
+                line.starts_with("tables") || errors.contains(said),
+                "{line}: {errors} {text}"
+            );
+        }
+    }
+}
+
+#[test]
 fn info_and_tables_take_several_recordings_as_a_fleet() {
     let all = made();
     for (name, _, is, rows) in FOLDERS {
         let (code, said, text) = bagreel(all.path(), "info F --format csv", name);
         if name == &"empty" {
             assert_eq!(code, 1, "{said}");
+            let (code, said, _) = bagreel(all.path(), "tables F -o fleet", name);
+            assert!(
+                code == 1 && said.contains("a folder without bags"),
+                "{said}"
+            );
             continue;
         }
         assert_eq!(text.lines().count() - 1, (*rows).max(1), "{name}: {text}");
         let (code, said, _) = bagreel(all.path(), "tables F -o fleet", name);
         let bags = match (is, rows) {
+            (Is::One, _) if *name == "split bags" => "2 bags".to_owned(),
             (Is::One, _) => "1 bag".to_owned(),
+            (_, 2) if *name == "split bags twice" => "3 bags".to_owned(),
             (_, rows) => format!("{rows} bags"),
         };
         assert!(

@@ -17,7 +17,7 @@ _NUMBERS = {
 }  # fmt: skip
 _COLUMNS = {
     "counts": "mission bag format period_ns win start_ns end_ns topic type node node_role n bytes first_ns last_ns max_gap_ns",
-    "bags": "uri mission etag file_bytes format tier is_complete messages start_ns end_ns period_ns origin_ns lost "
+    "bags": "uri mission etag file_bytes format tier is_complete messages content start_ns end_ns period_ns origin_ns lost "
     "error bagreel schema_version",
 }
 

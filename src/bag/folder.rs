@@ -1,10 +1,14 @@
-//! The recordings in a folder: a rosbag2 folder is one recording, and so is every other bag file below it.
+//! The recordings in a folder: a rosbag2 folder is one recording, and so are the parts of a split ROS 1 recording and
+//! every other bag file below it.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use super::InputKind;
 use super::input::{Input, file_name};
+use super::split;
 use crate::base::error::{Error, Result};
 use crate::base::words;
 
@@ -13,29 +17,67 @@ const DEEPEST: usize = 16;
 /// The most recordings that an error lists.
 const LISTED: usize = 8;
 
-/// The only recording in a folder: the folder itself, or one bag in it.
+/// A recording: a file, a rosbag2 folder, or the parts of a split ROS 1 recording, in order.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Recording(Vec<PathBuf>);
+
+impl Recording {
+    /// A file or a rosbag2 folder.
+    pub(crate) fn of(path: PathBuf) -> Self {
+        Self(vec![path])
+    }
+
+    /// Its files, at least one.
+    pub(crate) fn paths(&self) -> &[PathBuf] {
+        &self.0
+    }
+
+    /// Its files as the inputs of one mission.
+    pub(crate) fn inputs(&self) -> Vec<Input> {
+        self.0.iter().cloned().map(Input::Path).collect()
+    }
+
+    /// Its name, relative to a folder: `run.bag`, `run_0.bag to run_3.bag`, `.` for the folder itself.
+    pub(crate) fn name_in(&self, folder: &Path) -> String {
+        let name = |path: &PathBuf| match path.strip_prefix(folder).unwrap_or(path) {
+            own if own == Path::new("") => ".".to_owned(),
+            below => below.display().to_string(),
+        };
+        match &self.0[..] {
+            [first, .., last] => format!("{} to {}", name(first), file_name(last)),
+            all => all.first().map_or_else(String::new, name),
+        }
+    }
+}
+
+/// The inputs of an input: the parts of a split ROS 1 recording for the folder of it, else the input itself.
+pub(crate) fn parts_of(input: &Input) -> Vec<Input> {
+    let only = match input {
+        Input::Path(path) if path.is_dir() => only_recording(path).ok(),
+        _ => None,
+    };
+    let split = only.filter(|only| only.0.len() > 1);
+    split.map_or_else(|| vec![input.clone()], |split| split.inputs())
+}
+
+/// The only recording in a folder: the folder itself, or one in it.
 ///
 /// # Errors
 /// [`Error::UnknownBag`] for a folder without a recording, [`Error::Usage`] for one with several, which lists them.
-pub(crate) fn only_recording(folder: &Path) -> Result<PathBuf> {
+pub(crate) fn only_recording(folder: &Path) -> Result<Recording> {
     let mut found = recordings(folder)?;
     // If the folder has files of its own, links are not part of the recording.
-    if found.iter().any(|path| !path.is_symlink()) {
-        found.retain(|path| !path.is_symlink());
+    let is_link = |one: &Recording| one.0.iter().any(|path| path.is_symlink());
+    if found.iter().any(|one| !is_link(one)) {
+        found.retain(|one| !is_link(one));
     }
     match &found[..] {
         [] => Err(super::explain(folder, &[], true)),
         [one] => Ok(one.clone()),
         // Other files beside a recording's are reported when it is read.
-        [first, ..] if first == folder => Ok(first.clone()),
+        [first, ..] if first.0 == [folder] => Ok(first.clone()),
         all => {
-            let name = |path: &PathBuf| {
-                path.strip_prefix(folder)
-                    .unwrap_or(path)
-                    .display()
-                    .to_string()
-            };
-            let names: Vec<String> = all.iter().map(name).collect();
+            let names: Vec<String> = all.iter().map(|one| one.name_in(folder)).collect();
             let what = format!(
                 "`{}` is a folder with {} recordings: {}",
                 folder.display(),
@@ -48,14 +90,64 @@ pub(crate) fn only_recording(folder: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The path of every recording below `folder`, sorted by name; the folder itself if it is one.
+/// Every recording below `folder`, sorted by name; the folder itself if it is one.
 ///
 /// # Errors
 /// Fails if the folder cannot be read.
-pub(crate) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn recordings(folder: &Path) -> Result<Vec<Recording>> {
     let mut bags = Vec::new();
     find(folder, DEEPEST, &mut bags)?;
-    Ok(bags)
+    let stems = bags.iter().map(|path| path.to_str().and_then(stem));
+    let parts = split::parts(stems.map(Option::unwrap_or_default));
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut whole: Vec<Vec<(u32, &PathBuf)>> = Vec::new();
+    for (path, part) in bags.iter().zip(parts) {
+        let (name, number) = part.unwrap_or_default();
+        let next = whole.len();
+        let place = match part {
+            Some(_) => *places.entry(name).or_insert(next),
+            None => next,
+        };
+        if place == next {
+            whole.push(Vec::new());
+        }
+        whole[place].push((number, path));
+    }
+    let ordered = whole.into_iter().map(|mut parts| {
+        // By number, of which 10 is after 9.
+        parts.sort_unstable();
+        Recording(parts.into_iter().map(|(_, path)| path.clone()).collect())
+    });
+    Ok(ordered.collect())
+}
+
+/// The path of a ROS 1 bag without its extension.
+fn stem(path: &str) -> Option<&str> {
+    path.strip_suffix(".active")
+        .unwrap_or(path)
+        .strip_suffix(".bag")
+}
+
+/// The most recently written file or rosbag2 folder below a folder of which `grows` is true.
+pub(crate) fn newest(folder: &Path, grows: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+    let found = recordings(folder).ok()?.into_iter();
+    let files = found.flat_map(|recording| recording.0).map(|path| {
+        // The first file of a rosbag2 recording is followed by others in its folder.
+        let own = path
+            .parent()
+            .filter(|parent| is_growing(parent) && is_storage(&path));
+        own.map_or_else(|| path.clone(), Path::to_owned)
+    });
+    let mut files: Vec<PathBuf> = files.collect();
+    files.sort_by_cached_key(|path| std::cmp::Reverse(written(path)));
+    files.into_iter().find(|path| grows(path))
+}
+
+/// The last time at which a file, or one in a folder, was written.
+fn written(path: &Path) -> Option<SystemTime> {
+    let inside = fs::read_dir(path).into_iter().flatten().flatten();
+    let inside = inside.filter_map(|entry| entry.metadata().ok()?.modified().ok());
+    inside.chain(path.metadata().ok()?.modified().ok()).max()
 }
 
 /// Adds every recording in `folder`, sorted by name: the folder itself if it is one, otherwise each bag file and the
@@ -83,14 +175,14 @@ fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// Whether a folder directly contains rosbag2 storage files, such as those of a recording whose `metadata.yaml` is
-/// not written yet.
-pub(crate) fn has_storage(folder: &Path) -> bool {
-    let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.any(|entry| {
-        let path = entry.path();
-        file_name(&path) == "metadata.yaml" || is_storage(&path)
-    })
+/// Whether a folder is one rosbag2 recording, even if its `metadata.yaml` is not written yet: all of its storage files
+/// are parts of one name.
+pub(crate) fn is_growing(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    let storage = paths.iter().filter(|path| is_storage(path));
+    let stems: Option<BTreeSet<String>> = storage.map(|path| numbered(path)).collect();
+    stems.is_some_and(|stems| stems.len() == 1) || folder.join("metadata.yaml").is_file()
 }
 
 fn is_storage(path: &Path) -> bool {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::deferred::open_each;
-use crate::bag::folder::{only_recording, recordings};
+use crate::bag::folder::{Recording, only_recording, recordings};
 use crate::bag::input::{BagPlace, FormatRow, Input, Medium, file_name, size_on_disk};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
@@ -52,13 +52,19 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     let (files, links) = storage_and_links(&path);
     // A folder with nothing but links out of it is opened too, for this format's error message.
+    let mut parts = Vec::new();
     let is_here = links.is_empty() || !files.is_empty();
     if is_here && !path.join("metadata.yaml").is_file() {
         let only = only_recording(&path)?;
-        let is_part = only.parent() == Some(&path) && is_storage(&only);
-        if only != path && !is_part {
-            let mut one = open_each([Input::Path(only)], options);
-            return one.next().unwrap_or_else(|| Err(explain(&path, &[], true)));
+        match only.paths() {
+            [only] => {
+                let is_part = only.parent() == Some(&path) && is_storage(only);
+                if *only != path && !is_part {
+                    let mut one = open_each([Input::Path(only.clone())], options);
+                    return one.next().unwrap_or_else(|| Err(explain(&path, &[], true)));
+                }
+            }
+            several => parts = several.to_vec(),
         }
     }
     let mut folder = BagFolder {
@@ -76,7 +82,10 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         ),
     }
     let mut failed = None;
-    let files: Vec<Input> = folder.files(&path).into_iter().map(Input::Path).collect();
+    if parts.is_empty() {
+        parts = folder.files(&path);
+    }
+    let files: Vec<Input> = parts.into_iter().map(Input::Path).collect();
     folder.size = files.iter().filter_map(size_on_disk).sum();
     for part in open_each(files, options) {
         match part {
@@ -97,14 +106,16 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
 /// The storage files in a folder, ordered by number, without links out of it.
 fn storage(folder: &Path) -> Vec<PathBuf> {
     let (mut files, _) = storage_and_links(folder);
-    files.sort_by_cached_key(|p| {
-        let name = file_name(p);
-        let stem = name.split('.').next().unwrap_or_default();
-        let number = stem.rsplit('_').next().and_then(|n| n.parse::<u64>().ok());
-        (number, name)
-    });
+    files.sort_by_cached_key(|part| (number(part), file_name(part)));
     files.truncate(FILES);
     files
+}
+
+/// The number of a part: 2 of `run_2.mcap`.
+fn number(part: &Path) -> Option<u64> {
+    let name = file_name(part);
+    let stem = name.split('.').next().unwrap_or_default();
+    stem.rsplit('_').next()?.parse().ok()
 }
 
 /// The storage files in a folder, and links out of it that look like storage files.
@@ -150,6 +161,7 @@ impl BagFolder {
             }
         }
         if instead {
+            self.note_gaps(&there);
             return there;
         }
         // The error explains why there is no file.
@@ -157,15 +169,35 @@ impl BagFolder {
             return found;
         }
         let beside = recordings(path).unwrap_or_default();
-        let beside = beside
-            .iter()
-            .filter(|other| *other != path && !known.contains(*other));
+        let beside = beside.iter().flat_map(Recording::paths);
+        let beside = beside.filter(|other| *other != path && !known.contains(*other));
         for other in beside.take(FILES) {
             let name = other.strip_prefix(path).unwrap_or(other).display();
             let text = format!("`{name}` is not named in `metadata.yaml` and was left out");
             self.note(NoticeKind::Note, text);
         }
         found
+    }
+
+    /// Notes the numbers that are missing between these parts.
+    fn note_gaps(&mut self, parts: &[PathBuf]) {
+        let numbers = parts.iter().map(|part| number(part));
+        let numbers: Vec<Option<u64>> = numbers.collect();
+        for (names, numbers) in parts.windows(2).zip(numbers.windows(2)) {
+            let [Some(before), Some(after)] = numbers else {
+                continue;
+            };
+            let missing = (after - before).saturating_sub(1);
+            if missing > 0 {
+                let names = [&names[0], &names[1]].map(|name| file_name(name));
+                let which = match missing {
+                    1 => format!("part {} is", before + 1),
+                    _ => format!("parts {} to {} are", before + 1, after - 1),
+                };
+                let text = format!("{which} missing between `{}` and `{}`", names[0], names[1]);
+                self.note(NoticeKind::Damaged, text);
+            }
+        }
     }
 
     /// The error for a folder without any of its files.

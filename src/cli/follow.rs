@@ -104,10 +104,18 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         let text = file::read_text(path, budget::USER_TEXT)?;
         crate::gate::read(&text, path)
     };
+    let follow = Follow::new(reading, args.keep)?;
+    if args.what.is_dir() && follow.path() != args.what {
+        let newest = follow.path().display();
+        terminal.note(&format!(
+            "following `{newest}`, the newest recording in `{}`",
+            args.what.display()
+        ));
+    }
     let follower = Follower {
         args,
         expectation: args.expect.as_deref().map(expectation).transpose()?,
-        follow: Follow::new(reading, args.keep)?,
+        follow,
         live,
         format: match args.format {
             FollowFormat::Text => LogFormat::Text,

@@ -30,6 +30,14 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     for (_, why) in done.refused.iter().take(MOST_REPORTED) {
         terminal.failed(why);
     }
+    if !done.copies.is_empty() {
+        terminal.note(&format!(
+            "{} of {} contain the same messages as another, and all are counted: {}",
+            done.copies.len(),
+            words::count(done.bags, "bag"),
+            words::some_of(&done.copies, 4)
+        ));
+    }
     let seconds = terminal.seconds();
     let to = args.output.display();
     terminal.say(&format!(

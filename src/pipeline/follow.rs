@@ -5,6 +5,8 @@
 
 mod feed;
 
+use std::path::Path;
+
 use super::collect::Collected;
 use super::read::so_far;
 use super::{Reading, Render, Unwatched, show};
@@ -87,6 +89,11 @@ impl Follow {
             }
         }
         Ok(growth)
+    }
+
+    /// The path of the recording.
+    pub(crate) fn path(&self) -> &Path {
+        self.growing.path()
     }
 
     /// The number of connections and observations, which grows with every new fact.

@@ -1,10 +1,10 @@
 //! The bags of a mission, without duplicates.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
 
 use super::Reading;
+use super::contents::Contents;
 use crate::bag::moved::Moved;
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
@@ -15,14 +15,14 @@ use crate::base::time::{Span, Stamp};
 pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     let mut seen = BTreeSet::new();
     let (mut once, mut twice) = (Vec::new(), Vec::new());
-    for input in inputs {
-        let real = match input {
+    for input in inputs.iter().flat_map(bag::parts_of) {
+        let real = match &input {
             Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
             Input::Url(url) => PathBuf::from(url),
             Input::Stdin => PathBuf::from("-"),
         };
         if seen.insert(real) {
-            once.push(input.clone());
+            once.push(input);
         } else if input.is_pipe() {
             let what = format!(
                 "{} was given twice, but can be read only once",
@@ -127,9 +127,9 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
         span.map_or_else(|| Err(size()), |span| Ok((span.start, span.end)))
     };
     let contents = |input: &Input| {
-        let mut contents = Contents::default();
-        open(input)?.read(None, &mut contents).ok()?;
-        Some((contents.messages, contents.sum)).filter(|(messages, _)| *messages > 0)
+        let mut sink = ContentsSink::default();
+        open(input)?.read(None, &mut sink).ok()?;
+        sink.0.digest()
     };
     let mut alike: BTreeMap<_, Vec<&Input>> = BTreeMap::new();
     if near.len() > 1 {
@@ -153,28 +153,17 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
     Ok(())
 }
 
-/// The number of messages in a bag, and an order-independent checksum of their topics and times.
+/// The digest of a bag that is read.
 #[derive(Default)]
-struct Contents {
-    messages: u64,
-    sum: u64,
-    /// The topic of each connection.
-    topics: Vec<String>,
-}
+struct ContentsSink(Contents);
 
-impl Sink for Contents {
+impl Sink for ContentsSink {
     fn connection(&mut self, connection: &Connection) -> Want {
-        self.topics.push(connection.topic.to_string());
+        self.0.connection(connection.topic.as_str());
         Want::Stamps
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        let topic = self.topics.get(connection.0 as usize);
-        self.messages += stamps.len() as u64;
-        for stamp in stamps {
-            let mut hasher = DefaultHasher::new();
-            (topic, stamp.0).hash(&mut hasher);
-            self.sum = self.sum.wrapping_add(hasher.finish());
-        }
+        self.0.add(connection, stamps);
     }
 }

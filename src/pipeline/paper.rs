@@ -6,9 +6,9 @@ use std::fs;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::survey::{recordings, surveyed};
+use super::survey::{recordings, size, surveyed};
 use super::{Reading, Stage, Watch, read};
-use crate::bag::{self, Input};
+use crate::bag::Recording;
 use crate::base::digest::Sum;
 use crate::base::error::{Error, Result};
 use crate::draw::figure::{self, FigureKind, FigureOptions};
@@ -65,23 +65,23 @@ pub(crate) fn paper(job: &Paper, watch: &mut dyn Watch) -> Result<Papered> {
         path: &job.folder,
         names: BTreeSet::new(),
     };
-    let mut all = BTreeSet::new();
+    let (mut all, mut readable) = (BTreeSet::new(), Vec::new());
     for run in &job.runs {
         let below = if run.is_dir() {
             recordings(run)?
         } else {
-            vec![run.clone()]
+            vec![Recording::of(run.clone())]
         };
         all.extend(below);
     }
     for run in all {
         watch.stage(Stage::Read);
-        let name = run.display().to_string();
-        digests(&run, &mut sums)?;
-        let input = Input::Path(run);
-        let size = bag::size_on_disk(&input);
+        let name = run.name_in(Path::new(""));
+        for path in run.paths() {
+            digests(path, &mut sums)?;
+        }
         let reading = Reading {
-            inputs: vec![input],
+            inputs: run.inputs(),
             ..job.reading.clone()
         };
         let mission = read(&reading, watch);
@@ -93,9 +93,12 @@ pub(crate) fn paper(job: &Paper, watch: &mut dyn Watch) -> Result<Papered> {
             runs.push(Reconfiguration::new(&name, mission));
             bundle.figures(&name, mission, &mut done.remarks)?;
         }
-        let row: SurveyRow = surveyed(name, size, mission);
+        let row: SurveyRow = surveyed(name, size(&reading.inputs), mission);
         done.skipped |= !row.is_complete;
         done.remarks.extend(row.error.clone());
+        if row.error.is_none() {
+            readable.push(run);
+        }
         rows.push(row);
     }
     done.runs = rows.len();
@@ -105,7 +108,7 @@ pub(crate) fn paper(job: &Paper, watch: &mut dyn Watch) -> Result<Papered> {
         bundle.write(&format!("{name}.csv"), &csv(table)?)?;
     }
     bundle.write("SHA256SUMS", sums.as_bytes())?;
-    bundle.write("commands.sh", commands(job, &rows).as_bytes())?;
+    bundle.write("commands.sh", commands(job, &readable).as_bytes())?;
     bundle.write("README.md", README.as_bytes())?;
     bundle.write("CITATION.cff", CITATION.as_bytes())?;
     done.files = bundle.names.len();
@@ -142,21 +145,20 @@ fn digests(run: &Path, sums: &mut String) -> Result<()> {
 }
 
 /// The commands that make the bundle, and each of its parts again.
-fn commands(job: &Paper, rows: &[SurveyRow]) -> String {
-    let quoted = |path: &str| format!("'{}'", path.replace('\'', r"'\''"));
-    let runs: Vec<String> = job
-        .runs
-        .iter()
-        .map(|run| quoted(&run.display().to_string()))
-        .collect();
+fn commands(job: &Paper, readable: &[Recording]) -> String {
+    let quoted = |path: &PathBuf| {
+        let path = path.display().to_string();
+        format!("'{}'", path.replace('\'', r"'\''"))
+    };
+    let quoted = |paths: &[PathBuf]| paths.iter().map(quoted).collect::<Vec<_>>().join(" ");
     let mut text = format!(
         "#!/bin/sh\n# bagreel {}\nbagreel paper {}{} -o bundle\n",
         env!("CARGO_PKG_VERSION"),
-        runs.join(" "),
+        quoted(&job.runs),
         job.options
     );
-    for row in rows.iter().filter(|row| row.error.is_none()) {
-        let run = quoted(&row.path);
+    for run in readable {
+        let run = quoted(run.paths());
         let _ = writeln!(
             text,
             "bagreel info {run} --format csv\nbagreel events {run} --format csv"

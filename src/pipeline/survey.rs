@@ -1,10 +1,10 @@
 //! Reads every bag below a folder one by one, for a survey.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
-use crate::bag::{self, Input};
+use crate::bag::{self, Input, Recording};
 use crate::base::error::{Error, Result};
 use crate::export::tables::{TableFormat, writer};
 use crate::mission::Mission;
@@ -23,7 +23,7 @@ pub fn is_survey(input: &Input) -> bool {
     let Input::Path(path) = input else {
         return false;
     };
-    let is_one = |found: Vec<PathBuf>| found.len() == 1;
+    let is_one = |found: Vec<Recording>| found.len() == 1;
     path.is_dir() && !bag::recordings(path).is_ok_and(is_one)
 }
 
@@ -42,18 +42,13 @@ pub struct Survey {
 pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
     let bags = recordings(folder)?;
     let mut skipped = false;
-    let row = |path: PathBuf| {
-        let shown = match path.strip_prefix(folder).unwrap_or(&path) {
-            own if own == Path::new("") => ".".to_owned(),
-            below => below.display().to_string(),
-        };
-        let input = Input::Path(path);
-        let size = bag::size_on_disk(&input);
+    let row = |recording: Recording| {
         let one = Reading {
-            inputs: vec![input],
+            inputs: recording.inputs(),
             ..reading.clone()
         };
-        let row = surveyed(shown, size, read(&one, watch));
+        let shown = recording.name_in(folder);
+        let row = surveyed(shown, size(&one.inputs), read(&one, watch));
         skipped |= !row.is_complete;
         row
     };
@@ -65,17 +60,26 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
 ///
 /// # Errors
 /// If it cannot be read or contains no bag.
-pub(super) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn recordings(folder: &Path) -> Result<Vec<Recording>> {
     let bags = bag::recordings(folder)?;
     if bags.is_empty() {
-        let hint = "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned();
-        return Err(Error::UnknownBag {
-            path: folder.to_owned(),
-            looks_like: "a folder without bags".to_owned(),
-            hint,
-        });
+        return Err(no_bags(folder));
     }
     Ok(bags)
+}
+
+/// The error of a folder without bags.
+pub(super) fn no_bags(folder: &Path) -> Error {
+    Error::UnknownBag {
+        path: folder.to_owned(),
+        looks_like: "a folder without bags".to_owned(),
+        hint: "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned(),
+    }
+}
+
+/// The size of a recording in bytes, if known.
+pub(super) fn size(inputs: &[Input]) -> Option<u64> {
+    inputs.iter().map(bag::size_on_disk).sum()
 }
 
 /// The row of a bag that was read, or not.

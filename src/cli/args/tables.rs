@@ -53,8 +53,8 @@ pub(crate) struct TablesArgs {
 pub(crate) const HELP: &str = "\
 counts: mission, bag, format, period_ns, win, start_ns, end_ns, topic, type, node, node_role, n, bytes,
         first_ns, last_ns, max_gap_ns
-bags:   uri, mission, etag, file_bytes, format, tier, is_complete, messages, start_ns, end_ns, period_ns, origin_ns,
-        lost, error, bagreel, schema_version
+bags:   uri, mission, etag, file_bytes, format, tier, is_complete, messages, content, start_ns, end_ns, period_ns,
+        origin_ns, lost, error, bagreel, schema_version
 
 Exit codes: 0 done, 1 failed or a store refused a bag (run again), 2 usage error, 3 done, but `bags` lists unreadable or
 damaged bags.";

@@ -16,6 +16,7 @@ use crate::base::name::NodeName;
 use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::times::{SeriesId, Stamps};
+use crate::pipeline::contents::Contents;
 
 /// The options of counting.
 #[derive(Clone, Copy, Debug)]
@@ -119,6 +120,7 @@ fn row(planned: &PlannedBag, tally: &Tally) -> FleetBag {
         tier: None,
         is_complete: false,
         messages: 0,
+        content: None,
         span: None,
         period: tally.period,
         origin: planned.origin,
@@ -143,6 +145,7 @@ impl FleetBag {
         self.tier = Some(report.tier);
         self.is_complete = report.complete && lost.is_empty();
         self.messages = taken.messages;
+        self.content = taken.contents.digest();
         self.span = taken.span;
         self.lost = (!lost.is_empty()).then(|| lost.join("; "));
     }
@@ -200,6 +203,7 @@ struct BagTally {
     stamps: Stamps,
     notices: Notices,
     messages: u64,
+    contents: Contents,
     span: Option<Span>,
 }
 
@@ -213,6 +217,7 @@ impl BagTally {
             stamps: Stamps::default(),
             notices: Notices::new(),
             messages: 0,
+            contents: Contents::default(),
             span: None,
         }
     }
@@ -339,6 +344,7 @@ impl Sink for BagTally {
         let series = [self.stamps.series(), self.stamps.series()];
         let sent = self.senders.entry(sender.clone()).or_default();
         sent.series.extend(series);
+        self.contents.connection(connection.topic.as_str());
         self.sources.push((sender, series));
         Want::Stamps
     }
@@ -354,6 +360,7 @@ impl Sink for BagTally {
         };
         self.stamps.add(series, stamps, sizes);
         self.messages += stamps.len() as u64;
+        self.contents.add(connection, stamps);
         for at in stamps {
             let end = at.plus(1);
             let span = self.span.get_or_insert(Span::new(*at, end));
@@ -369,6 +376,7 @@ impl Sink for BagTally {
             return;
         };
         *sent.chunk_counts.entry(window).or_default() += count;
+        self.contents.add_many(connection, window, count);
         self.messages += count;
     }
 

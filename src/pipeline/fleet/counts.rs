@@ -7,7 +7,7 @@ use crate::bag::Tier;
 use crate::base::time::{Period, Span, Stamp};
 
 /// The version of both tables' columns, raised when the meaning of one changes.
-pub const SCHEMA_VERSION: i64 = 2;
+pub const SCHEMA_VERSION: i64 = 3;
 
 /// The messages of one publisher on one topic in one window: a row of the table `counts`. Windows without messages have
 /// no row.
@@ -124,6 +124,9 @@ pub struct FleetBag {
     pub is_complete: bool,
     /// The number of messages, in the counted part of the time.
     pub messages: u64,
+    /// A digest of the topics and times of these messages, the same for copies of a bag and conversions of it; none
+    /// without messages. Chunks counted as a whole add their windows instead of times.
+    pub content: Option<String>,
     /// From the first message to the last plus 1 ns; unknown if every chunk was counted as a whole.
     pub span: Option<Span>,
     /// The length of a window.

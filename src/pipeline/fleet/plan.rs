@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use regex::Regex;
 
-use crate::bag::{self, Input, OpenOptions};
+use crate::bag::{self, Input, OpenOptions, Recording};
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Stamp};
 use crate::base::words::worded;
@@ -145,7 +145,7 @@ impl FleetPlan {
 /// Makes a plan of bags, folders with bags below them, and prefixes of stores, which end in a slash.
 ///
 /// A folder that is one ROS 2 recording is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 without
-/// a gap) are one mission, `x`; so are the files `x/x_0.mcap`, … of a ROS 2 recording that are given individually;
+/// a gap) are one mission, `x`; so are the dated ones that ROS 1 records (`x_2024-05-03-14-03-22_0.bag`, …), and the files `x/x_0.mcap`, … of a ROS 2 recording that are given individually;
 /// every other bag is its own mission, named by its path without the format's extension.
 ///
 /// # Errors
@@ -186,7 +186,9 @@ fn listed(source: &str) -> Result<Vec<String>> {
         }
         Input::Path(path) if path.is_dir() => {
             let text = |path: PathBuf| path.to_string_lossy().into_owned();
-            Ok(bag::recordings(&path)?.into_iter().map(text).collect())
+            let found = bag::recordings(&path)?;
+            let files = found.iter().flat_map(Recording::paths).cloned();
+            Ok(files.map(text).collect())
         }
         _ => Ok(vec![source.to_owned()]),
     }
@@ -251,7 +253,9 @@ fn split_groups(stems: &[String]) -> Vec<String> {
                 .zip(0..)
                 .all(|(number, place)| *number == place)
     };
-    let mission = |stem: &String| match numbered(stem) {
+    let dated = bag::split_parts(stems.iter().map(String::as_str));
+    let mission = |(stem, part): (&String, Option<(&str, u32)>)| match part.or(numbered(stem)) {
+        Some((name, _)) if part.is_some() => name.to_owned(),
         // ROS 2 names the files of the recording `run` like `run/run_0.mcap`.
         Some((name, _)) if in_own_folder(name) => {
             let folder = Path::new(name).parent();
@@ -260,7 +264,7 @@ fn split_groups(stems: &[String]) -> Vec<String> {
         Some((name, _)) if is_split(name) => name.to_owned(),
         _ => stem.clone(),
     };
-    stems.iter().map(mission).collect()
+    stems.iter().zip(dated).map(mission).collect()
 }
 
 /// A name and its number: `run` and 12 of `run_12`.
@@ -330,6 +334,11 @@ mod tests {
             "d/b_2.bag",
             "c_0.db3",
         ];
+        let dated = [
+            "d/r_2024-05-03-14-03-22_0.bag",
+            "d/r_2024-05-03-14-08-22_1.bag.active",
+        ];
+        assert_eq!(missions_of(&dated, None), ["d/r_2024-05-03-14-03-22"; 2]);
         let expected = ["d/a", "d/a", "d/b_1", "d/b_2", "c_0"];
         assert_eq!(missions_of(&split, None), expected);
         assert_eq!(

@@ -37,6 +37,7 @@ const BAGS: &[ColumnOf<(), FleetBag>] = columns! {
     "tier" Text |(), bag| TableCell::known(bag.tier, |tier| TableCell::text(tier.word()));
     "is_complete" Flag |(), bag| TableCell::Flag(bag.is_complete);
     "messages" I64 |(), bag| TableCell::count(bag.messages);
+    "content" Text |(), bag| text(bag.content.as_deref());
     "start_ns" I64 |(), bag| TableCell::known(bag.span, |span| nanos(span.start));
     "end_ns" I64 |(), bag| TableCell::known(bag.span, |span| nanos(span.end));
     "period_ns" I64 |(), bag| TableCell::Int(bag.period.nanos());

@@ -23,6 +23,7 @@ use crate::export::sink::OutputSink;
 use crate::export::tables::{TableFormat, writer::Writer};
 use crate::export::target::Target;
 use crate::pipeline::read::files;
+use crate::pipeline::survey::no_bags;
 use crate::pipeline::{Stage, Watch};
 
 /// The treatment of unreadable bags.
@@ -84,6 +85,8 @@ pub struct Tabled {
     pub messages: u64,
     /// The number of rows of `counts`.
     pub rows: usize,
+    /// The bags that contain the same messages as another one of this run, sorted; all of them are counted.
+    pub copies: Vec<String>,
     /// Bags that a store refused, with the reasons; they have no row, and another run counts them.
     pub refused: Vec<(String, String)>,
 }
@@ -98,6 +101,9 @@ const FAR_JOBS: usize = 8;
 pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
     watch.stage(Stage::Count);
     let mut plan = plan(&job.sources, &job.planning)?;
+    if let (true, [first, ..]) = (plan.bags.is_empty(), &job.sources[..]) {
+        return Err(no_bags(Path::new(first)));
+    }
     if let Some((index, count)) = job.shard {
         plan = plan.shard(index, count)?;
     }
@@ -121,9 +127,16 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
         }
         drop(to);
         let mut done = Tabled::default();
+        let mut alike: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let mut outcome = Ok(());
         for (at, one) in from.into_iter().enumerate() {
             watch.progress(at as u64 + 1, plan.bags.len() as u64);
+            if let Ok(BagOutcome::Written { counted }) = &one
+                && let Some(content) = &counted.bag.content
+            {
+                let same = alike.entry(content.clone()).or_default();
+                same.push(counted.bag.uri.clone());
+            }
             outcome = outcome.and(one.map(|one| done.take(one)));
             if watch.stopped() {
                 outcome = Err(Error::Interrupted);
@@ -133,6 +146,9 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
             }
         }
         done.refused.sort();
+        let copies = alike.into_values().filter(|same| same.len() > 1);
+        done.copies = copies.flatten().collect();
+        done.copies.sort();
         outcome.map(|()| done)
     })
 }
