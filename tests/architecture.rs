@@ -313,11 +313,11 @@ fn the_top_level_modules_are_the_stations() {
     let expected: BTreeSet<&str> = STATIONS.iter().copied().chain(page).collect();
     assert_eq!(
         reported, expected,
-        "the stations, and what the front page is made of"
+        "the stations and the re-exported modules"
     );
     assert!(
         all.iter().all(|f| !f.code.contains("#[path")),
-        "a file stands where its name says"
+        "a file is not where its name requires"
     );
 }
 
@@ -359,7 +359,7 @@ fn files_of_a_station_only_use_lower_levels() {
         {
             let name = file.parts()[1];
             let Some(own) = floor(name) else {
-                wrong.push(format!("{} stands on no floor", file.path));
+                wrong.push(format!("{} belongs to no layer", file.path));
                 continue;
             };
             for used in file

@@ -168,7 +168,7 @@ fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), a
     let (_, rest) = rest.split_once('>').unwrap();
     let data: Value = serde_json::from_str(&rest[..rest.find("</script>").unwrap()]).unwrap();
     let mut shown = vec![0; expected.len()];
-    for row in data["told"].as_array().unwrap() {
+    for row in data["reported"].as_array().unwrap() {
         shown[place(&row[0])] = row[1].as_u64().unwrap();
     }
     let numbers: Vec<u64> = expected.iter().map(|shown| shown.len() as u64).collect();
@@ -186,8 +186,8 @@ fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), a
             .any(|mark| class.split(' ').any(|w| w == *mark))
     };
     let mut marked = vec![false; expected.len()];
-    for life in graph["lives"].as_array().unwrap() {
-        let runs: Vec<usize> = life[0].as_array().unwrap().iter().map(place).collect();
+    for runs in graph["runs"].as_array().unwrap() {
+        let runs: Vec<usize> = runs[0].as_array().unwrap().iter().map(place).collect();
         let mut window = 0;
         for run in runs.chunks(2) {
             window += run[0];

@@ -139,7 +139,7 @@ fn a_file_names_or_replaces_phases() {
             .contains("more names")
     );
     let svg = figure(&example(), &["--kind", "lives", "--phases", "none"]).unwrap();
-    assert!(!svg.contains("(+4)"), "no phase is told");
+    assert!(!svg.contains("(+4)"), "phases are named");
 }
 
 /// A rectangle around each text, in pixels: letters of the bundled font are at least so wide.

@@ -85,7 +85,7 @@ proptest! {
         let found = measure::measure(&plan, &layout);
         prop_assert_eq!(found.overlaps, 0, "boxes overlap");
         prop_assert_eq!(found.through, 0, "an edge runs through a foreign box");
-        prop_assert_eq!(found.foreign, 0, "a cluster holds what is not its own");
+        prop_assert_eq!(found.foreign, 0, "a cluster contains foreign boxes");
         prop_assert_eq!(found.label_overlaps, 0, "a label covers a box or a label");
         prop_assert!(!plan.is_labelled || found.crossed == 0, "a line runs through the label of another");
         prop_assert_eq!(layout.orientation, orientation);

@@ -234,12 +234,12 @@ mod bridge {
     use super::{complaint, follow, follow_for, graph};
 
     /// Sends a message to the client.
-    fn say(to: &mut WebSocket<TcpStream>, message: &Value) {
+    fn send(to: &mut WebSocket<TcpStream>, message: &Value) {
         to.send(Message::text(message.to_string())).unwrap();
     }
 
     /// Receives the client's next message.
-    fn hear(from: &mut WebSocket<TcpStream>) -> Value {
+    fn receive(from: &mut WebSocket<TcpStream>) -> Value {
         serde_json::from_str(from.read().unwrap().to_text().unwrap()).unwrap()
     }
 
@@ -261,7 +261,7 @@ mod bridge {
             Ok(response)
         };
         let mut client = accept_hdr(stream, protocol).unwrap();
-        say(
+        send(
             &mut client,
             &json!({"op": "serverInfo", "name": "robot", "capabilities": ["connectionGraph"]}),
         );
@@ -270,14 +270,14 @@ mod bridge {
 
     /// Advertises a channel; returns the client's subscription to it.
     fn begin(client: &mut WebSocket<TcpStream>) -> u64 {
-        assert_eq!(hear(client)["op"], "subscribeConnectionGraph");
-        say(
+        assert_eq!(receive(client)["op"], "subscribeConnectionGraph");
+        send(
             client,
             &json!({"op": "advertise", "channels": [{
                 "id": 7, "topic": "/scan", "encoding": "cdr", "schemaName": "std_msgs/msg/Empty", "schema": "",
             }]}),
         );
-        let asked = hear(client);
+        let asked = receive(client);
         assert_eq!(asked["subscriptions"][0]["channelId"], 7, "{asked}");
         asked["subscriptions"][0]["id"].as_u64().unwrap()
     }
@@ -298,9 +298,9 @@ mod bridge {
     fn serve(stream: TcpStream) {
         let mut client = open(stream);
         let subscription = begin(&mut client);
-        say(&mut client, &update(&["/lidar"]));
+        send(&mut client, &update(&["/lidar"]));
         scans(&mut client, subscription);
-        say(&mut client, &update(&[]));
+        send(&mut client, &update(&[]));
         sleep(Duration::from_millis(1500));
     }
 
@@ -312,7 +312,7 @@ mod bridge {
             for is_last in [false, true] {
                 let mut client = open(listener.accept().unwrap().0);
                 let subscription = begin(&mut client);
-                say(&mut client, &update(&["/lidar"]));
+                send(&mut client, &update(&["/lidar"]));
                 scans(&mut client, subscription);
                 if !is_last {
                     let _ = client.close(None);
@@ -320,11 +320,11 @@ mod bridge {
                     continue;
                 }
                 // The lidar left, which servers do not report, since its topic still has a subscriber.
-                assert_eq!(hear(&mut client)["op"], "unsubscribeConnectionGraph");
-                assert_eq!(hear(&mut client)["op"], "subscribeConnectionGraph");
+                assert_eq!(receive(&mut client)["op"], "unsubscribeConnectionGraph");
+                assert_eq!(receive(&mut client)["op"], "subscribeConnectionGraph");
                 let mut whole = update(&[]);
                 whole["publishedTopics"] = json!([]);
-                say(&mut client, &whole);
+                send(&mut client, &whole);
                 sleep(Duration::from_secs(3));
             }
         });

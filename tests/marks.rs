@@ -158,11 +158,7 @@ fn shown(log: &Log, svg: &str, at: &str) -> BTreeSet<u64> {
         if ["start", "end", "event", "letter", "handover"].contains(&mark.class)
             && !mark.title.is_empty()
         {
-            assert!(
-                log.sentences.contains(&mark.title),
-                "{at} says: {}",
-                mark.title
-            );
+            assert!(log.sentences.contains(&mark.title), "{at}: {}", mark.title);
         }
         all.extend(mark.ids);
     }
@@ -271,9 +267,11 @@ fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
     assert_eq!(with(&frame, "mark"), headlines.keys().copied().collect());
     let html = rendered(bag, &["--period", "60"], "page.html").unwrap();
     let data = page(&html);
-    let hands = data["hands"].as_array().unwrap().iter();
-    let hands: BTreeSet<u64> = hands.map(|hand| hand[3].as_u64().unwrap()).collect();
-    assert_eq!(hands, handed);
+    let takeovers = data["takeovers"].as_array().unwrap().iter();
+    let takeovers: BTreeSet<u64> = takeovers
+        .map(|takeover| takeover[3].as_u64().unwrap())
+        .collect();
+    assert_eq!(takeovers, handed);
 }
 
 #[test]
@@ -308,7 +306,7 @@ fn the_marks_of_frames_strips_and_pages_are_events_too() {
         let data = page(&html);
         let id = |value: &Value| value.as_u64().unwrap();
         let lists = |key: &str| data[key].as_array().unwrap().iter();
-        let lines = lists("told").flat_map(|shown| shown[3].as_array().unwrap());
+        let lines = lists("reported").flat_map(|shown| shown[3].as_array().unwrap());
         let lines: BTreeSet<u64> = lines.map(|line| id(&line[4])).collect();
         assert!(
             lines.iter().all(|id| log.headlines().contains_key(id)),

@@ -126,7 +126,7 @@ fn the_page_in_a_browser_shows_the_mission() {
     let pages = rendered(&mission, &["html", "svg", "json", "md"]);
     let hostile = rendered(&running(&HOSTILE, 12), &["html"]);
     let folded = rendered_with(&mission, &["html"], &["--collapse", "/nav,/sensors"]);
-    let board = rendered_with(&mission, &["html"], &["--view", "board"]);
+    let timeline = rendered_with(&mission, &["html"], &["--view", "board"]);
     let file = |folder: &TempDir, name: &str| folder.path().join(name);
     let files = [
         file(&pages, "x.html"),
@@ -134,7 +134,7 @@ fn the_page_in_a_browser_shows_the_mission() {
         file(&hostile, "x.html"),
         file(&pages, "x.svg"),
         file(&folded, "x.html"),
-        file(&board, "x.html"),
+        file(&timeline, "x.html"),
         file(&pages, "x.md"),
     ];
     browser::drive("drive.py", files);
@@ -173,7 +173,7 @@ fn collapsed_elements_are_listed_in_page_and_report() {
     }
     assert!(names(1).contains(&json!("/nav")) && !names(1).contains(&json!("/nav/planner")));
     let place = names(1).iter().position(|n| n == "/nav").unwrap();
-    let held = data["graphs"][1]["holds"][place].as_array().unwrap();
+    let held = data["graphs"][1]["members"][place].as_array().unwrap();
     assert!(
         held.iter()
             .any(|at| names(0)[usize::try_from(at.as_u64().unwrap()).unwrap()] == "/nav/planner")
@@ -257,7 +257,7 @@ fn holds_its_windows(data: &Value, mission: &Value) {
     };
     assert!(list("starts").eq(of("start_ns")) && list("ends").eq(of("end_ns")));
     let mut shown = 0;
-    for at in data["told"].as_array().unwrap() {
+    for at in data["reported"].as_array().unwrap() {
         let window = usize::try_from(at[0].as_u64().unwrap()).unwrap();
         let (start, end) = (
             list("starts").nth(window).unwrap(),
@@ -323,7 +323,7 @@ fn a_page_has_the_exact_rate_of_each_window() {
             let (Some(place), Some(hz)) = (place, topic["hz"].as_f64()) else {
                 continue;
             };
-            let lists = &graph["lives"][place];
+            let lists = &graph["runs"][place];
             let state = graph["classes"][value_at(&lists[0], w)].as_str().unwrap();
             if state == "off" || graph["kinds"][place] != 1 {
                 continue;
@@ -387,7 +387,7 @@ fn bars_and_jumps_count_headlines() {
         .collect();
     let is_headline = |e: &&Value| e["quiet"] != true && !parts.contains(&&e["id"]);
     let entries = ledger.iter().filter(is_headline).count() as u64;
-    let shown: u64 = data["told"]
+    let shown: u64 = data["reported"]
         .as_array()
         .unwrap()
         .iter()
@@ -395,7 +395,7 @@ fn bars_and_jumps_count_headlines() {
         .sum();
     assert!(shown > 10);
     assert_eq!(shown, entries);
-    for window in data["told"].as_array().unwrap() {
+    for window in data["reported"].as_array().unwrap() {
         assert_eq!(
             usize::try_from(window[1].as_u64().unwrap()).unwrap(),
             window[3].as_array().unwrap().len()

@@ -542,7 +542,7 @@ fn a_signature_is_sent_but_not_printed() {
 fn the_command_prints_the_same_for_an_object_and_a_file() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let server = Server::with(&[("warehouse.bag", fs::read(&path).unwrap())]);
-    let tells = |args: &[&str]| {
+    let output_of = |args: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
         let output = command.args(args).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
@@ -550,17 +550,17 @@ fn the_command_prints_the_same_for_an_object_and_a_file() {
         String::from_utf8(output.stdout).unwrap()
     };
     let (far, near) = (server.url("warehouse.bag"), path.to_string_lossy());
-    let rows = |bag: &str| tells(&["extract", bag, "-o", "-", "--format", "csv"]);
+    let rows = |bag: &str| output_of(&["extract", bag, "-o", "-", "--format", "csv"]);
     assert_eq!(rows(&far), rows(&near));
     // Payloads of remote bags are only compared on request, which reveals one more subscription.
     let info = |bag: &str| -> Vec<String> {
-        let row = tells(&["info", bag, "--format", "csv"]);
+        let row = output_of(&["info", bag, "--format", "csv"]);
         let cells = row.lines().nth(1).unwrap().split(',');
         cells.take(12).map(str::to_owned).collect()
     };
     assert_eq!(info(&far), info(&near));
     let all = |bag: &str| -> serde_json::Value {
-        let text = tells(&["info", bag, "--format", "json", "--infer", "payloads"]);
+        let text = output_of(&["info", bag, "--format", "json", "--infer", "payloads"]);
         let mut info: serde_json::Value = serde_json::from_str(&text).unwrap();
         // The version of the object, which a file does not have.
         info["bags"][0]["facts"].take();

@@ -202,7 +202,7 @@ pub fn shared(below: &str) -> Option<PathBuf> {
         .join("../shared")
         .join(below);
     if !path.exists() {
-        #[expect(clippy::print_stdout, reason = "a test that skips says so")]
+        #[expect(clippy::print_stdout, reason = "a skipped test prints its reason")]
         {
             println!("skipped: {} is not there", path.display());
         }

@@ -105,7 +105,7 @@ fn several_bags_make_one_sorted_table() {
     let times: Vec<i64> = rows[1..].iter().map(|r| r[0].parse().unwrap()).collect();
     assert!(times.is_sorted());
     let ros2 = rows.iter().find(|r| r[2] == "std_msgs/msg/String").unwrap();
-    assert_eq!(ros2[3], "", "ROS 2 bags do not say who publishes");
+    assert_eq!(ros2[3], "", "ROS 2 bags do not record publishers");
 }
 
 #[test]

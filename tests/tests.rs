@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     clippy::print_stdout,
-    reason = "tests say what went wrong by panicking"
+    reason = "tests fail by panicking"
 )]
 
 mod architecture;

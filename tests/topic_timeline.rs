@@ -60,7 +60,10 @@ fn a_mission_without_known_publishers_is_a_topic_timeline() {
     let frames: Vec<String> = (0..6).map(|n| text(&folder, &format!("{n}.svg"))).collect();
     for svg in &frames {
         assert!(svg.contains(">cmd_vel</text>") && svg.contains("geometry_msgs/msg/Twist"));
-        assert!(svg.contains("most publishers are unknown"), "it says why");
+        assert!(
+            svg.contains("most publishers are unknown"),
+            "the reason is missing"
+        );
         assert!(smallest(svg) >= 9.0);
     }
     // The playhead advances by a window per frame, and always has the width of one.
@@ -74,7 +77,7 @@ fn a_mission_without_known_publishers_is_a_topic_timeline() {
         text(&folder, "all.svg").contains("attributeName=\"visibility\" calcMode=\"discrete\"")
     );
     let page = text(&folder, "all.html");
-    assert!(page.contains("<body class=\"board\">") && page.contains(">amcl_pose</text>"));
+    assert!(page.contains("<body class=\"topic-timeline\">") && page.contains(">amcl_pose</text>"));
 }
 
 #[test]

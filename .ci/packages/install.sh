@@ -1,7 +1,7 @@
 #!/bin/sh
-# Installs bagreel @VERSION@ on Linux: fetches the archive for this machine, compares its checksum with the one below, and
+# Installs bagreel @VERSION@ on Linux: downloads the archive for this machine, verifies its checksum, and
 # copies the command, its manual pages and completions below ~/.local, or below PREFIX. Needs no root, and changes nothing else.
-# Not tried: the address of the releases, for which a local server stood in; BAGREEL_FROM is another one.
+# Tested with a local server instead of the releases' address; BAGREEL_FROM sets another address.
 set -eu
 
 main() {

@@ -21,4 +21,4 @@ for package in sorted(metadata["packages"], key=lambda package: (package["name"]
         texts[text].append(name)
 for text, names in sorted(texts.items(), key=lambda item: (item[1], item[0])):
     print("\n".join(sorted(names)), end="\n\n")
-    print(text or "Its archive holds no text of its own: the text of the licence named above holds.", end=f"\n\n{'-' * 80}\n\n")
+    print(text or "Its archive does not contain a licence; the text of the licence named above applies.", end=f"\n\n{'-' * 80}\n\n")

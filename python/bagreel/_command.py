@@ -45,9 +45,9 @@ def _words(options: Mapping[str, Any]) -> list[str]:
 
 
 def run(command: str, *bags: Bags, fine: tuple[int, ...] = DONE, **options: Any) -> tuple[int, str]:
-    """Runs a command; its exit code and its results. Raises `BagreelError` with what it said if it failed.
+    """Runs a command and returns its exit code and its results. Raises `BagreelError` with its messages if it failed.
 
-    An exit code of `fine` is no failure; one that is not in `DONE` only where there are results.
+    The exit codes in `fine` are no failures, but those that are not in `DONE` only if there are results.
     """
     with ExitStack() as stack:
         paths = []

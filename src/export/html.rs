@@ -115,7 +115,7 @@ impl HtmlPage<'_> {
         let view = self.whole.view;
         let is_paired = self.sequence.options.pairs.is_some();
         let kind = match self.overview {
-            Some(_) => "board",
+            Some(_) => "topic-timeline",
             None if view.compares && is_paired => "compares paired",
             None if view.compares => "compares",
             None => "",

@@ -68,7 +68,7 @@ pub struct Info {
 
 /// A bag of the mission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "the names say what `bag::Report` documents")]
+#[expect(missing_docs, reason = "`bag::Report` documents these fields")]
 pub struct BagInfo {
     pub name: String,
     pub format: String,

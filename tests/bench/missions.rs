@@ -10,7 +10,7 @@
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
-    reason = "a benchmark that fails says where, and its own numbers are small"
+    reason = "a panic in a benchmark names its line, and the numbers are small"
 )]
 
 mod measure;

@@ -39,11 +39,11 @@ def as_page(report):
     return f'<!doctype html><html lang="en"><title>Report</title><main><h1>Report</h1>{done.stdout}</main></html>'
 
 
-def check(graph, board, report):
+def check(graph, topic_timeline, report):
     """A page in every state of use, a page with a topic timeline, and a report."""
     with Browser(1440, 900) as b:
         b.call("POST", "/timeouts", {"script": 120000})
-        for url, states in ((graph, ("", "n", "t", "\ue00c", "b", "?")), (board, ("", "t"))):
+        for url, states in ((graph, ("", "n", "t", "\ue00c", "b", "?")), (topic_timeline, ("", "t"))):
             b.open(url)
             for key in states:
                 if key:

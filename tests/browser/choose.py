@@ -9,13 +9,19 @@ ESC = "\ue00c"
 ENTER = "\ue007"
 
 
-def drag(b, start, end):
-    """Drags the mouse from one point of the lifelines to another; both are fractions of the time."""
-    x, y, w = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")
-    move = lambda share: {"type": "pointerMove", "duration": 20, "x": round(x + share * w), "y": round(y)}
-    steps = [move(start), {"type": "pointerDown", "button": 0}, *(move(start + (end - start) * k / 8) for k in range(1, 9)), {"type": "pointerUp", "button": 0}]
+def mouse(b, steps):
     b.call("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": steps}]})
     time.sleep(0.3)
+
+
+def drag(b, start, end, is_released=True):
+    """Drags the mouse from one point of the timeline to another; both are fractions of the time."""
+    x, y, w = b.js("const r = document.getElementById('marks').getBoundingClientRect(); return [r.left, r.top + r.height / 2, r.width]")
+    move = lambda share: {"type": "pointerMove", "duration": 20, "x": round(x + share * w), "y": round(y)}
+    steps = [move(start), {"type": "pointerDown", "button": 0}, *(move(start + (end - start) * k / 8) for k in range(1, 9))]
+    if is_released:
+        steps.append({"type": "pointerUp", "button": 0})
+    mouse(b, steps)
 
 
 def there(window):
@@ -77,6 +83,35 @@ def ranges(b, url, evolution):
     print("  a drag, keys and a link choose a range, and its graph is what was there")
 
 
+def snapping(b, url):
+    """While the mouse is down, the timeline shades what it passed over, and frames and names the whole windows."""
+    b.open("about:blank")
+    b.open(url + "#t=0")
+    drag(b, 10.3 / 50, 12.6 / 50, is_released=False)
+    shares = """const marks = document.getElementById('marks').getBoundingClientRect();
+        return ['passed', 'head'].map(id => document.getElementById(id).getBoundingClientRect()).flatMap(r => [r.left, r.right].map(x => (x - marks.left) / marks.width * 50))"""
+    assert all(abs(share - wanted) < 0.2 for share, wanted in zip(b.js(shares), (10.3, 12.6, 10, 13))), b.js(shares)
+    tip = "const tip = document.getElementById('tip'); return [tip.hidden, ...[...tip.children].map(line => line.textContent)]"
+    assert b.js(tip) == [False, "01:40 – 02:10", "3 whole windows"], b.js(tip)
+    mouse(b, [{"type": "pointerUp", "button": 0}])
+    assert b.js("return document.getElementById('passed').hidden && document.getElementById('tip').hidden")
+    print("  a drag shows the pointer's range, and the windows to which it snaps")
+
+
+def ticks(b):
+    """The labels of the large plot: round rates with a unit, round times, in order, apart from each other."""
+    labels = b.js("""return [...document.querySelectorAll('#bigplot text')].map(t => { const r = t.getBoundingClientRect(); return [t.textContent, r.left, r.right, r.top, r.bottom]; })""")
+    rates = [float(text.split(" ")[0]) for text, *_ in labels if text.endswith(" Hz")]
+    steps = {round(after - before, 6) for before, after in zip(rates, rates[1:])}
+    assert rates[0] == 0 and len(steps) == 1 and f"{steps.pop():e}"[0] in "125" and 3 <= len(rates) <= 7, rates
+    times = [text for text, *_ in labels if ":" in text]
+    seconds = [int(minutes) * 60 + int(rest) for minutes, rest in (text.split(":") for text in times[:-1])]
+    assert len(seconds) > 3 and len({after - before for before, after in zip(seconds, seconds[1:])}) == 1, times
+    assert all(s % 30 == 0 for s in seconds), times
+    apart = lambda a, z: a[2] < z[1] or z[2] < a[1] or a[4] <= z[3] + 1 or z[4] <= a[3] + 1
+    assert all(apart(one, other) for k, one in enumerate(labels) for other in labels[:k]), labels
+
+
 def search(b):
     def hits(text):
         b.js("const q = document.getElementById('q'); q.value = arguments[0]; q.dispatchEvent(new Event('input'))", text)
@@ -97,7 +132,7 @@ def panel(b):
     assert b.js(count) > 0
     b.js("document.querySelector('#spaces').open = true; [...document.querySelectorAll('#spacelist label')].find(l => l.textContent.includes('/nav ')).querySelector('input').click()")
     assert b.js(count) == 0, "a namespace is left out"
-    left = "return [[...document.querySelectorAll('#graph .namespace')].filter(g => getComputedStyle(g).visibility == 'visible').length, [...document.querySelectorAll('#rownames .space')].filter(r => !r.hidden && r.textContent == '/nav').length, [...document.querySelectorAll('#news button')].filter(b => b.title.startsWith('/nav/')).length, document.getElementById('counts').textContent]"
+    left = "return [[...document.querySelectorAll('#graph .namespace')].filter(g => getComputedStyle(g).visibility == 'visible').length, [...document.querySelectorAll('#rownames .space')].filter(r => !r.hidden && r.textContent == '/nav').length, [...document.querySelectorAll('#changes button')].filter(b => b.title.startsWith('/nav/')).length, document.getElementById('counts').textContent]"
     hidden = b.js(left)
     assert hidden[1:3] == [0, 0], hidden
     b.js("document.querySelector('#spacelist input:not(:checked)').click()")
@@ -109,6 +144,7 @@ def panel(b):
     b.keys("g")
     line = b.js("return [document.getElementById('big').hidden, document.querySelectorAll('#bigplot .line').length, document.getElementById('bigplot').getBoundingClientRect().width]")
     assert line[0] is False and line[1] == 1 and line[2] > 600, line
+    ticks(b)
     b.keys(ESC)
     assert b.js("return document.getElementById('big').hidden")
     print("  namespaces are left out, and a rate is plotted large")
@@ -151,7 +187,7 @@ def timeline_page(b, url):
     b.open("about:blank")
     b.open(url)
     seen = b.js("""const shown = id => document.getElementById(id).getBoundingClientRect(), rows = [...document.querySelectorAll('#rownames button')];
-        return [shown('stage').height, shown('deck').width, rows.length, rows.filter(r => r.querySelector('.type').textContent && r.querySelector('.hz').textContent).length,
+        return [shown('stage').height, shown('controls').width, rows.length, rows.filter(r => r.querySelector('.type').textContent && r.querySelector('.hz').textContent).length,
             document.querySelectorAll('#legend .node, #legend .edge').length]""")
     assert seen[0] == 0 and seen[1] > 800 and seen[2] == seen[3] > 5 and seen[4] == 0, seen
     drag(b, 0.25, 0.75)
@@ -161,7 +197,7 @@ def timeline_page(b, url):
     print("  a page of topics is their timeline, with types and rates")
 
 
-def embedded(b, url, board):
+def embedded(b, url, topic_timeline):
     b.open("about:blank")
     b.open(url)
     b.keys("f")
@@ -170,7 +206,7 @@ def embedded(b, url, board):
     b.open(url + "#bare")
     assert b.js("return +document.getElementById('seek').value") == 0, "it begins with the first window"
     assert b.js("return document.getElementById('graph').getAttribute('viewBox')") == whole, whole
-    for page, part in ((url, "stage"), (board, "time")):
+    for page, part in ((url, "stage"), (topic_timeline, "time")):
         b.open("about:blank")
         b.open(page + "#bare&loop")
         time.sleep(0.3)
@@ -196,20 +232,21 @@ def printed(b, url):
     assert hidden == 0 and names > 5, (hidden, names)
     b.js("dispatchEvent(new Event('afterprint'))")
     b.cdp("Emulation.setEmulatedMedia", media="")
-    print("  paper shows all names and lives")
+    print("  printed pages show all names and lifelines")
 
 
-def drive(b, url, board, evolution):
+def drive(b, url, topic_timeline, evolution):
     first_view(b, url)
     ranges(b, url, evolution)
+    snapping(b, url)
     search(b)
     panel(b)
     minimap(b)
-    timeline_page(b, board)
-    embedded(b, url, board)
+    timeline_page(b, topic_timeline)
+    embedded(b, url, topic_timeline)
 
 
-def check(url, board, evolution):
+def check(url, topic_timeline, evolution):
     with Browser(1440, 900) as b:
-        drive(b, url, board, evolution)
+        drive(b, url, topic_timeline, evolution)
         printed(b, url)

@@ -1,6 +1,6 @@
 """Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads its text and the console.
 
-usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html BOARD.html REPORT.md
+usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html TOPIC_TIMELINE.html REPORT.md
 All but the hostile page are of the evolution, whose every window is compared with the page.
 """
 
@@ -53,7 +53,7 @@ def compare_data(page, evolution):
     data, compared = data_of(page), 0
     graph = data["graphs"][0]
     facts = [" ".join(data["words"][f] for f in own) for own in graph["facts"]]
-    lives = [[lists[k] if k < len(lists) else [] for k in range(5)] for lists in graph["lives"]]
+    runs = [[lists[k] if k < len(lists) else [] for k in range(5)] for lists in graph["runs"]]
     items = {}
     for i, name in enumerate(graph["names"]):
         items.setdefault(name, []).append(i)
@@ -68,17 +68,17 @@ def compare_data(page, evolution):
         for i, element in rows:
             if i is None or "together" in facts[i]:
                 continue
-            words = graph["classes"][at(lives[i][0], w)].split()
-            label = graph["labels"][at(lives[i][1], w)]
+            words = graph["classes"][at(runs[i][0], w)].split()
+            label = graph["labels"][at(runs[i][1], w)]
             assert words[0] == element["state"], (w, element, words)
             if element["hz"] is not None:
                 assert label == hertz(element["hz"]) + " Hz", (w, element, label)
-                exact = float(graph["labels"][at(lives[i][4], w)])
+                exact = float(graph["labels"][at(runs[i][4], w)])
                 assert abs(exact - element["hz"]) <= 1e-5 * element["hz"], (w, element, exact)
             there.add(i)
             compared += 1
-        for i, life in enumerate(lives):
-            words = graph["classes"][at(life[0], w)].split()
+        for i, own in enumerate(runs):
+            words = graph["classes"][at(own[0], w)].split()
             ends = graph["arrows"][i - count][:2] if i >= count else []
             grouped = any("together" in facts[e] for e in [i, *ends])
             assert i in there or grouped or words == ["off"] or "removed" in words, (w, i, words)
@@ -121,10 +121,10 @@ def window(b):
 
 def drive(b, url, evolution, data):
     windows = evolution["windows"]
-    told = [len(own) for own in headlines(evolution)]
+    counts = [len(own) for own in headlines(evolution)]
     last = len(windows) - 1
     b.open(url)
-    assert window(b) == data["still"] == told.index(max(told)), (window(b), data["still"], told)
+    assert window(b) == data["still"] == counts.index(max(counts)), (window(b), data["still"], counts)
     b.keys(HOME, RIGHT)
     assert window(b) == 1
     b.keys((SHIFT, RIGHT))
@@ -136,17 +136,17 @@ def drive(b, url, evolution, data):
     b.keys((CTRL, RIGHT))
     assert window(b) == int(last / 2 + 0.5)
     b.keys(HOME, "]")
-    first_change = next(w for w in range(1, len(windows)) if told[w])
+    first_change = next(w for w in range(1, len(windows)) if counts[w])
     assert window(b) == first_change, (window(b), first_change)
     value = b.js("return document.getElementById('seek').ariaValueText")
     assert f"window {first_change + 1} of {len(windows)}" in value, value
     assert b.js("return document.getElementById('live').textContent")
     b.keys(HOME)
-    seen = [0] if told[0] else []
+    seen = [0] if counts[0] else []
     while len(seen) < 2 or seen[-1] != seen[-2]:
         b.keys("n")
         seen.append(window(b))
-    assert seen[:-1] == [w for w, n in enumerate(told) if n], (seen, told)
+    assert seen[:-1] == [w for w, n in enumerate(counts) if n], (seen, counts)
     b.keys("p")
     assert window(b) == seen[-3], (window(b), seen)
     print("  keys move through the mission, n and p from change to change")
@@ -171,7 +171,7 @@ def drive(b, url, evolution, data):
     assert topic in b.js("return document.getElementById('name').textContent")
     assert b.js("return document.querySelectorAll('#graph .near').length") > 1
     until(b, f"location.hash.includes('sel=topic:{topic}')")
-    assert b.js("return document.getElementById('life').children.length") > 1
+    assert b.js("return document.getElementById('lifeline').children.length") > 1
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
     node = windows[0]["nodes"][0]["name"]
@@ -201,7 +201,7 @@ def drive(b, url, evolution, data):
     b.js("location.hash = '#t=0&q=scan'")
     until(b, "document.getElementById('q').value", "scan")
     assert window(b) == 0
-    print("  links lead where they say")
+    print("  links show the element and window that they name")
 
     compare_drawing(b, windows)
     compare_telling(b, evolution)
@@ -219,16 +219,16 @@ def compare_drawing(b, windows):
     for w, data in enumerate(windows):
         state = {e["name"]: e["state"] for e in data["topics"]} | {e["name"]: e["state"] for e in data["nodes"]}
         rates = {e["node"] + " " + e["topic"]: e["hz"] for e in data["publishes"]}
-        for name, words, told in b.js(read):
+        for name, words, text in b.js(read):
             words = words.split()
             if "off" in words or "removed" in words:
                 continue
             if name in state and name.count("/") > 1:
                 assert state[name] in words, (w, name, words)
-            if rates.get(name) is not None and told:
-                assert told.endswith(hertz(rates[name]) + " Hz"), (w, name, told)
+            if rates.get(name) is not None and text:
+                assert text.endswith(hertz(rates[name]) + " Hz"), (w, name, text)
         b.keys(RIGHT)
-    print("  every window is drawn as the evolution says")
+    print("  every window shows what is in the evolution")
 
 
 def compare_telling(b, evolution):
@@ -236,7 +236,7 @@ def compare_telling(b, evolution):
     b.keys(HOME)
     for w, own in enumerate(headlines(evolution)):
         entries, numbers, listed = b.js("""const counts = document.getElementById('counts');
-            return [counts.dataset.entries.split(' ').filter(Boolean).length, [...counts.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
+            return [counts.dataset.entries.split(' ').filter(Boolean).length, [...counts.children].map(c => c.textContent), document.querySelectorAll('#changes button').length]""")
         assert entries == listed == len(own), (w, entries, listed, own)
         assert sum(int(n) for n in re.findall(r"\d+", " ".join(numbers))) == len(own), (w, numbers)
         for e in own[:1]:
@@ -248,7 +248,7 @@ def compare_telling(b, evolution):
                     [(x["end_ns"] - evolution["windows"][0]["start_ns"]) / 1e9 for x in evolution["windows"]]))
             assert went == w, (went, w)
         b.keys(RIGHT)
-    print("  counts, lists and marks count what the ledger tells")
+    print("  counts, lists and marks agree with the event log")
 
 
 def compare_table(b, evolution, data):
@@ -260,15 +260,15 @@ def compare_table(b, evolution, data):
         assert len(rows) == len(data["graphs"][0]["names"]), len(rows)
         state = {"topic:" + e["name"]: e for e in evolution["windows"][w]["topics"]}
         state |= {"node:" + e["name"]: e for e in evolution["windows"][w]["nodes"]}
-        for key, rate, says in rows:
+        for key, rate, shown in rows:
             if key in state and state[key]["hz"] is not None:
                 assert rate == hertz(state[key]["hz"]) + " Hz", (w, key, rate, state[key])
-                assert says.startswith(state[key]["state"]), (w, key, says)
+                assert shown.startswith(state[key]["state"]), (w, key, shown)
             elif key not in state:
-                assert rate == "–" and says.startswith("absent"), (w, key, rate, says)
+                assert rate == "–" and shown.startswith("absent"), (w, key, rate, shown)
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('sheet').hidden")
-    print("  the table says what the evolution says")
+    print("  the table agrees with the evolution")
 
 
 def compare_windows(b, evolution, data):
@@ -282,20 +282,20 @@ def compare_windows(b, evolution, data):
     for before, after in ((3, 30), (30, 3), (10, 11)):
         b.js("document.activeElement.blur()")
         b.js(f"location.hash = '#t={data['starts'][after]}&b={data['starts'][before]}'")
-        until(b, "document.getElementById('newstitle').textContent", f"Differences from window {before + 1}")
+        until(b, "document.getElementById('changestitle').textContent", f"Differences from window {before + 1}")
         until(b, "+document.getElementById('seek').value", after)
         old, new = present(before), present(after)
         moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
         differs = (old.keys() ^ new.keys()) | moved
-        shown = b.js("""const more = document.querySelector('#news .more'); more?.click();
+        shown = b.js("""const more = document.querySelector('#changes .more'); more?.click();
             const counts = document.getElementById('counts');
-            return [[...counts.children].map(c => c.textContent), document.querySelectorAll('#news button').length, 'entries' in counts.dataset]""")
+            return [[...counts.children].map(c => c.textContent), document.querySelectorAll('#changes button').length, 'entries' in counts.dataset]""")
         # Differences between two arbitrary windows are not events of the log: they are counted and listed without event ids.
         counted = sum(int(n) for n in re.findall(r"\d+", " ".join(shown[0])))
         assert [counted, *shown[1:]] == [len(differs), len(differs), False], (before, after, shown, len(differs))
         drawn = b.js("return document.querySelectorAll('#graph .items > :is(.added, .removed, .changed), #graph .arrows > :is(.added, .removed, .changed)').length")
         assert drawn == len(differs), (drawn, len(differs))
-    print("  two windows differ in what the evolution says")
+    print("  the comparison of two windows agrees with the evolution")
 
 
 def hostile(url):
@@ -328,7 +328,7 @@ def elsewhere(url, page):
         b.click("[data-key=',']")
         until(b, "+document.getElementById('seek').value", before - 1)
         b.click("#toside")
-        b.click("#told a")
+        b.click("#allchanges a")
         assert window(b) >= 0 and b.js("return location.href") == "about:srcdoc", "a link left the frame"
         # The panel does not cover the button that closes it.
         b.click("#toside")
@@ -340,7 +340,7 @@ def elsewhere(url, page):
         b.cdp("Emulation.setScriptExecutionDisabled", value=False)
         assert b.js("return document.querySelectorAll('tbody a').length") > 3
         assert b.js("return document.querySelectorAll('.items > .node:not(.off)').length") > 3
-    print("  it works in a sandboxed frame, and under three policies says what changed, without scripts too")
+    print("  it works in a sandboxed frame, and lists the changes under three policies and without scripts")
 
 
 STYLED = "default-src 'none';style-src 'unsafe-inline';font-src data:;img-src data:"
@@ -360,7 +360,7 @@ def under_policies(b, outer, page):
         b.frame(0)
         time.sleep(0.3)
         assert (window(b) > 0) == plays, (policy, window(b))
-        seen = b.js("return [document.querySelectorAll('#told a').length, document.querySelectorAll('.items > .node:not(.off)').length, getComputedStyle(document.querySelector('.node :is(ellipse, rect)')).fill]")
+        seen = b.js("return [document.querySelectorAll('#allchanges a').length, document.querySelectorAll('.items > .node:not(.off)').length, getComputedStyle(document.querySelector('.node :is(ellipse, rect)')).fill]")
         assert seen[0] > 3 and seen[1] > 3 and seen[2] != "rgb(0, 0, 0)", (policy, seen)
         b.log("browser")
 
@@ -377,9 +377,9 @@ def animation(svg):
             time.sleep(8)
             shots[flags] = (first, b.screenshot())
     moving, still = shots.values()
-    assert moving[0] != moving[1], "the animation stands still"
+    assert moving[0] != moving[1], "the animation does not move"
     assert still[0] == still[1], "it moves although less motion is asked for"
-    print("  the animation runs in an <img>, and stands still where asked to")
+    print("  the animation runs in an <img>, and stops for readers who prefer reduced motion")
 
 
 def is_there(tool):
@@ -390,7 +390,7 @@ def is_there(tool):
     return not reason
 
 
-def main(page, evolution, hostile_page, svg, folded_page, board, report):
+def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report):
     if not is_there(webdriver):
         return
     path = pathlib.Path(page).resolve()
@@ -404,15 +404,15 @@ def main(page, evolution, hostile_page, svg, folded_page, board, report):
     elsewhere(url(page), text)
     animation(svg)
     folded.check(url(folded_page), data_of(pathlib.Path(folded_page).read_text()))
-    choose.check(url(page), url(board), evolution)
+    choose.check(url(page), url(topic_timeline), evolution)
     touch.check(url(page))
-    sight.check(url(page), url(folded_page), url(board))
+    sight.check(url(page), url(folded_page), url(topic_timeline))
     if is_there(axe):
-        axe.check(url(page), url(board), report)
+        axe.check(url(page), url(topic_timeline), report)
     if is_there(firefox):
         with firefox.Firefox() as b:
             drive(b, url(page), evolution, data)
-            choose.drive(b, url(page), url(board), evolution)
+            choose.drive(b, url(page), url(topic_timeline), evolution)
         print("  all of this in Firefox, too")
     print("all well")
 

@@ -15,7 +15,7 @@ return [boxes.length, boxes.filter(r => r.left < stage.left || r.top < stage.top
 def check(url, data):
     folded = data["graphs"][1]
     place = max(range(len(folded["names"])), key=lambda k: (folded["kinds"][k] == 3, -k))
-    name, held = folded["names"][place], folded["holds"][place]
+    name, held = folded["names"][place], folded["members"][place]
     with Browser(1440, 900) as b:
         b.open(url)
         time.sleep(0.3)

@@ -7,7 +7,7 @@ from webdriver import Browser
 SCREENS = ((1440, 900), (1920, 1080), (1024, 768), (390, 844))
 SMALLEST = """
 const stage = document.getElementById('stage').getBoundingClientRect(), graph = document.querySelector('.graph:not([hidden])');
-if (document.body.classList.contains('board')) {
+if (document.body.classList.contains('topic-timeline')) {
     const rows = [...document.querySelectorAll('#rownames button, #ticks span')].filter(row => row.getBoundingClientRect().width);
     return [rows.length, Math.min(...rows.map(row => parseFloat(getComputedStyle(row).fontSize))), document.documentElement.scrollWidth];
 }

@@ -65,8 +65,8 @@ def check(url):
         drag(b, ((axis[0] + 5, axis[1]), (axis[0] + axis[2] - 5, axis[1])))
         last = b.js("return +document.getElementById('seek').max")
         assert b.js("return +document.getElementById('seek').value") == last, "a finger along the time"
-        b.js("document.querySelector('#told a').scrollIntoView({block: 'center'})")
-        tap(b, "#told a")
+        b.js("document.querySelector('#allchanges a').scrollIntoView({block: 'center'})")
+        tap(b, "#allchanges a")
         where = b.js("const r = document.getElementById('stage').getBoundingClientRect(); return [r.top, r.bottom]")
         assert -1 <= where[0] and where[1] <= HIGH and b.js("return +document.getElementById('seek').value") < last, where
     print("  fingers pinch, drag, tap and scrub")

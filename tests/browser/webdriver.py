@@ -89,7 +89,7 @@ class Browser:
         self.call("POST", f"/element/{self.find(css)}/value", {"text": text})
 
     def keys(self, *keys):
-        """Presses keys one after another, wherever the focus is; `("\\ue008", "x")` holds the first."""
+        """Presses keys one after another, wherever the focus is; `("\\ue008", "x")` keeps the first pressed."""
         actions = []
         for key in keys:
             held = key if isinstance(key, tuple) else (key,)

@@ -1,6 +1,6 @@
-"""Counts one fleet in every documented way, kills workers meanwhile, and compares digests.
+"""Counts one fleet in every documented way while workers are killed, and compares digests.
 
-Usage: fleet.py FOLDER, in an environment with the wheel (see `run`). Ends with 1 if anything differs.
+Usage: fleet.py FOLDER, in an environment with the wheel (see `run`). Exits with 1 if anything differs.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ def bags(folder):
 
 
 def digest(tables, what):
-    """The digest of all rows, sorted."""
+    """The digest of all rows, regardless of their order, and their number."""
     rows = sorted(repr(tuple(row.values())) for table in tables for row in table.to_pylist())
     if what == "bags":
         assert len({row for row in rows}) == len(rows), "a bag twice"
@@ -59,7 +59,7 @@ def of_folder(folder, table="counts"):
     return digest([pq.read_table(file) for file in sorted((folder / table).glob("*.parquet"))], table)
 
 
-def tell(name, got, expected, started):
+def report(name, got, expected, started):
     right = got == expected
     if not right:
         FAILED.append(name)
@@ -67,7 +67,7 @@ def tell(name, got, expected, started):
 
 
 def shards(fleet, to, count=16, jobs=2):
-    """As `seq 1 16 | xargs -P 2`; returns the running `xargs`."""
+    """Runs the shards like `seq 1 16 | xargs -P 2`; returns the running `xargs`."""
     numbers = "\n".join(map(str, range(1, count + 1)))
     args = ["xargs", "-P", str(jobs), "-I{}", *COMMAND, str(fleet), "-o", str(to), "--shard", "{}/" + str(count), "--skip-existing"]
     process = subprocess.Popen(args, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
@@ -103,9 +103,9 @@ def kill_one(pid, what, after, until=30):
                     print(f"(killed a process of `{what}`)", flush=True)
                     return
                 except ProcessLookupError:
-                    continue  # It had ended: the next one.
+                    continue  # It has ended; try the next one.
             time.sleep(0.01)
-        FAILED.append(f"no process of `{what}` could be killed")
+        FAILED.append(f"no process of `{what}` was found to kill")
     thread = threading.Thread(target=run)
     thread.start()
     return thread
@@ -127,7 +127,7 @@ def shards_killed(fleet, to):
                 os.kill(workers[-1], signal.SIGKILL)
                 break
             except ProcessLookupError:
-                continue  # It had ended: the next one.
+                continue  # It has ended; try the next one.
     process.wait()
     return done(to)
 
@@ -136,7 +136,7 @@ def xargs(fleet, folder, expected):
     to = folder / "shards"
     started = time.time()
     shards(fleet, to).wait()
-    tell("xargs -P 2, 16 shards", of_folder(to), expected, started)
+    report("xargs -P 2, 16 shards", of_folder(to), expected, started)
     to = folder / "shards_killed"
     started = time.time()
     # A worker exists for a tenth of a second, so all may have been counted before this process is scheduled again.
@@ -146,13 +146,13 @@ def xargs(fleet, folder, expected):
     for file in [*(to / "counts").glob("*"), *(to / "bags").glob("*")]:
         assert file.suffix == ".parquet" and pq.read_metadata(file).num_rows >= 0, file
     shards(fleet, to).wait()
-    tell(f"the same, a worker killed with {before} of {COPIES} bags done, run again", of_folder(to), expected, started)
+    report(f"the same, a worker killed with {before} of {COPIES} bags done, run again", of_folder(to), expected, started)
 
 
 def wheel(fleet, folder, expected):
     started = time.time()
     tables = [bagreel.tables(b["uri"], mission=b["mission"], origin_ns=b["origin_ns"]) for b in bagreel.plan(fleet)]
-    tell("wheel, one process", digest([t["counts"].to_pyarrow() for t in tables], "counts"), expected, started)
+    report("wheel, one process", digest([t["counts"].to_pyarrow() for t in tables], "counts"), expected, started)
 
 
 def spark_job(spark, fleet, table, shards=16):
@@ -173,7 +173,7 @@ def sail(fleet, folder, expected):
     server.start(background=True)
     spark = SparkSession.builder.remote(f"sc://127.0.0.1:{server.listening_address[1]}").getOrCreate()
     started = time.time()
-    tell("Sail, local-cluster", digest([spark_job(spark, fleet, "counts")], "counts"), expected, started)
+    report("Sail, local-cluster", digest([spark_job(spark, fleet, "counts")], "counts"), expected, started)
     spark.stop()
     server.stop()
 
@@ -190,12 +190,12 @@ def spark(fleet, folder, expected):
     )
     session.sparkContext.setLogLevel("OFF")
     started = time.time()
-    tell("Spark, local-cluster[2,1,1024]", digest([spark_job(session, fleet, "counts")], "counts"), expected, started)
+    report("Spark, local-cluster[2,1,1024]", digest([spark_job(session, fleet, "counts")], "counts"), expected, started)
     started = time.time()
     killer = kill_one(os.getpid(), "CoarseGrainedExecutorBackend", 0.5)
     got = digest([spark_job(session, fleet, "counts")], "counts")
     killer.join()
-    tell("the same, an executor killed with -9", got, expected, started)
+    report("the same, an executor killed with -9", got, expected, started)
     session.stop()
 
 
@@ -212,7 +212,7 @@ def dask(fleet, folder, expected):
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         started = time.time()
-        tell("Dask, 2 workers", digest(client.gather(client.map(one, bagreel.plan(fleet), pure=False)), "counts"), expected, started)
+        report("Dask, 2 workers", digest(client.gather(client.map(one, bagreel.plan(fleet), pure=False)), "counts"), expected, started)
         started = time.time()
         for _ in range(20):
             futures = client.map(one, bagreel.plan(fleet), pure=False)
@@ -223,13 +223,13 @@ def dask(fleet, folder, expected):
         else:
             FAILED.append("Dask had counted all bags when its worker was killed, twenty times")
         os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
-        tell(f"the same, a worker killed with -9 with {finished} of {COPIES} bags done", digest(client.gather(futures), "counts"), expected, started)
+        report(f"the same, a worker killed with -9 with {finished} of {COPIES} bags done", digest(client.gather(futures), "counts"), expected, started)
 
 
 def s3(fleet, folder, expected):
     import s3 as server
 
-    server.run(fleet, folder, expected, tell, 20 * COPIES, COMMAND)
+    server.run(fleet, folder, expected, report, 20 * COPIES, COMMAND)
 
 
 def workers(fleet, folder, expected):
@@ -247,7 +247,7 @@ def main():
     started = time.time()
     subprocess.run([*COMMAND, str(fleet), "-o", str(folder / "one")], check=False)
     expected = of_folder(folder / "one")
-    tell(f"one process, {COPIES} bags", expected, expected, started)
+    report(f"one process, {COPIES} bags", expected, expected, started)
     uris = pa.concat_tables(pq.read_table(file) for file in (folder / "one/bags").glob("*.parquet"))
     assert sorted(uris["uri"].to_pylist()) == sorted(map(str, fleet.iterdir())), "not each bag exactly once"
     sys.path.insert(0, str(Path(__file__).parent))

@@ -1,7 +1,7 @@
 """Checks that other programs read the Parquet files of `extract` and `render` with the same values as the CSV files.
 
 Usage: opened.py [spark], in an environment with the wheel, pyarrow, pandas, DuckDB and Polars, and with PySpark if that
-is named. Ends with 1 if anything differs.
+is named. Exits with 1 if anything differs.
 """
 
 import csv
@@ -149,7 +149,7 @@ def main():
             messages = same(f"{bag.name}, messages", folder / "m.parquet", readers)
             text = [tuple("" if cell is None else str(cell) for cell in row) for row in messages]
             if text != [tuple(row) for row in csv_rows(folder / "m.csv")]:
-                differs(f"{bag.name}, messages", "the CSV file holds others")
+                differs(f"{bag.name}, messages", "the CSV file has others")
             # A table per topic with every field, and those of a mission.
             fields, mission = folder / f"{bag.name} fields", folder / f"{bag.name} mission"
             bagreel("extract", bag, "-o", f"{fields}/", "--fields")

@@ -1,7 +1,7 @@
 """`ros2 bagreel …` and `ros2 bag graph …` of the installed wheel behave like `bagreel …` and `bagreel render …`: the same output,
-messages and exit code, whatever the arguments. Run with Python; ends with 1 if anything differs.
+messages and exit code, whatever the arguments. Run with Python; exits with 1 if anything differs.
 
-Where `ros2cli` and `ros2bag` are installed too, the arguments go through them (of ROS itself only `rclpy` is stood in for); elsewhere
+Where `ros2cli` and `ros2bag` are installed too, the arguments pass through them (of ROS itself, only `rclpy` is replaced by a stub); elsewhere
 through parsers that are built, used twice and nested as theirs are.
 """
 
@@ -19,7 +19,7 @@ COURIER = ROOT / "examples/courier.mcap"
 
 
 def extension(group, name):
-    """A new extension, as ros2cli makes it."""
+    """A new extension, created as by ros2cli."""
     (found,) = entry_points(group=group, name=name)
     return found.load()()
 

@@ -108,7 +108,7 @@ MANY = 100
 """Chunks of a bag of which all indexes are read."""
 
 
-def run(fleet, folder, expected, tell, chunks, command):
+def run(fleet, folder, expected, report, chunks, command):
     import boto3
     from moto.server import ThreadedMotoServer
 
@@ -137,7 +137,7 @@ def run(fleet, folder, expected, tell, chunks, command):
         done = subprocess.run([*command, "s3://fleet/day/", "-o", str(to), "--tier", "index"], check=False)
         assert done.returncode == 3, done.returncode
         tables = plain(to, fleet)
-        tell(f"S3 {name}: {rules['requests']} requests, {rules['bytes'] / 1e6:.1f} of {total / 1e6:.1f} MB", tables, expected, started)
+        report(f"S3 {name}: {rules['requests']} requests, {rules['bytes'] / 1e6:.1f} of {total / 1e6:.1f} MB", tables, expected, started)
 
     count("plain", False)
     count("stumbling, 20 % of requests answered 503", True)

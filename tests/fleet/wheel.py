@@ -25,7 +25,7 @@ def raises(kind, what, run):
     try:
         run()
     except kind as error:
-        assert what in str(error), f"{error!r} does not say `{what}`"
+        assert what in str(error), f"{error!r} does not contain `{what}`"
     else:
         raise AssertionError(f"no {kind.__name__}")
 

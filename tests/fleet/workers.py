@@ -1,4 +1,4 @@
-"""Measures the speedup by more workers, as threads and as processes, for bags on a slow server."""
+"""Measures the speedup with more workers, as threads and as processes, for bags on a slow server."""
 
 import subprocess
 import threading

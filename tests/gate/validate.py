@@ -43,8 +43,8 @@ def junit(schema, path):
     cases = [case for suite in suites for case in suite]
     of = lambda kind: sum(any(isinstance(r, kind) for r in case.result) for case in cases)
     counted = (len(cases), of(junitparser.Failure), of(junitparser.Skipped))
-    told = (suites[0].tests, suites[0].failures, suites[0].skipped)
-    assert counted == told, f"{counted} cases, failures, skipped; {told} are told"
+    reported = (suites[0].tests, suites[0].failures, suites[0].skipped)
+    assert counted == reported, f"counted {counted} cases, failures, skipped; the file reports {reported}"
     assert len({(c.classname, c.name) for c in cases}) == len(cases), "two cases of one name"
     return counted
 

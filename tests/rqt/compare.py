@@ -9,7 +9,7 @@ QT_DOTGRAPH_SRC  the `qt_dotgraph/src` folder of a checkout of ros-visualization
 
 Needs Python 3.9 and `pip install pydot`; no ROS and no display. Every case is a random graph with random settings. Its
 graph goes to rqt_graph's own `dotcode.py` and, as an evolution of one window, to `bagreel render x.json -o x.dot`. Ids,
-labels, shapes, tool tips and URLs of nodes and topics, the cluster each stands in, the nesting of clusters, and
+labels, shapes, tool tips and URLs of nodes and topics, the cluster of each, the nesting of clusters, and
 the ends and labels of edges must be equal, but for the differences named in README.md, which are counted.
 
 Exit status: 0 all equal, 1 some differ (the first ones are printed, and kept with --keep), 2 could not compare.
@@ -70,7 +70,7 @@ def random_settings(rng):
 
 
 def load_rqt(rqt, qtd):
-    """rqt_graph's generator and its DOT factory, with empty stand-ins for ROS and Qt."""
+    """rqt_graph's generator and its DOT factory, with empty stubs for ROS and Qt."""
     def stub(module, **attributes):
         made = types.ModuleType(module)
         made.__path__ = []

@@ -68,12 +68,12 @@ pub fn write_metadata(recording: &Recording, folder: &Path, storage: &str, files
         last - first,
         recording.messages.len(),
     );
-    let mut told = Vec::new();
+    let mut seen = Vec::new();
     for publisher in &recording.publishers {
-        if told.contains(&&publisher.topic) {
+        if seen.contains(&&publisher.topic) {
             continue;
         }
-        told.push(&publisher.topic);
+        seen.push(&publisher.topic);
         let qos = if publisher.qos.is_empty() {
             "        offered_qos_profiles: []\n".to_owned()
         } else {

@@ -45,14 +45,13 @@ struct PageData<'a> {
     epoch: i64,
     date: String,
     /// The headlines of each window that has any.
-    #[serde(rename = "told")]
     reported: Vec<ReportedData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The lifelines, from top to bottom.
     rows: Vec<RowData>,
     /// Takeovers: the time, the old row, the new row, and the event's index in the log.
-    hands: Vec<(f64, usize, usize, EventId)>,
+    takeovers: Vec<(f64, usize, usize, EventId)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
     /// The titles of the two windows of a comparison; absent otherwise.
@@ -83,9 +82,9 @@ struct GraphData<'a> {
     labels: &'a [String],
     /// Per element, run lists: of classes, of rates as drawn, of lifecycle states, of rate changes, whose values apply
     /// to one window, and of the messages per second of each window. Empty lists at the end are left out.
-    lives: Vec<&'a ElementRuns>,
+    runs: Vec<&'a ElementRuns>,
     /// Per item of the picture: its members.
-    holds: Vec<Vec<u32>>,
+    members: Vec<Vec<u32>>,
 }
 
 /// The headlines of a window, and the elements that are back in it: its index, the number of headlines, the
@@ -135,9 +134,9 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         reported: reported(page, &places, clock),
         phases: phases(mission, clock),
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
-        hands: lives.map_or_else(Vec::new, |lives| {
-            let hands = lives.handovers.iter();
-            hands
+        takeovers: lives.map_or_else(Vec::new, |lives| {
+            let handovers = lives.handovers.iter();
+            handovers
                 .map(|h| (clock.secs(h.at), h.from, h.to, h.event))
                 .collect()
         }),
@@ -198,9 +197,9 @@ fn graph<'a>(
     let facts = of_items
         .chain(of_arrows)
         .map(|(members, is_item)| facts_of(page, members, clock, is_item, words));
-    let holds = |item: &Item| -> Vec<u32> {
-        let members = item.members.iter().filter_map(|m| places.get(m).copied());
-        members
+    let members = |item: &Item| -> Vec<u32> {
+        let places = item.members.iter().filter_map(|m| places.get(m).copied());
+        places
             .collect::<std::collections::BTreeSet<u32>>()
             .into_iter()
             .collect()
@@ -224,15 +223,15 @@ fn graph<'a>(
         arrows: order().map(arrow).collect(),
         classes: &runs.classes,
         labels: &runs.labels,
-        lives: runs
+        runs: runs
             .items
             .iter()
             .chain(drawn.order.iter().map(|at| &runs.arrows[*at]))
             .collect(),
-        holds: if std::ptr::eq(drawn, &raw const page.whole) {
+        members: if std::ptr::eq(drawn, &raw const page.whole) {
             Vec::new()
         } else {
-            view.items.iter().map(holds).collect()
+            view.items.iter().map(members).collect()
         },
     }
 }

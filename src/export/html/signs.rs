@@ -83,7 +83,7 @@ pub(super) fn timeline(lives: Option<&LifeLines>) -> String {
         ),
         (
             !lives.handovers.is_empty(),
-            "hand",
+            "takeover",
             "M18 3V17m-3 -4l3 4l3 -4",
             "handed over",
         ),

@@ -21,10 +21,7 @@ fn dropped_messages_keep_their_printed_events() {
             .iter()
             .any(|t| t.name.as_str() == name)
     };
-    assert!(
-        topic("/robot_description"),
-        "a latched message is long ago and still holds"
-    );
+    assert!(topic("/robot_description"), "a latched message stays valid");
     // Times are still counted from the first message.
     assert_eq!(Some(known.mission.span.start), follow.origin);
 }

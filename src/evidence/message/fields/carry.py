@@ -1,10 +1,10 @@
-"""Writes `ros1.msg` or `ros2.msg`: the fields of the message types of common packages, for bags that hold no definitions.
+"""Writes `ros1.msg` or `ros2.msg`: the fields of the message types of common packages, for bags without definitions.
 
 Usage: carry.py 1|2 CHECKOUT… > ros1.msg|ros2.msg
 
 Each CHECKOUT is a clone of one of `REPOSITORIES`. Its `.msg` files are read as of the branch that ROS 1 Noetic was released
-from (the branch of the clone), or as of that of ROS 2 Humble, the last release whose sqlite3 recordings hold no definitions.
-What has other fields in Galactic or Foxy stands behind it once more, as `MSG: package/Name before`.
+from (the branch of the clone), or as of that of ROS 2 Humble, the last release whose sqlite3 recordings contain no definitions.
+A type whose fields differ in Galactic or Foxy is followed by its older fields, as `MSG: package/Name before`.
 """
 
 import re

@@ -1,23 +1,25 @@
 // The page's data, unpacked: any value of any element in any window is found by one search. `data.rs`
 // describes it.
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) });
-const say = (id, text) => { const element = $[id]; if (element.textContent != text) element.textContent = text; };
+const setText = (id, text) => { const element = $[id]; if (element.textContent != text) element.textContent = text; };
 const make = (tag, props, ...inside) => {
 	const element = Object.assign(document.createElement(tag), props);
 	element.append(...inside);
 	return element;
 };
+const set = (element, attributes) => { for (const key in attributes) element.setAttribute(key, attributes[key]); return element; };
+const drawn = (tag, attributes, textContent = '') => set(Object.assign(document.createElementNS('http://www.w3.org/2000/svg', tag), { textContent }), attributes);
 async function unpacked({ type, textContent: text }) {
 	if (type != 'deflated') return text;
 	const bytes = Uint8Array.from(atob(text), c => c.charCodeAt());
 	return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate-raw'))).text();
 }
 const data = JSON.parse(await unpacked($.data));
-say('data', '');
-const { words, starts, ends, told, phases, rows, hands, sizes } = data;
+setText('data', '');
+const { words, starts, ends, reported, phases, rows, takeovers, sizes } = data;
 const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
 // The length of the lifelines: for two missions, whose windows have no times, that of the longer one.
-const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lives]) => lives.filter((_, k) => k % 3 < 2))) : total;
+const long = data.sides ? Math.max(1e-3, ...rows.flatMap(([, , , lifetimes]) => lifetimes.filter((_, k) => k % 3 < 2))) : total;
 // The window that contains a time: the last one that begins before it.
 const windowAt = s => Math.max(0, starts.findLastIndex(start => start <= s + 1e-6));
 const iso = (s, from, to) => new Date(Math.round(s * 1e3)).toISOString().slice(from, to).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');
@@ -34,18 +36,17 @@ const NONE = [];
 
 // Elements are numbered: items, then arrows.
 class Graph {
-	constructor({ names, kinds, arrows, facts, boxes, classes, labels, lives, holds }, svg) {
-		Object.assign(this, { names, kinds, arrows, boxes, classes, labels, holds, svg, N: names.length, count: names.length + arrows.length });
-		this.lives = lives.map(lists => [0, 1, 2, 3, 4].map(k => lists[k] ?? NONE));
-		for (const list of lives.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
+	constructor({ names, kinds, arrows, facts, boxes, classes, labels, runs, members }, svg) {
+		Object.assign(this, { names, kinds, arrows, boxes, classes, labels, members, svg, N: names.length, count: names.length + arrows.length });
+		this.runs = runs.map(lists => [0, 1, 2, 3, 4].map(k => lists[k] ?? NONE));
+		for (const list of runs.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
 		this.facts = facts.map(list => list.map(f => words[f]));
-		this.els = svg ? [...svg.querySelectorAll('.items > g, .arrows > g')] : [];
-		if (svg) this.els = [...svg.querySelector('.items').children, ...svg.querySelector('.arrows').children];
+		this.els = svg ? ['.items', '.arrows'].flatMap(layer => [...svg.querySelector(layer).children]) : [];
 		// The frames of namespaces, with the items inside.
 		this.spaces = [...svg?.querySelectorAll('.spaces > g') ?? []].map(frame => {
 			const [x, y, w, h] = ['x', 'y', 'width', 'height'].map(key => +frame.querySelector('rect').getAttribute(key));
 			return [frame, [...names.keys()].filter(i => boxes[i][0] >= x - 1 && boxes[i][1] >= y - 1 && boxes[i][0] + boxes[i][2] <= x + w + 1 && boxes[i][1] + boxes[i][3] <= y + h + 1)];
-		}).filter(([, held]) => held.length);
+		}).filter(([, inside]) => inside.length);
 		this.base = this.els.map(e => e.classList[0] + ' ');
 		this.live = this.els.map(e => e.querySelector('.r'));
 		this.cur = this.els.map(() => '');
@@ -60,6 +61,8 @@ class Graph {
 		for (let i = 0; i < this.count; i++) this.keys.set(this.key(i), i);
 	}
 	ends(i) { return i < this.N ? this.neighbours[i] : this.arrows[i - this.N].slice(0, 2); }
+	// An element with its connections and the elements at their other ends.
+	nearby(i) { return [i, ...this.ends(i).flatMap(end => end < this.N ? end : [end, ...this.ends(end)])]; }
 	name(i) {
 		if (i < this.N) return this.names[i];
 		const [a, b, topic] = this.arrows[i - this.N];
@@ -68,13 +71,13 @@ class Graph {
 	kind(i) { return i < this.N ? ITEMS[this.kinds[i]] : 'edge'; }
 	key(i) { return this.kind(i) + ':' + this.name(i); }
 	type(i) { return this.facts[i].find(f => f.startsWith('type ')) ?? ''; }
-	class(i, w) { return at(this.lives[i][0], w); }
+	class(i, w) { return at(this.runs[i][0], w); }
 	isThere(i, w) { return this.there[this.class(i, w)]; }
 	// Messages in some windows, the time in seconds, and whether any are known.
 	sent(i, from, to = from) {
 		let sum = 0, time = 0, isKnown = false;
 		for (let w = from; w <= to; w++) {
-			const number = this.class(i, w) && this.labels[at(this.lives[i][4], w)], seconds = ends[w] - starts[w];
+			const number = this.class(i, w) && this.labels[at(this.runs[i][4], w)], seconds = ends[w] - starts[w];
 			time += seconds;
 			sum += (+number || 0) * seconds;
 			isKnown ||= !!number;
@@ -89,12 +92,12 @@ class Graph {
 	rate(i, from, to = from) {
 		const [sum, time, isKnown] = this.sent(i, from, to), hz = sum && sum / time;
 		if (!isKnown || !sum && /^(latched|declared)/.test(this.classes[this.class(i, to)])) return '';
-		const each = / each$/.test(this.labels[at(this.lives[i][1], to)]) ? ' each' : '';
-		return (Math.abs(sum - 1) < .01 ? '1 msg' : spell(hz < 999.5 ? hz : hz / 1e3) + (hz < 999.5 ? ' Hz' : ' kHz')) + each;
+		const each = / each$/.test(this.labels[at(this.runs[i][1], to)]) ? ' each' : '';
+		return (Math.abs(sum - 1) < .01 ? '1 msg' : withUnit(hz)) + each;
 	}
-	lifecycle(i, w) { return this.labels[at(this.lives[i][2], w)]; }
-	turn(i, w) {
-		const list = this.lives[i][3], p = place(list, w);
+	lifecycle(i, w) { return this.labels[at(this.runs[i][2], w)]; }
+	rateChange(i, w) {
+		const list = this.runs[i][3], p = place(list, w);
 		return p && list[p - 2] == w ? this.labels[list[p - 1]] : '';
 	}
 	// The difference between two windows: class words and text.
@@ -109,8 +112,8 @@ class Graph {
 		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;
 	}
 	// The windows in which it changes.
-	turns(i) {
-		const found = new Set(told.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.lives[i][0];
+	changesOf(i) {
+		const found = new Set(reported.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.runs[i][0];
 		for (let r = 0; r < list.length; r += 2) {
 			if (this.marks[list[r + 1]] >= 0) for (let w = list[r]; w < Math.min(list[r + 2] ?? W, list[r] + 1000); w++) found.add(w);
 		}
@@ -119,4 +122,4 @@ class Graph {
 }
 const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);
 const folded = data.graphs[1] && new Graph(data.graphs[1], $.folded);
-const news = new Map(told.map(([w, n, counts, lines]) => [w, { n, counts, lines }]));
+const headlines = new Map(reported.map(([w, n, counts, lines]) => [w, { n, counts, lines }]));

@@ -5,9 +5,9 @@ function side(on) {
 	toggle('toside', 'noside', on);
 	resized();
 }
-function livesOn(on) {
-	$.tolives.ariaPressed = on;
-	$.deck.classList.toggle('small', !on);
+function showLifelines(on) {
+	$.tolifelines.ariaPressed = on;
+	$.controls.classList.toggle('small', !on);
 	resized();
 }
 function escape() {
@@ -23,7 +23,7 @@ let isChosen = false;
 function arrange() {
 	if (isChosen || beforePrint) return;
 	side(innerWidth >= 1200 || innerWidth <= 760);
-	livesOn(isBoard || innerWidth > 760 && innerHeight > 600);
+	showLifelines(isTopicTimeline || innerWidth > 760 && innerHeight > 600);
 }
 const choose = (arranges, on) => { isChosen = true; arranges(on); };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1, '.': 1, ',': -1, PageDown: W / 10, PageUp: -W / 10, Home: -W, End: W };
@@ -32,7 +32,7 @@ const KEYS = {
 	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
 	'/': () => { choose(side, true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
 	g: () => enlarge($.big.hidden), r: () => { if (data.sides) return; if (range) { span(null); seek(now); } else { anchor = now; go(now); } },
-	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => choose(livesOn, $.deck.classList.contains('small')), s: () => choose(side, !sideIsOpen()),
+	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => choose(showLifelines, $.controls.classList.contains('small')), s: () => choose(side, !sideIsOpen()),
 	o: () => { if (group >= 0) unfold(); else if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
 };
 const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + Math.sign(MOVES[key]) * Math.ceil(Math.abs(MOVES[key] * far)) : Math.round(last * key / 10));
@@ -75,21 +75,21 @@ addEventListener('resize', arrange);
 arrange();
 // Printed pages show the whole graph, with names and lifelines, regardless of the screen.
 onbeforeprint = () => {
-	beforePrint = [view, $.deck.classList.contains('small'), $.notes.open];
+	beforePrint = [view, $.controls.classList.contains('small'), $.notes.open];
 	$.notes.open = true;
-	if (!isBoard) fit(homeOf());
+	if (!isTopicTimeline) fit(homeOf());
 	svg().classList.remove('norates', 'notopics', 'nonodes');
-	$.deck.classList.remove('small');
+	$.controls.classList.remove('small');
 	$.time.style.width = '42rem';
 	drawTime();
-	// On one sheet, so that names and lives stay side by side.
+	// On one sheet, so that names and lifelines stay side by side.
 	$.time.style.zoom = Math.max(.4, Math.min(1, 600 / $.time.offsetHeight));
 };
 onafterprint = () => {
 	const [box, isSmall, isOpen] = beforePrint;
 	$.notes.open = isOpen;
 	beforePrint = $.time.style.width = $.time.style.zoom = '';
-	livesOn(!isSmall);
+	showLifelines(!isSmall);
 	fit(box);
 };
 load(location.hash.slice(1));

@@ -21,32 +21,32 @@ function fill(id, all, row, most = MANY) {
 const signOf = i => range ? (([look]) => look == 'off' ? 'away' : KINDS.find(kind => look.endsWith(kind)) ?? '')(looksOf(whole)[i]) : base < 0 ? KINDS[whole.marks[whole.class(i, now)]] ?? (whole.isThere(i, now) ? '' : 'away') : whole.difference(i, base, now)[0] ?? '';
 // An element with its rate, or with its difference.
 function element(i) {
-	const [, differs] = range ? NONE : base < 0 ? [0, whole.turn(i, now)] : whole.difference(i, base, now);
+	const [, differs] = range ? NONE : base < 0 ? [0, whole.rateChange(i, now)] : whole.difference(i, base, now);
 	const rate = differs || whole.rate(i, ...range ?? [now]);
 	return entry(i, whole.name(i) + (rate ? '  ' + rate : ''), signOf(i));
 }
-function listNews() {
+function listChanges() {
 	if (base < 0) {
-		say('newstitle', data.sides ? 'Differences' : range ? 'Changes in these windows' : 'Changes in this window');
-		const all = told.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
+		setText('changestitle', data.sides ? 'Differences' : range ? 'Changes in these windows' : 'Changes in this window');
+		const all = reported.filter(([w]) => range ? w >= range[0] && w <= range[1] : w == now);
 		const lines = all.flatMap(([w]) => linesOf(w)), n = all.reduce((sum, [, n, , lines]) => sum + n - lines.length, lines.length);
 		// Still empty.
-		if (!n && $.news.firstChild?.textContent == 'None.') return;
-		fill('news', lines, ([s, sign, i, text, id]) => {
+		if (!n && $.changes.firstChild?.textContent == 'None.') return;
+		fill('changes', lines, ([s, sign, i, text, id]) => {
 			const line = entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s)));
 			line.dataset.entry = id;
 			return line;
 		});
-		if (n > lines.length) $.news.append(make('p', { textContent: `and ${n - lines.length} more` }));
-		if (!n) $.news.append(make('p', { textContent: 'None.' }));
+		if (n > lines.length) $.changes.append(make('p', { textContent: `and ${n - lines.length} more` }));
+		if (!n) $.changes.append(make('p', { textContent: 'None.' }));
 		return;
 	}
-	say('newstitle', `Differences from window ${base + 1}`);
+	setText('changestitle', `Differences from window ${base + 1}`);
 	const all = marked(whole);
-	fill('news', all, element);
-	if (!all.length) $.news.append(make('p', { textContent: 'None.' }));
+	fill('changes', all, element);
+	if (!all.length) $.changes.append(make('p', { textContent: 'None.' }));
 }
-onSeek.push(listNews);
+onSeek.push(listChanges);
 
 // Search: all words must be in name or type; `a -> b` finds connections. An exact last part comes first, then
 // names that begin with the text, then names that contain it; without any, names with other separators, similar
@@ -94,13 +94,12 @@ let hitList = NONE;
 function search() {
 	const q = $.q.value;
 	hitList = found(q);
-	hits = q ? new Set(hitList.flatMap(i => [i, ...(i < whole.N ? whole.ends(i) : whole.ends(i))])) : null;
-	if (hits) for (const i of hitList) if (i < whole.N) for (const k of whole.ends(i)) whole.ends(k).forEach(end => hits.add(end));
-	if (hits && shown == folded) hits = new Set(shown.holds.flatMap((held, i) => held.some(h => hits.has(h)) ? i : NONE).concat([...Array(shown.count - shown.N).keys()].map(k => k + shown.N)));
-	say('count', q && (hitList.length ? `${hitList.length} found` : 'no matches'));
+	hits = q ? new Set(hitList.flatMap(i => whole.nearby(i))) : null;
+	if (hits && shown == folded) hits = new Set(shown.members.flatMap((inside, i) => inside.some(h => hits.has(h)) ? i : NONE).concat([...Array(shown.count - shown.N).keys()].map(k => k + shown.N)));
+	setText('count', q && (hitList.length ? `${hitList.length} found` : 'no matches'));
 	$.onlybox.hidden = !q;
 	fill('hits', hitList, element);
-	dress();
+	redraw();
 	save();
 }
 function clearSearch() {
@@ -109,7 +108,7 @@ function clearSearch() {
 	search();
 }
 $.q.oninput = search;
-$.only.onchange = () => { only = $.only.checked; dress(); };
+$.only.onchange = () => { only = $.only.checked; redraw(); };
 // Namespaces, each with a checkbox that hides it.
 function listSpaces() {
 	const counts = new Map();
@@ -122,5 +121,5 @@ function listSpaces() {
 		save();
 	} }), ` ${space == '/' ? 'no namespace' : space} (${n})`)));
 }
-$.known.hidden = !isBoard || !whole.kinds.includes(0);
+$.known.hidden = !isTopicTimeline || !whole.kinds.includes(0);
 onSeek.push(() => $.known.hidden || fill('knownlist', [...whole.kinds.keys()].filter(i => !whole.kinds[i] && !/ \?( ×\d+)?$/.test(whole.names[i])), element));

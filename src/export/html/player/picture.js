@@ -17,7 +17,7 @@ function looksOf(g) {
 	if (rangeLooks.has(g)) return rangeLooks.get(g);
 	const [from, to] = range, looks = [];
 	for (let i = 0; i < g.count; i++) {
-		const list = g.lives[i][0], first = g.class(i, from), after = g.isThere(i, to);
+		const list = g.runs[i][0], first = g.class(i, from), after = g.isThere(i, to);
 		let last = -1;
 		for (let p = Math.max(0, place(list, from) - 2); p < list.length && list[p] <= to; p += 2) {
 			if (list[p + 1]) last = list[p + 1];
@@ -30,6 +30,7 @@ function looksOf(g) {
 	return looks;
 }
 const spell = hz => hz >= 99.95 ? hz.toFixed(0) : hz >= .95 ? +hz.toFixed(1) + '' : hz ? +hz.toPrecision(2) + '' : '0';
+const withUnit = hz => hz < 999.5 ? spell(hz) + ' Hz' : spell(hz / 1e3) + ' kHz';
 // Shows a range of windows as one graph; `null` shows single windows again.
 function span(ends) {
 	range = ends && [Math.min(...ends), Math.max(...ends)];
@@ -48,11 +49,11 @@ function labelOf(g, i, w) {
 	const topic = i >= g.N && g.arrows[i - g.N][2], named = text => (topic ? topic + ' ' : '') + (text == NIL ? '' : text);
 	if (range) return named(looksOf(g)[i][1]);
 	if (base >= 0) return named(g.difference(i, base, w)[1] ?? g.rate(i, w));
-	const lifecycle = g.lives[i][2].length && g.lifecycle(i, w), turn = g.turn(i, w);
-	return lifecycle || turn && named(turn) || g.labels[at(g.lives[i][1], w)];
+	const lifecycle = g.runs[i][2].length && g.lifecycle(i, w), turn = g.rateChange(i, w);
+	return lifecycle || turn && named(turn) || g.labels[at(g.runs[i][1], w)];
 }
 // Updates the elements of the stage to the current window; returns those that look different.
-function dress() {
+function redraw() {
 	const g = shown, moved = [];
 	g.els.forEach((e, i) => {
 		const look = classOf(g, i, now) + (isOut(g, i) ? ' without' : ''), cls = near.has(i) ? look + ' near' : look, all = hits?.has(i) ? cls + ' hit' : cls;
@@ -62,10 +63,10 @@ function dress() {
 		}
 		const text = g.live[i];
 		if (look == 'off' || !text) return;
-		const says = labelOf(g, i, now);
-		if (text.says != says) text.textContent = text.says = says;
+		const label = labelOf(g, i, now);
+		if (text.shown != label) text.textContent = text.shown = label;
 	});
-	g.spaces.forEach(([frame, held]) => frame.classList.toggle('without', held.every(i => /^off|without/.test(g.cur[i]))));
+	g.spaces.forEach(([frame, inside]) => frame.classList.toggle('without', inside.every(i => /^off|without/.test(g.cur[i]))));
 	g.svg?.classList.toggle('filtered', only && !!hits);
 	g.svg?.classList.toggle('pinned', near.size > 0);
 	return moved;
@@ -76,11 +77,11 @@ function marked(g = shown) {
 	return [...Array(g.count).keys()].filter(i => isMarked(i) && !isOut(g, i));
 }
 // The headlines of a window about elements that are not hidden.
-const linesOf = w => (news.get(w)?.lines ?? NONE).filter(line => line[2] < 0 || !isOut(whole, line[2]));
+const linesOf = w => (headlines.get(w)?.lines ?? NONE).filter(line => line[2] < 0 || !isOut(whole, line[2]));
 function countsOf() {
 	if (base < 0 && !range) {
 		const all = linesOf(now), n = [0, 1, 2].map(sign => all.filter(line => line[1] == sign).length);
-		return all.length == news.get(now)?.lines.length ? news.get(now).counts : n.map((n, k) => n && ['+' + n, '−' + n, n + ' changed'][k]).map(text => text || '');
+		return all.length == headlines.get(now)?.lines.length ? headlines.get(now).counts : n.map((n, k) => n && ['+' + n, '−' + n, n + ' changed'][k]).map(text => text || '');
 	}
 	const sum = { added: [0, 0, 0], removed: [0, 0, 0], changed: [0, 0, 0] };
 	marked(whole).forEach(i => sum[range ? looksOf(whole)[i][0].split(' ').at(-1) : whole.difference(i, base, now)[0].split(' ')[0]][i < whole.N ? +(whole.kinds[i] % 3 > 0) : 2]++);
@@ -91,23 +92,24 @@ function seek(w, quiet) {
 	w = Math.max(0, Math.min(last, w));
 	const step = (w - now) ** 2;
 	now = w;
-	const moved = dress();
+	const moved = redraw();
 	if (step == 1 && moved.length < 41 && !calm.matches) moved.forEach(i => shown.els[i].animate({ opacity: [.2, 1] }, 250));
 	header();
-	onSeek.forEach(tell => tell());
+	onSeek.forEach(update => update());
 	if (quiet) return;
 	const lines = linesOf(now);
-	say('live', [clock(starts[now]), `window ${now + 1} of ${W}`, ...lines.slice(0, 5).map(line => line[3])].join(', '));
+	setText('live', [clock(starts[now]), `window ${now + 1} of ${W}`, ...lines.slice(0, 5).map(line => line[3])].join(', '));
 	save();
 }
+const rangeTimes = () => `${clock(starts[range[0]])} – ${clock(ends[range[1]])}`;
 function header() {
 	const place = `window ${now + 1} of ${W}`, counts = countsOf();
-	if (range) say('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${clock(starts[range[0]])} – ${clock(ends[range[1]])} of ${clock(total)} · mean rates`);
-	else say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
+	if (range) setText('where', `windows ${range[0] + 1} to ${range[1] + 1} of ${W} · ${rangeTimes()} of ${clock(total)} · mean rates`);
+	else setText('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · compared with window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
-	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
+	setText('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
 	// The log events that the badges count; a difference between two arbitrary windows need not be an event.
 	if (base < 0 && !range) $.counts.dataset.entries = linesOf(now).map(line => line[4]).join(' ');
@@ -121,7 +123,7 @@ function play(on) {
 	clearTimeout(timer);
 	if (on) span(null);
 	timer = on && setTimeout(() => { seek(now == last && looping ? 0 : now + 1, 1); play(looping || now < last); }, 1e3 / $.speed.value);
-	say('play', on ? 'Pause' : 'Play');
+	setText('play', on ? 'Pause' : 'Play');
 	if (on && now == last) seek(0, 1);
 	if (!on) save();
 }
@@ -133,17 +135,17 @@ function go(w) {
 }
 // To the next window with a headline; only of the followed element, if any.
 function jump(by) {
-	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.turns(sel) : news;
+	const turns = $.follow.ariaPressed == 'true' && sel >= 0 ? whole.changesOf(sel) : headlines;
 	let w = now;
 	do w += by; while (w >= 0 && w < W && !turns.has(w));
 	if (w >= 0 && w < W) go(w);
-	else { play(0); say('live', by > 0 ? 'No later change' : 'No earlier change'); }
+	else { play(0); setText('live', by > 0 ? 'No later change' : 'No earlier change'); }
 }
 function compare(w) {
 	if (w >= 0) span(null);
 	base = w;
 	$.compare.ariaPressed = base >= 0;
-	say('compare', base < 0 ? 'Compare' : 'Stop comparing');
+	setText('compare', base < 0 ? 'Compare' : 'Stop comparing');
 	seek(now);
 }
 // Shows another graph on the stage.
@@ -152,8 +154,8 @@ function show(g) {
 	shown.svg.setAttribute('hidden', '');
 	shown = g;
 	shown.svg.removeAttribute('hidden');
-	say('open', shown == folded ? 'Expand all' : 'Collapse');
-	near = near_of(sel);
-	dress();
+	setText('open', shown == folded ? 'Expand all' : 'Collapse');
+	near = nearOf(sel);
+	redraw();
 	fit(shown.home);
 }

@@ -38,14 +38,10 @@ function load(hash = '') {
 }
 // The stage as it is, with its style rules and its font.
 function picture() {
-	const copy = svg().cloneNode(true), k = scaleOf(view);
-	const box = [view[0] + view[2] / 2 - wide / k / 2, view[1] + view[3] / 2 - high / k / 2, wide / k, high / k];
-	for (const [key, value] of Object.entries({ xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high, viewBox: box.join(' ') })) copy.setAttribute(key, value);
-	const style = document.createElementNS('http://www.w3.org/2000/svg', 'style'), ground = document.createElementNS('http://www.w3.org/2000/svg', 'rect');
-	style.textContent = [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join('');
-	['x', 'y', 'width', 'height'].forEach((key, n) => ground.setAttribute(key, box[n]));
-	ground.setAttribute('style', `fill:${getComputedStyle(document.body).backgroundColor};stroke:none`);
-	copy.prepend(style, $.signs.querySelector('defs').cloneNode(true), ground);
+	const copy = svg().cloneNode(true), [x, y, width, height] = visible();
+	set(copy, { xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high, viewBox: [x, y, width, height].join(' ') });
+	const style = drawn('style', {}, [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join(''));
+	copy.prepend(style, $.signs.querySelector('defs').cloneNode(true), drawn('rect', { x, y, width, height, style: `fill:${getComputedStyle(document.body).backgroundColor};stroke:none` }));
 	copy.querySelectorAll('.off').forEach(e => e.remove());
 	return new XMLSerializer().serializeToString(copy);
 }
@@ -53,7 +49,7 @@ const fileName = kind => `${document.title.replace(/\.\w+$/, '').replace(/[^\w.-
 function download(href, kind) {
 	const a = make('a', { href, download: fileName(kind) });
 	a.click();
-	say('live', `Saved ${a.download}`);
+	setText('live', `Saved ${a.download}`);
 }
 async function savePicture(kind) {
 	const url = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(picture());
@@ -70,5 +66,5 @@ $.save.onchange = async () => {
 	$.save.blur();
 	if (what != 'link') return savePicture(what);
 	const url = location.href.split('#')[0] + link();
-	try { await navigator.clipboard.writeText(url); say('live', 'Link copied'); } catch { say('live', url); prompt?.('The link', url); }
+	try { await navigator.clipboard.writeText(url); setText('live', 'Link copied'); } catch { setText('live', url); prompt?.('The link', url); }
 };

@@ -1,36 +1,33 @@
 // The selection: its name, its evidence, its changes, and its connections.
-function near_of(i) {
-	if (i < 0) return new Set();
-	const at = shown == whole ? [i] : [...shown.holds.keys()].filter(k => shown.holds[k].includes(i));
-	return new Set(at.flatMap(k => [k, ...shown.ends(k).flatMap(end => end < shown.N ? end : [end, ...shown.ends(end)])]));
-}
+// The elements on the stage that represent an element of the whole graph.
+const onStage = i => i < 0 ? NONE : shown == whole ? [i] : [...shown.members.keys()].filter(k => shown.members[k].includes(i));
+const nearOf = i => new Set(onStage(i).flatMap(k => shown.nearby(k)));
 // The element of the whole graph for an element on the stage: the same one, or the first of its members.
 const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key(i)) ?? -1 : -1;
 // Selects an element of the whole graph; `look` brings it into view, `from` means that a list did.
 function pick(i, look, fromList, isTimed) {
 	sel = i;
 	group = -1;
-	if (i >= 0 && look && !isTimed && !whole.isThere(i, now) && base < 0 && !range) toLife(i);
-	if (i >= 0 && look && shown == folded && !near_of(i).size) show(whole);
-	near = near_of(i);
-	dress();
+	if (i >= 0 && look && !isTimed && !whole.isThere(i, now) && base < 0 && !range) toNearest(i);
+	if (i >= 0 && look && shown == folded && !nearOf(i).size) show(whole);
+	near = nearOf(i);
+	redraw();
 	if (i < 0) $.follow.ariaPressed = false;
 	card();
 	drawRow();
 	rowNames[rows.findIndex(([k]) => k >= 0 && k == i)]?.scrollIntoView({ block: 'nearest' });
 	if (look && i >= 0) {
-		const mine = shown == whole ? [i] : [...shown.holds.keys()].filter(k => shown.holds[k].includes(i));
-		bring(mine, Math.max(scaleOf(view), TOPIC), 1.5);
+		bring(onStage(i), Math.max(scaleOf(view), TOPIC), 1.5);
 		if (fromList && innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
 	}
 	save();
 }
 // To the nearest window in which an element exists.
-function toLife(i) {
+function toNearest(i) {
 	for (let far = 1; far < W; far++) for (const w of [now - far, now + far]) {
 		if (w >= 0 && w < W && whole.isThere(i, w)) {
 			go(w);
-			return say('live', `${whole.name(i)} does not exist at that time; the nearest time is ${clock(starts[w])}`);
+			return setText('live', `${whole.name(i)} does not exist at that time; the nearest time is ${clock(starts[w])}`);
 		}
 	}
 }
@@ -44,11 +41,10 @@ function pickGroup(i) {
 }
 // In the picture, a group and its connections; when expanded, its members and their connections.
 function pin() {
-	near = new Set(shown == folded ? nearBox(group) : folded.holds[group].flatMap(i => i < whole.N ? [i, ...whole.ends(i)] : i));
-	dress();
+	near = new Set(shown == folded ? shown.nearby(group) : folded.members[group].flatMap(i => i < whole.N ? [i, ...whole.ends(i)] : i));
+	redraw();
 	card();
 }
-const nearBox = i => [i, ...shown.ends(i).flatMap(end => [end, ...shown.ends(end)])];
 // Expands the group in place, with its members around its middle, as far as all of them are visible. Or
 // collapses it again and restores the previous view.
 function unfold() {
@@ -57,17 +53,17 @@ function unfold() {
 		fit(viewBefore ?? homeOf());
 		return pin();
 	}
-	const k = scaleOf(view), [x, y, w, h] = folded.boxes[group], held = folded.holds[group].filter(i => i < whole.N);
+	const k = scaleOf(view), [x, y, w, h] = folded.boxes[group], inside = folded.members[group].filter(i => i < whole.N);
 	const there = [wide / 2 + k * (x + w / 2 - view[0] - view[2] / 2), high / 2 + k * (y + h / 2 - view[1] - view[3] / 2)];
 	viewBefore = view;
 	show(whole);
-	bring(held, TOPIC);
+	bring(inside, TOPIC);
 	pin();
-	stand(around(boxesOf(held)), there);
-	say('live', `${held.length} elements, expanded`);
+	centerAt(around(boxesOf(inside)), there);
+	setText('live', `${inside.length} elements, expanded`);
 }
 // Moves the view so that the middle of a box is at a point of the stage, and all of the box is visible.
-function stand([x, y, w, h], there) {
+function centerAt([x, y, w, h], there) {
 	const k = scaleOf(view), within = (at, part, all) => Math.max(part / 2, Math.min(all - part / 2, at));
 	if (w * k > wide || h * k > high) return minimap();
 	const left = within(there[0], w * k, wide), top = within(there[1], h * k, high);
@@ -79,7 +75,7 @@ const DEGREES = { stated: 'stated by a log, graph or file', inferred: 'inferred 
 // The facts about an element in some windows, line by line.
 function explain(g, i, [from, to] = range ?? [now, now]) {
 	const isRange = from < to, [state, ...rest] = (isRange ? looksOf(g)[i][0] : g.classes[g.class(i, from)]).split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
-	const turn = !isRange && g.turn(i, from), rate = g.rate(i, from, to), lifecycle = g.lifecycle(i, to), has = word => rest.includes(word);
+	const turn = !isRange && g.rateChange(i, from), rate = g.rate(i, from, to), lifecycle = g.lifecycle(i, to), has = word => rest.includes(word);
 	const now = [has('removed') ? 'ended in this window' : STATES[isRange && state == 'silent' && rate != NIL ? 'active' : state], has('added') && 'began in this window', turn && 'rate ' + turn, rate && (rate == NIL ? state == 'active' && 'no message in this window' : rate + ' in this window'), lifecycle && 'state ' + lifecycle, has('starved') && 'gets nothing (quality of service)', state != 'off' && degree];
 	const text = now.filter(Boolean).join(' · ');
 	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, isRange ? text.replaceAll('this window', 'this range') : text, ...g.facts[i]];
@@ -88,52 +84,45 @@ function card() {
 	const g = group < 0 ? whole : folded, i = group < 0 ? sel : group;
 	if ($.card.hidden = i < 0) return;
 	const [title, state, ...facts] = explain(g, i), differs = base < 0 ? NONE : g.difference(i, base, now);
-	say('name', g.name(i));
+	setText('name', g.name(i));
 	$.title.className = 'is-' + g.kind(i);
-	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · compared with window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
+	setText('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · compared with window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
 	// The members of a group are listed below.
 	$.facts.replaceChildren(...facts.filter(fact => group < 0 || !/^\d+ together/.test(fact)).map(fact => make('p', { textContent: fact })));
-	drawLife(g.lives[i][0], g.classes);
+	drawLifeline(g.runs[i][0], g.classes);
 	drawRate($.rate, g, i);
 	$.rate.toggleAttribute('hidden', !$.rate.childElementCount);
 	$.enlarge.hidden = $.rate.hasAttribute('hidden');
 	if (!$.big.hidden) enlarge(true);
 	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;
-	say('unfold', shown == whole ? 'Collapse' : 'Expand');
-	say('endstitle', group < 0 ? 'Connected' : 'Members');
-	const past = told.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.holds[group].includes(line[2])).map(line => [w, ...line]));
-	$.story.hidden = !past.length;
+	setText('unfold', shown == whole ? 'Collapse' : 'Expand');
+	setText('endstitle', group < 0 ? 'Connected' : 'Members');
+	const past = reported.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.members[group].includes(line[2])).map(line => [w, ...line]));
+	$.history.hidden = !past.length;
 	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
-	fill('ends', group < 0 ? whole.ends(sel) : folded.holds[group], element);
+	fill('ends', group < 0 ? whole.ends(sel) : folded.members[group], element);
 }
-function drawLife(life, classes) {
+function drawLifeline(runs, classes) {
 	const bits = [];
-	for (let k = 0; k < life.length && bits.length < 2000; k += 2) if (life[k + 1]) bits.push([classes[life[k + 1]], starts[life[k]], starts[life[k + 2]] ?? total]);
-	$.life.setAttribute('viewBox', `0 0 ${total} 9`);
-	$.life.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
+	for (let k = 0; k < runs.length && bits.length < 2000; k += 2) if (runs[k + 1]) bits.push([classes[runs[k + 1]], starts[runs[k]], starts[runs[k + 2]] ?? total]);
+	$.lifeline.setAttribute('viewBox', `0 0 ${total} 9`);
+	$.lifeline.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
 }
-// The rate of an element in each window, with an axis; empty if it has none.
+// The rate of an element in each window, with axes; empty if it has none.
 function drawRate(svg, g, i, w = 300, h = 84) {
-	const rates = starts.map((_, k) => g.hz(i, k)), top = Math.max(...rates), deep = 16, left = 4, x = s => left + s / total * (w - left - 4), y = hz => h - deep - hz / top * (h - deep - 18);
-	const named = (tag, attributes, text = '') => {
-		const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
-		for (const key in attributes) element.setAttribute(key, attributes[key]);
-		element.textContent = text;
-		return element;
-	};
-	svg.setAttribute('viewBox', `0 0 ${w} ${h}`);
-	if (!(top > 0)) return svg.replaceChildren();
+	const rates = starts.map((_, k) => g.hz(i, k)), most = Math.max(...rates), step = roundStep(most / (h < 150 ? 2 : 5)), top = Math.ceil(most / step) * step;
+	const deep = 16, left = 50, right = w - 4, x = s => left + s / total * (right - left), y = hz => h - deep - hz / top * (h - deep - 8);
+	set(svg, { viewBox: `0 0 ${w} ${h}`, 'aria-label': `Rate of ${g.name(i)}, at most ${withUnit(most)}` });
+	if (!(most > 0)) return svg.replaceChildren();
 	const from = range?.[0] ?? now, to = range?.[1] ?? now;
 	const line = rates.map((hz, k) => `${k ? 'L' : 'M'}${x(starts[k]).toFixed(1)} ${y(hz).toFixed(1)}H${x(ends[k]).toFixed(1)}`).join('');
-	const grid = w > 400 ? [0, .25, .5, .75, 1] : [0, 1], times = w > 400 ? [0, .25, .5, .75, 1] : [0, 1];
+	const times = ticksOf(total, right - left), last = times.length - 1;
 	svg.replaceChildren(
-		named('rect', { class: 'now', x: x(starts[from]), y: 14, width: Math.max(2, x(ends[to]) - x(starts[from])), height: h - deep - 14 }),
-		...grid.map(k => named('path', { class: 'grid', d: `M${left} ${y(top * k)}H${w - 4}` })),
-		named('path', { class: 'line', d: line }),
-		...grid.slice(1).map(k => named('text', { x: left, y: y(top * k) - 3 }, spell(top * k) + ' Hz')),
-		...times.map(k => named('text', { x: x(total * k), y: h - 3, 'text-anchor': k == 0 ? 'start' : k == 1 ? 'end' : 'middle' }, clock(Math.floor(total * k)))));
-	svg.setAttribute('aria-label', `Rate of ${g.name(i)}, at most ${spell(top)} Hz`);
+		drawn('rect', { class: 'now', x: x(starts[from]), y: 8, width: Math.max(2, x(ends[to]) - x(starts[from])), height: h - deep - 8 }),
+		...multiples(step, top).flatMap(hz => [drawn('path', { class: 'grid', d: `M${left} ${y(hz)}H${right}` }), drawn('text', { x: left - 5, y: y(hz) + 4, 'text-anchor': 'end' }, withUnit(hz))]),
+		drawn('path', { class: 'line', d: line }),
+		...times.flatMap(([s, text], k) => [drawn('path', { class: 'grid', d: `M${x(s)} ${h - deep}v4` }), drawn('text', { x: x(s), y: h - 1, 'text-anchor': ['start', 'middle', 'end'][k && 1 + (k == last)] }, text)]));
 }
 // The same plot in the size of the stage.
 function enlarge(on) {
@@ -141,7 +130,7 @@ function enlarge(on) {
 	on &&= i >= 0;
 	$.big.hidden = !on;
 	if (!on) return $.enlarge.focus();
-	say('bigname', g.name(i));
+	setText('bigname', g.name(i));
 	drawRate($.bigplot, g, i, Math.max(500, $.big.clientWidth - 24), Math.max(200, $.big.clientHeight - 70));
 }
 $.enlarge.onclick = () => enlarge(true);

@@ -9,16 +9,16 @@ const before = () => base < 0 ? Math.max(0, now - 1) : base;
 const change = i => range ? 0 : whole.hz(i, now) - whole.hz(i, before());
 const classNow = i => range ? looksOf(whole)[i][0] : whole.classes[whole.class(i, now)];
 const isHere = i => range ? classNow(i) != 'off' : whole.isThere(i, now);
-const ofLife = new Map();
+const courses = new Map();
 // The times at which it existed, and its rates in at most 60 steps.
 function course(i) {
-	if (!ofLife.has(i)) {
-		const list = whole.lives[i][0], there = [];
+	if (!courses.has(i)) {
+		const list = whole.runs[i][0], there = [];
 		for (let k = 0; k < list.length; k += 2) if (whole.there[list[k + 1]]) there.push([starts[list[k]], starts[list[k + 2]] ?? total]);
 		const steps = Math.min(W, 60), rates = Array.from({ length: steps }, (_, k) => whole.hz(i, Math.floor((k + .5) * W / steps)));
-		ofLife.set(i, { first: there[0]?.[0] ?? Infinity, last: there.at(-1)?.[1] ?? 0, rates, mean: whole.hz(i, 0, last) });
+		courses.set(i, { first: there[0]?.[0] ?? Infinity, last: there.at(-1)?.[1] ?? 0, rates, mean: whole.hz(i, 0, last) });
 	}
-	return ofLife.get(i);
+	return courses.get(i);
 }
 const times = i => [course(i).first, course(i).last], mean = i => course(i).mean;
 function sparkline(rates) {
@@ -32,7 +32,7 @@ function chosen() {
 	return edges.filter(i => {
 		const of = whole.kind(i).replace('topics', 'topic').replace('namespace', 'node');
 		const state = $.tstate.value;
-		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : range ? /added|removed/.test(looksOf(whole)[i][0]) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.turn(i, now) : whole.difference(i, base, now).length));
+		return (kind ? of == kind : of != 'edge') && (!state || (state == 'here' ? isHere(i) : range ? /added|removed/.test(looksOf(whole)[i][0]) : base < 0 ? whole.marks[whole.class(i, now)] >= 0 || whole.rateChange(i, now) : whole.difference(i, base, now).length));
 	});
 }
 function cells(i) {
@@ -49,9 +49,9 @@ function cells(i) {
 }
 function fillTable() {
 	if ($.sheet.hidden) return;
-	const value = COLUMNS[sortBy][1], all = chosen(), held = new Map(all.map(i => [i, value(i)]));
+	const value = COLUMNS[sortBy][1], all = chosen(), values = new Map(all.map(i => [i, value(i)]));
 	all.sort((a, b) => {
-		const [x, y] = [held.get(a), held.get(b)], order = x < y ? -1 : x > y ? 1 : 0;
+		const [x, y] = [values.get(a), values.get(b)], order = x < y ? -1 : x > y ? 1 : 0;
 		return order ? (upward ? order : -order) : a - b;
 	});
 	const [head, body] = $.sheet.querySelectorAll('thead, tbody');
@@ -67,7 +67,7 @@ function fillTable() {
 		return row;
 	}));
 	if (all.length > most) body.append(make('tr', {}, make('td', { colSpan: COLUMNS.length }, make('button', { textContent: `and ${all.length - most} more`, onclick: () => { most *= 4; fillTable(); } }))));
-	say('tcount', `${all.length} of ${$.tkind.value == 'edge' ? whole.count - whole.N : whole.N}`);
+	setText('tcount', `${all.length} of ${$.tkind.value == 'edge' ? whole.count - whole.N : whole.N}`);
 }
 onSeek.push(fillTable);
 function table(on) {

@@ -1,6 +1,6 @@
 // The view of the stage: a gesture moves the picture by X, Y, S; at its end it is redrawn. Text that is too
 // small to read is hidden.
-const isBoard = document.body.classList.contains('board');
+const isTopicTimeline = document.body.classList.contains('topic-timeline');
 let X = 0, Y = 0, S = 1, idle;
 const READABLE = 9, MOST = 6, pointers = new Map();
 for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
@@ -11,10 +11,15 @@ const homeOf = () => shown.home ?? (shown.home = $.graph.getAttribute('viewBox')
 let wide = stage.clientWidth, high = stage.clientHeight;
 const scaleOf = ([, , w, h]) => Math.min(wide / w, high / h);
 let view = homeOf();
+// The visible part of the graph.
+function visible() {
+	const k = scaleOf(view), w = wide / k, h = high / k;
+	return [view[0] + (view[2] - w) / 2, view[1] + (view[3] - h) / 2, w, h];
+}
 const [RATE, TOPIC, NODE] = sizes.map(size => READABLE / size);
 
 function fit(box) {
-	if (isBoard) return;
+	if (isTopicTimeline) return;
 	view = [...box];
 	svg().setAttribute('viewBox', view.join(' '));
 	const k = scaleOf(view), list = svg().classList;
@@ -37,9 +42,9 @@ function zoom(by, dx = 0, dy = 0, x = wide / 2, y = high / 2) {
 }
 // Redraws after a gesture, which only moves the picture.
 function settle() {
-	const k = scaleOf(view), left = view[0] - (wide / k - view[2]) / 2, top = view[1] - (high / k - view[3]) / 2;
+	const k = scaleOf(view), [left, top, w, h] = visible();
 	svg().style.willChange = svg().style.transform = '';
-	fit([left - X / S / k, top - Y / S / k, wide / k / S, high / k / S]);
+	fit([left - X / S / k, top - Y / S / k, w / S, h / S]);
 	X = Y = 0;
 	S = 1;
 }
@@ -73,7 +78,7 @@ function densest(boxes, w, h) {
 }
 // The whole graph if its names are legible or nobody can zoom out, else the changes of this window.
 function firstView() {
-	if (isBoard) return;
+	if (isTopicTimeline) return;
 	if (scaleOf(homeOf()) >= TOPIC || document.body.classList.contains('bare')) return fit(homeOf());
 	const all = marked();
 	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
@@ -81,10 +86,10 @@ function firstView() {
 }
 
 // The minimap: the whole graph, with a frame around the visible part.
+const itemBoxes = all => [...all].filter(i => i < shown.N).map(i => shown.boxes[i]);
 const outline = boxes => boxes.map(([x, y, w, h]) => `M${x} ${y}h${w}v${h}h-${w}z`).join('');
 function minimap() {
-	const [x, y, w, h] = homeOf(), k = scaleOf(view), seen = [wide / k, high / k];
-	const hidden = !shown.svg || seen[0] >= w * .98 && seen[1] >= h * .98;
+	const [, , w, h] = homeOf(), [x, y, width, height] = visible(), hidden = !shown.svg || width >= w * .98 && height >= h * .98;
 	$.mini.toggleAttribute('hidden', hidden);
 	if (hidden) return;
 	const [all, , picked, frame] = $.mini.children;
@@ -94,22 +99,20 @@ function minimap() {
 		all.setAttribute('d', outline(shown.boxes));
 	}
 	markMini();
-	picked.setAttribute('d', outline([...near].filter(i => i < shown.N).map(i => shown.boxes[i])));
-	const places = [view[0] + view[2] / 2 - seen[0] / 2, view[1] + view[3] / 2 - seen[1] / 2, ...seen];
-	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
+	picked.setAttribute('d', outline(itemBoxes(near)));
+	set(frame, { x, y, width, height });
 	outOfTheWay();
 }
 // The minimap is in the first corner in which it covers no selected element; if there is none, it fades.
 function outOfTheWay() {
-	const k = scaleOf(view), { width: w, height: h } = $.mini.getBoundingClientRect(), edge = 14;
-	const left = view[0] + view[2] / 2 - wide / k / 2, top = view[1] + view[3] / 2 - high / k / 2;
-	const boxes = boxesOf([...near].filter(i => i < shown.N)).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
+	const k = scaleOf(view), { width: w, height: h } = $.mini.getBoundingClientRect(), edge = 14, [left, top] = visible();
+	const boxes = itemBoxes(near).map(b => [(b[0] - left) * k, (b[1] - top) * k, b[2] * k, b[3] * k]);
 	const isFree = ([x, y]) => !boxes.some(b => b[0] < x + w + edge && b[0] + b[2] > x - edge && b[1] < y + h + edge && b[1] + b[3] > y - edge);
 	const corners = [['', wide - w, high - h], ['west', 0, high - h], ['north', wide - w, 0], ['north west', 0, 0]];
 	const free = corners.find(([, x, y]) => isFree([x, y]));
 	$.mini.setAttribute('class', free ? free[0] : 'faint');
 }
-const markMini = () => $.mini.children[1].setAttribute('d', outline(marked().filter(i => i < shown.N).map(i => shown.boxes[i])));
+const markMini = () => $.mini.children[1].setAttribute('d', outline(itemBoxes(marked())));
 onSeek.push(() => $.mini.hasAttribute('hidden') || markMini());
 function lookFromMini(e) {
 	const { left, top, width, height } = $.mini.getBoundingClientRect(), [x, y, w, h] = homeOf(), k = Math.min(width / w, height / h);
