@@ -34,6 +34,7 @@ mod stable;
 mod state;
 mod turn;
 pub(crate) mod union;
+pub(crate) mod words;
 
 use std::sync::Arc;
 

@@ -48,7 +48,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options"],
         &["group", "select"],
         &["bundles", "homes"],
-        &["items"],
+        &["items", "words"],
         &["apart", "frame", "lasting"],
         &["caption", "hidden", "marks", "nothing", "state"],
         &["turn"],

@@ -305,8 +305,12 @@ fn drawn(svg: &str) -> BTreeMap<&str, String> {
     all
 }
 
-/// A line of SVG with placeholders for rates and counts, without tooltip.
+/// A line of SVG with placeholders for rates and counts, without tooltip and lengths of texts.
 fn without_numbers(line: &str) -> String {
+    let mut parts = line.split(" textLength=\"");
+    let mut unmeasured = parts.next().unwrap_or_default().to_owned();
+    parts.for_each(|part| unmeasured += part.split_once('"').map_or("", |(_, rest)| rest));
+    let line = unmeasured.as_str();
     let (head, rest) = line.split_once("<title>").unwrap_or((line, ""));
     let rest = rest.split_once("</title>").map_or("", |(_, rest)| rest);
     let mut out = head.to_owned();

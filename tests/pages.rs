@@ -186,6 +186,56 @@ fn collapsed_elements_are_listed_in_page_and_report() {
 }
 
 #[test]
+fn a_page_lists_infrastructure_as_words() {
+    let edge = |node: &str, topic: &str| json!({"node": node, "topic": topic, "state": "active", "hz": 5.0});
+    let node = |name: &str| json!({"name": name, "state": "active", "hz": 5.0});
+    let topic = |name: &str| json!({"name": name, "types": ["a/T"], "state": "active", "count": 50, "hz": 5.0});
+    let start = 1_700_000_000_000_000_000_i64;
+    let window = |w: i64| {
+        json!({
+            "start_ns": start + w * 10_000_000_000, "end_ns": start + (w + 1) * 10_000_000_000, "messages": 10,
+            "nodes": (["/arm/camera_tf", "/arm/driver", "/arm/planner"].map(node)),
+            "topics": (["/arm/plan", "/tf"].map(topic)),
+            "publishes": [edge("/arm/planner", "/arm/plan"), edge("/arm/camera_tf", "/tf"), edge("/arm/driver", "/tf")],
+            "subscribes": [edge("/arm/driver", "/arm/plan"), edge("/arm/planner", "/tf")],
+        })
+    };
+    let windows: Vec<Value> = (0..3).map(window).collect();
+    let mission = json!({"schema": "bagreel.evolution/1", "bags": [{"name": "m", "format": "mcap"}], "windows": windows});
+    let page = read(&rendered(&mission, &["html"]), "x.html");
+    let drawing = |key: &str| {
+        let rest = page.split_once(key).unwrap_or_else(|| panic!("no {key}")).1;
+        rest.split_once("</g>")
+            .unwrap()
+            .0
+            .split_once('>')
+            .unwrap()
+            .1
+            .to_owned()
+    };
+    assert_eq!(page.matches(">also here:</text>").count(), 2);
+    for (name, word) in [("/tf", "/tf"), ("/arm/camera_tf", "camera_tf")] {
+        let drawing = drawing(&format!(" data-name=\"{name}\""));
+        assert!(
+            drawing.starts_with("<text ") && drawing.contains(&format!(">{word}</text>")),
+            "{drawing}"
+        );
+    }
+    assert!(drawing(" data-name=\"/arm/driver\"").starts_with("<rect "));
+    assert_eq!(drawing(" data-from=\"/arm/camera_tf\" data-to=\"/tf\""), "");
+    assert!(drawing(" data-from=\"/arm/plan\" data-to=\"/arm/driver\"").contains("<path "));
+    // They can be found, with all their facts.
+    let graph = &data_of(&page)["graphs"][0];
+    let count = |key: &str| graph[key].as_array().unwrap().len();
+    assert_eq!([count("names"), count("boxes"), count("arrows")], [5, 5, 5]);
+    let shown = read(
+        &rendered_with(&mission, &["html"], &["--hide", "none"]),
+        "x.html",
+    );
+    assert!(!shown.contains("also here:"));
+}
+
+#[test]
 fn arrows_between_nodes_list_their_topics() {
     let pages = rendered_with(&running(&ROBOT, 20), &["html", "svg"], &["--mode", "nodes"]);
     let page = read(&pages, "x.html");

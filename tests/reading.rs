@@ -510,7 +510,7 @@ fn a_pipe_is_read_from_the_front() {
     }
 }
 
-/// Numbers that look random and are the same everywhere.
+/// Pseudo-random numbers, the same on every machine.
 struct Dice(u64);
 
 impl Dice {
@@ -616,7 +616,7 @@ fn wrong_numbers_are_tolerated_or_reported() {
             let all = kept.stamps.len() == recording.messages.len();
             assert!(
                 all || !report.complete,
-                "{} messages and no word",
+                "{} messages without a notice",
                 kept.stamps.len()
             );
         }
@@ -643,7 +643,7 @@ fn offsets_of_an_mcap_summary_are_not_trusted() {
         let renamed = kept.stamps.len() == recording.messages.len();
         assert!(
             all || renamed || !report.complete,
-            "at {at}: {} messages and no word",
+            "at {at}: {} messages without a notice",
             kept.stamps.len()
         );
     }

@@ -1,6 +1,6 @@
 //! The picture: a view, a layout and a style become one scene per window, with fixed positions.
 
-mod also;
+pub(crate) mod also;
 mod arrows;
 mod badge;
 mod boxes;
@@ -24,6 +24,7 @@ pub(crate) mod title;
 mod topics;
 mod tween;
 mod union;
+mod words;
 
 use self::arrows::ArrowPath;
 use self::boxes::{Boxes, ItemBox};

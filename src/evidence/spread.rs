@@ -1,4 +1,4 @@
-//! The variation of the lag between messages: of two streams on one path the one next to the output varies less.
+//! The variation of the lag between messages: of two streams on one path, that of the one closer to the output varies less.
 
 /// The lags seen so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -239,9 +239,12 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
     let opened = unfolded::opened(&mission, &drawing, Some(&view), &job.outputs)?;
+    let part = opened
+        .as_ref()
+        .and_then(|view| unfolded::part(view, &mission, &drawing, &job.outputs));
     let opened_picture = opened
         .as_ref()
-        .and_then(|view| unfolded::drawn(view, &drawing, &job.outputs));
+        .and_then(|view| unfolded::drawn((view, part.as_ref()), &drawing, &job.outputs));
     let lives = lives.filter(|_| opened.is_some()).map(LifeLines::new);
     let lives = job.sequence.pairs.clone().or(lives);
     let strip = match figure {

@@ -3,10 +3,14 @@
 use super::Drawing;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::draw::picture::also::MOST_LISTED;
 use crate::draw::picture::{Course, Measured, PageOptions, Picture};
+use crate::draw::scene::Scene;
 use crate::export::Output;
+use crate::export::sequence::{Drawings, UnionDrawings};
 use crate::mission::Mission;
-use crate::view::{View, view};
+use crate::view::words::{DrawnPart, drawn_part};
+use crate::view::{AlsoHere, View, view};
 
 /// The part of a screen that the graph of a page has: 3 : 2.
 const SCREEN: Size = Size::new(1200.0, 800.0);
@@ -45,15 +49,32 @@ fn is_page(output: &Output) -> bool {
     output.format.word == "html"
 }
 
+/// The part of that view that a page draws; `None` for all of it, or if no output is a page.
+pub(super) fn part(
+    view: &View,
+    mission: &Mission,
+    drawing: &Drawing,
+    outputs: &[Output],
+) -> Option<DrawnPart> {
+    let part = outputs.iter().any(is_page).then(|| {
+        let options = drawing.view.opened(&mission.elements);
+        drawn_part(view, mission, &options)
+    });
+    let is_listed = |also: &AlsoHere| also.items.len() <= MOST_LISTED;
+    part.flatten()
+        .filter(|part| part.view.also.iter().all(is_listed))
+}
+
 /// The picture of that view; `None` if no output is a page.
 pub(super) fn drawn<'a>(
-    view: &'a View,
+    (whole, part): (&'a View, Option<&'a DrawnPart>),
     drawing: &'a Drawing,
     outputs: &[Output],
-) -> Option<Picture<'a>> {
+) -> Option<OpenedDrawings<'a>> {
     if !outputs.iter().any(is_page) {
         return None;
     }
+    let view = part.map_or(whole, |part| &part.view);
     let page = PageOptions {
         size: SCREEN,
         bare: true,
@@ -62,5 +83,33 @@ pub(super) fn drawn<'a>(
         ..drawing.page.clone()
     };
     let measured = Measured::new(view, &drawing.style, &drawing.fonts, page);
-    Some(measured.laid_out(drawing.engine))
+    Some(OpenedDrawings {
+        picture: measured.laid_out(drawing.engine),
+        whole,
+        part,
+    })
+}
+
+/// The picture of a view, or of the part of it that is not listed as words.
+pub(super) struct OpenedDrawings<'a> {
+    picture: Picture<'a>,
+    whole: &'a View,
+    part: Option<&'a DrawnPart>,
+}
+
+impl Drawings for OpenedDrawings<'_> {
+    fn scene(&self, window: usize, phase: f64) -> Scene {
+        self.picture.between(window, phase)
+    }
+
+    fn graph(&self) -> Option<UnionDrawings<'_>> {
+        let drawings = self.picture.graph()?;
+        Some(match self.part {
+            Some(part) => UnionDrawings {
+                union: self.picture.union_with_words(self.whole, part),
+                ..drawings
+            },
+            None => drawings,
+        })
+    }
 }

@@ -250,7 +250,7 @@ impl Drawn {
     }
 
     /// Removes the topics of these rows and the boxes that are never shown, and renumbers everything.
-    fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
+    pub(super) fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
         let gone: BTreeSet<_> = rows
             .iter()
             .map(|row| (row.item.kind, row.item.name.clone()))

@@ -3,8 +3,8 @@
 //! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page
 //! already, only the rows. `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives
 //! the height of the rows, and `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A
-//! canvas in pixels (a timeline below frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with
-//! pixels per millimetre as its scale, and gives its groups by `into_groups`.
+//! canvas in pixels (a timeline below frames, the topic timeline) is `Canvas::new(fonts, sizes, scale)` with
+//! pixels per millimetre as its scale; `into_groups` returns its groups.
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
@@ -20,7 +20,7 @@ use crate::draw::style::Color;
 use crate::mission::EventId;
 use crate::mission::events::sentence;
 
-/// Lengths in pitches of 2.75 mm, as fractions of the pitch.
+/// Lengths as fractions of the pitch of rows, 2.75 mm.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
 /// The least width of a figure with a column of the topics that each row publishes and subscribes to, and the
 /// width of that column; in millimetres.

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use super::svg;
 use super::xml::Xml;
 use crate::draw::scene::{Group, Scene};
+use crate::draw::text::Fonts;
 
 /// Scenes as an animation.
 #[derive(Default)]
@@ -82,6 +83,7 @@ impl AnimatedScenes {
     /// The animation as SVG text; `still` is the scene for users with reduced motion.
     pub(crate) fn write(&self, title: &str, still: usize) -> String {
         let mut xml = Xml::default();
+        let fonts = Fonts::bundled();
         svg::open(&mut xml, &self.first);
         if !title.is_empty() {
             xml.leaf("title", title).raw("\n");
@@ -93,7 +95,7 @@ impl AnimatedScenes {
         svg::ground(&mut xml, &self.first);
         for slot in self.order.iter().map(|slot| &self.slots[*slot]) {
             for (k, (group, scenes)) in slot.looks.iter().enumerate() {
-                self.look(&mut xml, (k, group), scenes, still);
+                self.look(&mut xml, (k, group), (scenes, still), &fonts);
             }
         }
         xml.close().raw("\n");
@@ -101,9 +103,15 @@ impl AnimatedScenes {
     }
 
     /// Writes a look of a group, with the times at which it is visible, unless always.
-    fn look(&self, xml: &mut Xml, (k, group): (usize, &Group), scenes: &[usize], still: usize) {
+    fn look(
+        &self,
+        xml: &mut Xml,
+        (k, group): (usize, &Group),
+        (scenes, still): (&[usize], usize),
+        fonts: &Fonts,
+    ) {
         if scenes.len() == self.times.len() {
-            svg::write_group(xml, group);
+            svg::write_group(xml, group, Some(fonts));
             xml.raw("\n");
             return;
         }
@@ -129,7 +137,7 @@ impl AnimatedScenes {
         if k > 0 {
             group.id = format!("{}..{k}", group.id);
         }
-        svg::write_group(xml, &group);
+        svg::write_group(xml, &group, Some(fonts));
         xml.close().raw("\n");
     }
 

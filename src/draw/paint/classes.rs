@@ -47,7 +47,8 @@ impl<'a> Classes<'a> {
     /// Writes the boxes around namespaces.
     pub(crate) fn spaces(&self, xml: &mut Xml) {
         for space in &self.union.spaces {
-            xml.open("g").attribute("class", "namespace");
+            let class = space.class.split(' ').next().unwrap_or_default();
+            xml.open("g").attribute("class", class);
             Self::pieces(xml, space, None);
             xml.close().raw("\n");
         }

@@ -1,4 +1,7 @@
 //! A scene as SVG text: the only painter for screens.
+//!
+//! Documents do not contain fonts: editors and converters ignore embedded ones. Instead each text has its length, to
+//! which viewers without the font stretch or condense it, so that it fits its box everywhere.
 
 use std::fmt::{self, Display};
 
@@ -9,6 +12,11 @@ use crate::draw::text::{Fonts, Weight};
 
 /// The scene as one SVG document: UTF-8, a line per group, coordinates rounded to a tenth of a pixel, names escaped.
 pub(crate) fn write(scene: &Scene) -> String {
+    write_measured(scene, Some(&Fonts::bundled()))
+}
+
+/// The scene as [`write`] writes it; its texts have lengths if there are fonts to measure them.
+pub(super) fn write_measured(scene: &Scene, fonts: Option<&Fonts>) -> String {
     let mut xml = Xml::with_capacity(4096 + scene.groups.len() * 512);
     open(&mut xml, scene);
     if !scene.title.is_empty() {
@@ -16,7 +24,7 @@ pub(crate) fn write(scene: &Scene) -> String {
     }
     ground(&mut xml, scene);
     for group in &scene.groups {
-        write_group(&mut xml, group);
+        write_group(&mut xml, group, fonts);
         xml.raw("\n");
     }
     xml.close().raw("\n");
@@ -35,11 +43,11 @@ pub(super) fn ground(xml: &mut Xml, scene: &Scene) {
 }
 
 /// A document of the scene's size with this group alone and no background, for painters that process groups
-/// separately.
+/// separately and have the fonts.
 pub(crate) fn write_alone(scene: &Scene, group: &Group) -> String {
     let mut xml = Xml::with_capacity(1024);
     open(&mut xml, scene);
-    write_group(&mut xml, group);
+    write_group(&mut xml, group, None);
     xml.finish()
 }
 
@@ -65,7 +73,8 @@ pub(super) fn open(xml: &mut Xml, scene: &Scene) {
         .raw("\n");
 }
 
-pub(super) fn write_group(xml: &mut Xml, group: &Group) {
+/// Writes a group; its texts have lengths if there are fonts to measure them.
+pub(super) fn write_group(xml: &mut Xml, group: &Group, fonts: Option<&Fonts>) {
     xml.open("g").attribute("class", &group.class);
     for (key, value) in &group.data {
         xml.attribute(format_args!("data-{key}"), value);
@@ -79,7 +88,7 @@ pub(super) fn write_group(xml: &mut Xml, group: &Group) {
     for piece in &group.pieces {
         match piece {
             Piece::Shape(shape) => write_shape(xml, shape),
-            Piece::Text(text) => write_text(xml, text),
+            Piece::Text(text) => write_text(xml, text, fonts),
         }
     }
     xml.close();
@@ -174,7 +183,7 @@ fn write_stroke(xml: &mut Xml, stroke: &Stroke) {
     }
 }
 
-fn write_text(xml: &mut Xml, text: &Text) {
+fn write_text(xml: &mut Xml, text: &Text, fonts: Option<&Fonts>) {
     xml.open("text")
         .attribute("x", tenth(text.at.x))
         .attribute("y", tenth(text.at.y))
@@ -185,6 +194,13 @@ fn write_text(xml: &mut Xml, text: &Text) {
     if text.anchor != Anchor::Start {
         let is_end = text.anchor == Anchor::End;
         xml.attribute("text-anchor", if is_end { "end" } else { "middle" });
+    }
+    // Characters that the font lacks are drawn with any font, at its own width.
+    let is_known = |fonts: &&Fonts| fonts.missing(&text.text).next().is_none();
+    if let Some(fonts) = fonts.filter(is_known).filter(|_| text.text.len() > 1) {
+        let width = fonts.width(&text.text, text.size, text.weight);
+        xml.attribute("textLength", hundredth(width))
+            .attribute("lengthAdjust", "spacingAndGlyphs");
     }
     xml.attribute("fill", text.color);
     if let Some((color, width)) = text.halo.filter(|(c, _)| *c != Color::NONE) {

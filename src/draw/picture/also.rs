@@ -22,7 +22,7 @@ const ABOVE: f64 = 0.4;
 const INSET: f64 = 8.0;
 const FIRST: &str = "also here:";
 /// The most names that are listed: ten lines or so. The others are counted.
-const MOST_LISTED: usize = 60;
+pub(crate) const MOST_LISTED: usize = 60;
 
 /// The words for the nodes of one namespace.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,6 +126,26 @@ fn broken(words: &[String], fonts: &Fonts, size: f64, most: f64) -> Vec<Point> {
 }
 
 impl Boxes<'_> {
+    /// The introductory words and the names of a footer for drawings of all windows, each with its rectangle.
+    pub(crate) fn footer_words(&self, footer: &Footer, place: Rect) -> Vec<(String, Rect)> {
+        let size = self.style.edge.size;
+        let inset = if footer.cluster.is_some() { INSET } else { 0.0 };
+        let words = words(footer.names.iter().cloned(), 0);
+        let most = (place.w - 2.0 * inset).max(footer.room.w) + 0.1;
+        let places = broken(&words, self.fonts, size, most);
+        let last = places.last().map_or(0.0, |at| at.y);
+        let bottom = place.bottom() - inset * 0.8;
+        let rect = |(word, at): (String, Point)| {
+            let width = self.fonts.width(&word, size, Weight::Regular);
+            let top = bottom - size * LINE * (last - at.y + 1.0);
+            (
+                word,
+                Rect::new(place.x + inset + at.x, top, width, size * LINE),
+            )
+        };
+        words.into_iter().zip(places).map(rect).collect()
+    }
+
     /// The words in window `k` at the bottom of a rectangle: a namespace, or the area of the words outside of
     /// all.
     pub(crate) fn footer(

@@ -67,13 +67,13 @@ pub(crate) fn inside(counts: &Counts) -> String {
     reported.collect::<Vec<_>>().join(", ")
 }
 
-/// The rate that is written, with no more digits than its messages allow; `None` for none.
+/// The rate that is written, with no more digits than its number of messages justifies; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
     let (hz, count) = shown.written_rate()?;
     measured(shown, hz, count)
 }
 
-/// A rate of an element, of so many messages.
+/// The rate of an element that sent this many messages.
 fn measured(shown: &Shown, hz: f64, count: Option<u64>) -> Option<String> {
     if shown.each < 2 {
         return rate_in_window(Some(hz), count);
@@ -82,7 +82,7 @@ fn measured(shown: &Shown, hz: f64, count: Option<u64>) -> Option<String> {
     Some(rate(hz / shown.each as f64) + " each")
 }
 
-/// A rate with no more digits than so many messages allow; `None` for none.
+/// A rate with no more digits than this many messages justify; `None` for none.
 pub(crate) fn rate_in_window(hz: Option<f64>, count: Option<u64>) -> Option<String> {
     let hz = hz.filter(|hz| *hz > 0.0)?;
     Some(match count {

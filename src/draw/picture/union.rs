@@ -31,7 +31,7 @@ pub struct Union {
 }
 
 /// One element of the union.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct UnionElement {
     /// Its shapes and texts.
     pub group: Group,

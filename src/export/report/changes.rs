@@ -1,4 +1,4 @@
-//! The changes with their times, with full names: a row per window, and a row per phase.
+//! The changes with their times and full names: a row per window, and a row per phase.
 
 use super::escape::plain;
 use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, tables};

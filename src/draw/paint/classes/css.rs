@@ -27,6 +27,12 @@ fn base(style: &Style) -> String {
     );
     body(&mut out, ".node", &style.node);
     body(&mut out, ".topic", &style.topic);
+    // The names of elements without a box.
+    let _ = write!(
+        out,
+        ".also rect{{stroke:none}}.also text,.items>g>text:first-child{{text-anchor:start;font:{}px {FONT};fill:{};stroke:none}}",
+        style.edge.size, style.page.quiet
+    );
     edges(&mut out, style);
     badges(&mut out, style);
     // A separate shape among those of its box.

@@ -1,4 +1,4 @@
-//! The profile `rqt`: as `rqt_graph` saves a graph, with all positions, so that it can load the file.
+//! The profile `rqt`: a graph as `rqt_graph` saves it, with all positions, so that it can load the file.
 //!
 //! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and does
 //! not draw elements without a position. It fails on edge labels without `lp`, widths that are not whole

@@ -93,12 +93,59 @@ fn text_is_drawn_in_both_weights_and_as_wide_as_measured() {
     );
 }
 
+/// The columns with ink in a document drawn at four times its size: the first and the last.
+fn columns(svg: &str, options: &usvg::Options<'_>) -> (u32, u32) {
+    let tree = Tree::from_str(svg, options).unwrap();
+    let mut map = tiny_skia::Pixmap::new(800, 480).unwrap();
+    let scaled = tiny_skia::Transform::from_scale(4.0, 4.0);
+    resvg::render(&tree, scaled, &mut map.as_mut());
+    let has_ink = |x: &u32| {
+        (0..480).any(|y| {
+            map.pixel(*x, y)
+                .is_some_and(|p| p.alpha() > 128 && p.red() < 128)
+        })
+    };
+    let mut inked = (0..800).filter(has_ink);
+    (inked.next().unwrap(), inked.next_back().unwrap())
+}
+
+#[test]
+fn text_of_a_document_is_as_wide_in_another_font() {
+    let name = "mmm_/planner 7.4 Hz";
+    let scene = page(vec![words("a", name, Weight::Regular)]);
+    let mut other = fontdb::Database::new();
+    other.load_font_data(crate::draw::text::SEMIBOLD.to_vec());
+    let other = usvg::Options {
+        fontdb: Arc::new(other),
+        ..usvg::Options::default()
+    };
+    let own = &painter().options;
+    let (document, alone) = (
+        svg::write(&scene),
+        svg::write_alone(&scene, &scene.groups[0]),
+    );
+    let width = |svg: &str, options| {
+        let (first, last) = columns(svg, options);
+        last - first
+    };
+    let expected = width(&alone, own);
+    assert!(width(&alone, &other) > expected + 8, "the font differs");
+    assert!(width(&document, &other).abs_diff(expected) <= 3);
+    assert!(width(&document, own).abs_diff(expected) <= 1);
+}
+
+#[test]
+fn text_with_characters_of_other_fonts_has_its_natural_width() {
+    let scene = page(vec![words("a", "/机器", Weight::Regular)]);
+    assert!(!svg::write(&scene).contains("textLength"));
+}
+
 /// The largest difference between the channels of the painter's picture and those of the whole document drawn
 /// at once.
 fn apart(scene: &Scene, scale: f32) -> Vec<u8> {
     let painter = painter();
     let pixels = painter.paint(scene, f64::from(scale)).unwrap();
-    let whole = Tree::from_str(&svg::write(scene), &painter.options).unwrap();
+    let whole = Tree::from_str(&svg::write_measured(scene, None), &painter.options).unwrap();
     let mut map = tiny_skia::Pixmap::new(pixels.width, pixels.height).unwrap();
     let scaled = tiny_skia::Transform::from_scale(scale, scale);
     resvg::render(&whole, scaled, &mut map.as_mut());

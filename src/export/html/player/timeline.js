@@ -89,7 +89,7 @@ const STEPS = [10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 4320
 // Round times on an axis of some width, and its end: each with its text.
 function ticksOf(end, width) {
 	const least = end * 70 / width, step = least <= 5 ? roundStep(least) : STEPS.find(s => s >= least) ?? Math.ceil(least / 86400) * 86400;
-	const text = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19), room = (7 * text(end).length + 30) * end / width;
+	const text = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19), room = (7 * text(end).length + 46) * end / width;
 	return [...multiples(step, end).filter(s => s < end - room), end].map(s => [s, text(s)]);
 }
 function drawTicks(wide) {

@@ -89,7 +89,7 @@ function firstView() {
 const itemBoxes = all => [...all].filter(i => i < shown.N).map(i => shown.boxes[i]);
 const outline = boxes => boxes.map(([x, y, w, h]) => `M${x} ${y}h${w}v${h}h-${w}z`).join('');
 function minimap() {
-	const [, , w, h] = homeOf(), [x, y, width, height] = visible(), hidden = !shown.svg || width >= w * .98 && height >= h * .98;
+	const [x, y, width, height] = visible(), hidden = !shown.svg || shown.boxes.every(b => b[0] >= x && b[1] >= y && b[0] + b[2] <= x + width && b[1] + b[3] <= y + height);
 	$.mini.toggleAttribute('hidden', hidden);
 	if (hidden) return;
 	const [all, , picked, frame] = $.mini.children;

@@ -1,4 +1,4 @@
-//! Rows in which clusters are like words in brackets, from their top borders to their bottom borders.
+//! Rows in which clusters nest like brackets, each from its top border to its bottom border.
 
 use std::collections::BTreeMap;
 

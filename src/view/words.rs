@@ -1,0 +1,89 @@
+//! The part of a view that a page draws: infrastructure topics, and nodes that only these connect, are listed as words.
+
+use std::collections::BTreeSet;
+
+use super::bundles::{also_here, drawn};
+use super::cards::Drawn;
+use super::{Item, ItemKind, View, ViewOptions, cluster};
+use crate::graph::Element;
+use crate::mission::Mission;
+
+/// The drawn part of a view. Its windows are left out.
+#[derive(Debug)]
+pub(crate) struct DrawnPart {
+    /// The boxes and arrows that are drawn, and the other items as words.
+    pub(crate) view: View,
+    /// Whether each item, and each arrow, of the view is drawn.
+    pub(crate) items: Vec<bool>,
+    pub(crate) arrows: Vec<bool>,
+}
+
+/// The part of a mission's view that is drawn; `None` for all of it, which includes views most of whose nodes would be
+/// words.
+pub(crate) fn drawn_part(
+    view: &View,
+    mission: &Mission,
+    options: &ViewOptions,
+) -> Option<DrawnPart> {
+    let topics = drawn(mission, options);
+    let is_hidden = |what: &Element| match what {
+        Element::Topic(id) => !topics[*id as usize],
+        _ => false,
+    };
+    let is_hidden = |item: &Item| item.members.iter().all(is_hidden);
+    let hidden: Vec<bool> = view.items.iter().map(is_hidden).collect();
+    let arrows = view.arrows.iter();
+    let ends = arrows.map(|arrow| [arrow.from as usize, arrow.to as usize]);
+    let arrows: Vec<bool> = ends
+        .clone()
+        .map(|ends| !ends.iter().any(|at| hidden[*at]))
+        .collect();
+    let lined = ends.zip(&arrows).filter(|(_, drawn)| **drawn);
+    let lined: BTreeSet<usize> = lined.flat_map(|(ends, _)| ends).collect();
+    let is_node = |at: usize| view.items[at].kind == ItemKind::Node;
+    let items: Vec<bool> = (0..hidden.len())
+        .map(|at| !hidden[at] && (!is_node(at) || lined.contains(&at)))
+        .collect();
+    let nodes = |is_drawn: bool| {
+        (0..items.len())
+            .filter(|at| is_node(*at) && items[*at] == is_drawn)
+            .count()
+    };
+    if items.iter().all(|drawn| *drawn) || nodes(false) > nodes(true) {
+        return None;
+    }
+    let mut part = Drawn {
+        items: view.items.clone(),
+        arrows: filtered(&view.arrows, &arrows),
+        items_shown: view.items_shown.clone(),
+        arrows_shown: filtered(&view.arrows_shown, &arrows),
+    };
+    let is_word: Vec<bool> = items.iter().map(|drawn| !drawn).collect();
+    let words = filtered(&view.items, &is_word);
+    let shown = filtered(&view.items_shown, &is_word);
+    let gone = (0..)
+        .zip(&items)
+        .filter(|(_, drawn)| !**drawn)
+        .map(|(at, _)| at);
+    part.drop_items(&mut Vec::new(), &gone.collect());
+    let namespaces = cluster::clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
+    Some(DrawnPart {
+        view: View {
+            also: also_here(words, shown, &namespaces),
+            items: part.items,
+            arrows: part.arrows,
+            namespaces,
+            items_shown: part.items_shown,
+            arrows_shown: part.arrows_shown,
+            compares: view.compares,
+            ..View::default()
+        },
+        items,
+        arrows,
+    })
+}
+
+fn filtered<T: Clone>(all: &[T], kept: &[bool]) -> Vec<T> {
+    let kept = all.iter().zip(kept).filter(|(_, kept)| **kept);
+    kept.map(|(one, _)| one.clone()).collect()
+}
