@@ -26,6 +26,8 @@ const ROWS_AHEAD: usize = 2;
 /// The most groups on the pages of all threads together, except on those of a single thread: a thread keeps the scene
 /// and the drawing of each group, up to 10 kB, and tens of thousands of boxes must fit into 512 MB.
 const MOST_GROUPS: usize = 50_000;
+/// The frames whose groups are counted: a mission may grow or shrink.
+const LOOKED_AT: usize = 3;
 /// The most frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
 
@@ -80,8 +82,8 @@ impl<'a> RasterPool<'a> {
             page: Size::new(1.0, 1.0),
             threads: rayon::current_num_threads(),
         };
-        if let Some(first) = frame_times.first() {
-            let scene = pool.scene(*first);
+        for at in spread(frame_times, LOOKED_AT) {
+            let scene = pool.scene(at);
             pool.page = scene.size;
             let most = MOST_GROUPS / scene.groups.len().max(1);
             pool.threads = pool.threads.min(most).max(1);
@@ -167,7 +169,7 @@ impl<'a> RasterPool<'a> {
         };
         let all: Vec<usize> = (0..self.frame_times.len()).collect();
         let changed: Vec<usize> = all.iter().copied().filter(is_changed).collect();
-        let mut sample = spread(&changed, SAMPLES / 2);
+        let mut sample: Vec<usize> = spread(&changed, SAMPLES / 2).collect();
         sample.extend(spread(&all, SAMPLES / 2));
         sample.sort_unstable();
         sample.dedup();
@@ -274,12 +276,10 @@ impl<'a> Drawer<'a> {
 }
 
 /// At most `most` of `all`, evenly spread, the first and the last among them.
-fn spread(all: &[usize], most: usize) -> Vec<usize> {
+fn spread<T: Copy>(all: &[T], most: usize) -> impl Iterator<Item = T> {
     let count = all.len().min(most);
     let last = all.len().saturating_sub(1);
-    (0..count)
-        .map(|i| all[i * last / (count - 1).max(1)])
-        .collect()
+    (0..count).map(move |i| all[i * last / (count - 1).max(1)])
 }
 
 #[cfg(test)]
@@ -289,8 +289,8 @@ mod tests {
     #[test]
     fn a_spread_includes_both_ends() {
         let all: Vec<usize> = (0..100).collect();
-        assert_eq!(spread(&all, 4), [0, 33, 66, 99]);
-        assert_eq!(spread(&all[..3], 4), [0, 1, 2]);
-        assert_eq!(spread(&[], 4), Vec::<usize>::new());
+        assert!(spread(&all, 4).eq([0, 33, 66, 99]));
+        assert!(spread(&all[..3], 4).eq([0, 1, 2]));
+        assert_eq!(spread::<usize>(&[], 4).next(), None);
     }
 }
