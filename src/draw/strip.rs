@@ -62,7 +62,7 @@ pub struct StripSource<'a> {
 /// page on a screen, at least `width` pixels.
 ///
 /// # Errors
-/// [`Error::Usage`] for a window that does not exist.
+/// [`Error::Usage`] for a window that does not exist, and for more than 200,000 boxes and arrows on all panels together.
 pub fn strip(
     source: StripSource<'_>,
     choice: &Choice,
@@ -87,6 +87,12 @@ pub fn strip(
     let mut groups = Vec::new();
     for (at, window) in windows.iter().enumerate() {
         source.panel(&bare.scene(*window), &page, at, *window, &mut groups);
+        if groups.len() > MOST_GROUPS {
+            return Err(Error::usage(
+                format!("a strip of more than {MOST_GROUPS} boxes and arrows is too large"),
+                "choose fewer windows (`--strip 2x1`) or elements (`--ns-filter`, `--collapse`)",
+            ));
+        }
     }
     let rows = windows.len().div_ceil(page.columns);
     let graphs = page.corner(rows * page.columns).y;
@@ -128,6 +134,10 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     };
     (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
 }
+
+/// The most boxes, arrows and names of all panels together: with two kilobytes each, half a gigabyte, and a hundred
+/// times as many as can be told apart.
+const MOST_GROUPS: usize = 200_000;
 
 /// The largest area of panels in square pixels that a strip on a screen may take for legible text.
 const LARGEST_STRIP: f64 = 24e6;
