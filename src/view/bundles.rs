@@ -30,8 +30,7 @@ pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
 /// their connections changes or there is no other topic.
 pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     let elements = &mission.elements;
-    let plain = |topic: &Topic| !options.hide.quiet || !is_infrastructure(topic.name.as_str());
-    let mut drawn: Vec<bool> = elements.topics.iter().map(plain).collect();
+    let drawn = plain(elements, options);
     let mut connected = vec![0_u8; drawn.len()];
     let both = [(&elements.publishes, 1), (&elements.subscribes, 2)];
     for (edges, end) in both {
@@ -46,9 +45,25 @@ pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
     {
         return vec![true; drawn.len()];
     }
+    with_changing(mission, drawn)
+}
+
+/// Whether pages draw each topic: all but infrastructure without a connection that changes.
+pub(super) fn drawn_in_pages(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
+    with_changing(mission, plain(&mission.elements, options))
+}
+
+/// Whether each topic is no infrastructure.
+fn plain(elements: &Elements, options: &ViewOptions) -> Vec<bool> {
+    let plain = |topic: &Topic| !options.hide.quiet || !is_infrastructure(topic.name.as_str());
+    elements.topics.iter().map(plain).collect()
+}
+
+/// These topics, and those with a connection that changes.
+fn with_changing(mission: &Mission, mut drawn: Vec<bool>) -> Vec<bool> {
     let events = mission.log.events.iter();
     for event in events.filter(|event| event.is_headline()) {
-        if let (Some(_), Some(topic)) = elements.ends(event.what) {
+        if let (Some(_), Some(topic)) = mission.elements.ends(event.what) {
             drawn[topic as usize] = true;
         }
     }

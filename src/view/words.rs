@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::bundles::{also_here, drawn};
+use super::bundles::{also_here, drawn_in_pages};
 use super::cards::Drawn;
 use super::{Item, ItemKind, View, ViewOptions, cluster};
 use crate::graph::Element;
@@ -25,7 +25,7 @@ pub(crate) fn drawn_part(
     mission: &Mission,
     options: &ViewOptions,
 ) -> Option<DrawnPart> {
-    let topics = drawn(mission, options);
+    let topics = drawn_in_pages(mission, options);
     let is_hidden = |what: &Element| match what {
         Element::Topic(id) => !topics[*id as usize],
         _ => false,
@@ -86,4 +86,54 @@ pub(crate) fn drawn_part(
 fn filtered<T: Clone>(all: &[T], kept: &[bool]) -> Vec<T> {
     let kept = all.iter().zip(kept).filter(|(_, kept)| **kept);
     kept.map(|(one, _)| one.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::mission;
+    use crate::view::view;
+
+    /// The names in words; `None` if all is drawn.
+    fn words(windows: &[&str]) -> Option<Vec<String>> {
+        let (mission, options) = (mission(windows), ViewOptions::default());
+        let whole = view(&mission, &options).0;
+        let part = drawn_part(&whole, &mission, &options)?;
+        let drawn = whole
+            .items
+            .iter()
+            .zip(&part.items)
+            .filter(|(_, drawn)| **drawn);
+        let drawn: Vec<&str> = drawn.map(|(item, _)| &*item.name).collect();
+        let kept: Vec<&str> = part.view.items.iter().map(|item| &*item.name).collect();
+        assert_eq!(drawn, kept);
+        for arrow in &part.view.arrows {
+            assert!(
+                [arrow.from, arrow.to]
+                    .iter()
+                    .all(|end| (*end as usize) < kept.len())
+            );
+        }
+        let also = part.view.also.iter().flat_map(|also| &also.items);
+        Some(also.map(|item| item.name.to_string()).collect())
+    }
+
+    #[test]
+    fn infrastructure_and_the_nodes_that_only_it_connects_are_words() {
+        let found =
+            words(&["/b/driver>/b/odom@5 /b/ekf</b/odom /b/camera_tf>/tf@5 /b/driver>/tf@9"]);
+        assert_eq!(found.unwrap(), ["/tf", "/b/camera_tf"]);
+    }
+
+    #[test]
+    fn topics_without_a_subscriber_are_drawn() {
+        let found = words(&["/driver>/odom@5 /driver>/tf@9"]);
+        assert_eq!(found.unwrap(), ["/tf"]);
+    }
+
+    #[test]
+    fn a_view_of_infrastructure_is_drawn_as_a_whole() {
+        assert_eq!(words(&["/a>/tf@5 /b</tf"]), None);
+        assert_eq!(words(&["/a>/x@1 /b</x /c>/tf@1 /d>/tf@1 /e>/tf@1"]), None);
+    }
 }
