@@ -26,7 +26,7 @@ use clap::{ColorChoice, FromArgMatches as _, ValueEnum as _};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::words::visible;
-use crate::cli::terminal::{Terminal, has_colour};
+use crate::cli::terminal::{Terminal, has_colour, print_usage};
 use crate::mission::Mission;
 use applies::Given;
 use args::{Colour, Command, ExtractArgs, Typed};
@@ -138,8 +138,15 @@ fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     };
     let coloured = Typed::grammar().color(colour).try_get_matches_from(shown);
     let error = coloured.err().unwrap_or(error);
+    if error.use_stderr() {
+        let text = error.render();
+        match colour {
+            ColorChoice::Always => print_usage(&text.ansi().to_string()),
+            _ => print_usage(&text.to_string()),
+        }
+        return USAGE;
+    }
     match error.print().and_then(|()| std::io::stdout().flush()) {
-        _ if error.use_stderr() => USAGE,
         // A closed pipe is not an error.
         Err(lost) if lost.kind() != std::io::ErrorKind::BrokenPipe => FAILED,
         _ => DONE,

@@ -20,5 +20,5 @@ pub(crate) use difference::{
 };
 pub(crate) use expectation::{Expectation, read};
 pub(crate) use finding::{FindingKind, Severity};
-pub(crate) use judge::{Verdict, judge};
+pub(crate) use judge::{Judgement, Verdict, judge};
 pub(crate) use report::{FORMATS, Format, Subject, explain};

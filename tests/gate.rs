@@ -71,6 +71,25 @@ fn commands_name_the_files_that_they_wrote_once() {
 }
 
 #[test]
+fn an_expectation_without_rules_is_noted() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    let check = |rules: &str| {
+        let text = format!("schema: bagreel.expect/1\n{rules}");
+        fs::write(here.join("g.yaml"), text).unwrap();
+        run(here, &["check", "run.bag", "--expect", "g.yaml"])
+    };
+    let (code, said) = check("topics:\n");
+    assert!(
+        code == 0 && said.contains("`g.yaml` contains no rule that applies"),
+        "{said}"
+    );
+    let (_, said) = check("topics:\n  /scan: {}\n");
+    assert!(!said.contains("contains no rule"), "{said}");
+}
+
+#[test]
 fn reversed_ranges_are_refused_with_their_line() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();

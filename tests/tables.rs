@@ -90,7 +90,10 @@ fn rows_are_filtered_by_topic_and_time() {
         "/robot1/odm",
     ];
     let said = ends(dir.path(), &nothing, 0);
-    assert!(said.contains("matches `/robot1/odm`"), "{said}");
+    assert!(
+        said.contains("matches no topic; the nearest name is `/robot1/odom`"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -237,8 +240,87 @@ fn recordings_without_definitions_use_common_and_given_types() {
     ends(dir.path(), &defined, 0);
     assert_eq!(csv(&dir.path().join("new/er/thing.csv")), thing);
     let none = [&args[..], &["--topic-filter", "/nothing"]].concat();
-    let said = ends(dir.path(), &none, 1);
-    assert!(said.contains("contains no messages"), "{said}");
+    let said = ends(dir.path(), &none, 2);
+    assert!(said.contains("matches none of 2 names"), "{said}");
+}
+
+#[test]
+fn malformed_definitions_are_errors_of_the_topics_that_need_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut bag = crate::support::Recording::default();
+    for (topic, type_name) in [
+        ("/thing", "my_msgs/msg/Thing"),
+        ("/outer", "my_msgs/msg/Outer"),
+        ("/good", "my_msgs/msg/Good"),
+    ] {
+        let place = bag.publisher("", topic, type_name);
+        bag.send(place, (0, 1000), 100, b"\0\x01\0\0\x03\0\0\0hi\0");
+    }
+    crate::support::sqlite3::write(&bag, &dir.path().join("a.db3"));
+    let put = |name: &str, text: &[u8]| {
+        let path = dir.path().join("ws/my_msgs/msg").join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    let args = [
+        "extract",
+        "a.db3",
+        "-o",
+        "t",
+        "--fields",
+        "--msg-path",
+        "ws",
+    ];
+    put(
+        "Good.msg",
+        b"# A word\nuint8 A=1\nstring data \"hi\"\n=====\n",
+    );
+    put("Outer.msg", b"Thing thing\n");
+    for (name, text, why) in [
+        (
+            "Thing.msg",
+            &b"# Its data\nfloat64[x] data\n"[..],
+            "its definition has an array `[x]` in line 2",
+        ),
+        (
+            "Thing.msg",
+            b"int8 a\nfloat64\n",
+            "`float64` is not a field in line 2",
+        ),
+        (
+            "Thing.msg",
+            b"\n\n??? data\n",
+            "`??? data` is not a field in line 3",
+        ),
+        ("Thing.msg", b"\xff\xfe", "it is not UTF-8 text"),
+        ("Thing.idl", b"hello", "it has no `module` with a `struct`"),
+        (
+            "Thing.idl",
+            b"module my_msgs { module msg {\n  struct Thing {\n    double x;\n",
+            "its definition in IDL ends early in line 3",
+        ),
+        (
+            "Thing.idl",
+            b"module my_msgs { module msg {\n  struct Thing {\n    double;\n}; }; };\n",
+            "in line 3",
+        ),
+    ] {
+        put(name, text);
+        let said = ends(dir.path(), &args, 3);
+        for topic in ["/thing", "/outer"] {
+            let lines: Vec<&str> = said.lines().filter(|l| l.contains(topic)).collect();
+            let is_named = lines.len() == 1
+                && lines[0].contains(&format!("ws/my_msgs/msg/{name}"))
+                && lines[0].ends_with("(10 times)")
+                && lines[0].contains(why);
+            assert!(is_named, "{name} {topic}: {said}");
+        }
+        assert!(said.contains("1 table, 10 rows"), "{said}");
+        // A topic that does not need it is not affected.
+        let only = [&args[..], &["--topic-filter", "/good"]].concat();
+        assert!(!ends(dir.path(), &only, 0).contains("Thing"));
+        fs::remove_file(dir.path().join("ws/my_msgs/msg").join(name)).unwrap();
+    }
 }
 
 #[test]

@@ -367,6 +367,13 @@ fn long_messages_are_broken_between_words() {
         lines.iter().all(|line| line.chars().count() <= 50),
         "{lines:#?}"
     );
+    let args = ["render", "a.bag", "--offset", "courier.mcap=x"];
+    let written = typed(folder.path(), &args, On::Errors, 60, true);
+    let lines = screen(&written, 1000);
+    assert!(
+        lines.iter().all(|line| line.chars().count() <= 60),
+        "{lines:#?}"
+    );
 }
 
 #[test]

@@ -181,10 +181,10 @@ pub(crate) fn hang(lead: &str, text: &str, indent: usize, width: Option<usize>) 
 fn broken((lead, text): (&str, &str), indent: usize, width: Option<usize>, end: &str) -> String {
     let width = width.map(|width| width.saturating_sub(end.len()));
     let mut out = lead.to_owned();
-    let mut used = lead.chars().count();
+    let mut used = shown(lead);
     let mut is_first = true;
     for word in text.split(' ') {
-        let length = word.chars().count();
+        let length = shown(word);
         let space = usize::from(!is_first);
         if width.is_some_and(|width| used + space + length > width) && used > indent {
             out.truncate(out.trim_end().len());
@@ -202,6 +202,17 @@ fn broken((lead, text): (&str, &str), indent: usize, width: Option<usize>, end: 
     out.truncate(out.trim_end().len());
     out.push('\n');
     out
+}
+
+/// The number of characters that a terminal shows, without those that set colours.
+fn shown(text: &str) -> usize {
+    let mut parts = text.split("\u{1b}[");
+    let first = parts.next().unwrap_or_default().chars().count();
+    let rest = parts.map(|part| {
+        part.split_once('m')
+            .map_or(0, |(_, rest)| rest.chars().count())
+    });
+    first + rest.sum::<usize>()
 }
 
 /// The text with lines of at most `width` characters; the rest of a longer one is below the start of the last
@@ -241,6 +252,9 @@ mod tests {
         let expected = "+ node  /é  only in\n        the first of\n        two\nshort\n";
         assert_eq!(fitted(text, 22), expected);
         assert_eq!(fitted(text, 40), text);
+        let coloured = "\u{1b}[31merror:\u{1b}[0m one two three\n";
+        let expected = "\u{1b}[31merror:\u{1b}[0m one\n  two three\n";
+        assert_eq!(fitted(coloured, 11), expected);
         let command = "   =  accept: bagreel baseline run.bag --only /a\n";
         let expected = "   =  accept: bagreel \\\n      baseline run.bag \\\n      --only /a\n";
         #[cfg(unix)]

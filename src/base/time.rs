@@ -142,8 +142,12 @@ pub fn parse_nanos(text: &str) -> Option<i64> {
     let text = text.trim();
     if text.contains(':') {
         let mut total = 0.0;
-        for part in text.split(':') {
-            total = total * 60.0 + parse_number(part)?;
+        for (at, part) in text.split(':').enumerate() {
+            let number = parse_number(part)?;
+            if at > 2 || at > 0 && number >= 60.0 {
+                return None;
+            }
+            total = total * 60.0 + number;
         }
         return to_nanos(total);
     }
@@ -265,6 +269,9 @@ mod tests {
         assert_eq!(at("1:30"), Some(190));
         assert_eq!(at("-30s"), Some(170));
         assert_eq!(at("1970-01-01T00:02:00Z"), Some(120));
-        assert_eq!(at("noon"), None);
+        assert_eq!(at("75:00"), Some(4600));
+        for bad in ["noon", "9:99", "1:60:00", "0:0:0:1"] {
+            assert_eq!(at(bad), None, "{bad}");
+        }
     }
 }

@@ -17,7 +17,7 @@ use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::Output;
 use crate::export::target::Target;
-use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
+use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Judgement, Severity, explain};
 use crate::mission::Mission;
 use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
 use crate::pipeline::{Body, Drawing, Reading};
@@ -285,7 +285,14 @@ fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Res
     }
     terminal.notices(&done.mission.notices);
     let verdict = &done.verdict;
-    let what = words::count(verdict.findings().len(), "finding");
+    let findings = verdict.findings().len();
+    if findings == 0 && verdict.facts(Judgement::Kept) == 0 {
+        terminal.note(&format!(
+            "`{}` contains no rule that applies",
+            job.expect.display()
+        ));
+    }
+    let what = words::count(findings, "finding");
     let targets = job.reports.iter().map(|report| &report.target);
     wrote(targets, &what, terminal);
     Ok(match code(&done.mission) {

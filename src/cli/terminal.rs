@@ -235,6 +235,12 @@ impl Terminal {
     }
 }
 
+/// Prints an error of the command line, with its colours.
+pub(super) fn print_usage(error: &str) {
+    let text = error_width().map_or_else(|| error.to_owned(), |width| fitted(error, width));
+    let _ = io::stderr().write_all(text.as_bytes());
+}
+
 /// Whether standard error, or standard output, has colours: only on a terminal that has them, and if `NO_COLOR` is not set,
 /// unless `--color` overrides it.
 pub(super) fn has_colour(asked: Colour, is_error: bool) -> bool {

@@ -78,7 +78,14 @@ impl Live {
             return Err(Error::usage(what, "leave it out"));
         }
         let Some((place, way)) = found else {
-            return Ok(None);
+            let scheme = text.split_once("://").filter(|_| !address.exists());
+            let unknown = scheme.map(|(scheme, _)| {
+                Error::usage(
+                    format!("`{scheme}://` is not a live system that can be followed"),
+                    "live systems are `ros1://localhost:11311` and `ws://localhost:8765`",
+                )
+            });
+            return unknown.map_or(Ok(None), Err);
         };
         let watch = way.ok_or_else(|| Error::Unsupported {
             path: address.to_owned(),

@@ -146,7 +146,11 @@ fn meant(wanted: &[&str], names: &[&str]) -> String {
         Some(space) => {
             format!("the nearest namespace is `{space}`: `{space}/.*` matches all of it")
         }
-        None => format!("there are {}", words::some_of(names, 3)),
+        None => {
+            // Those of unknown nodes contain spaces, and cannot be meant.
+            let names: Vec<&str> = names.iter().copied().filter(|n| !n.contains(' ')).collect();
+            format!("there are {}", words::some_of(&names, 3))
+        }
     }
 }
 

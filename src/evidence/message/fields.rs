@@ -184,6 +184,9 @@ impl DecodePlan<'_> {
     ) -> Result<(Vec<DecodeStep>, usize), String> {
         let definition = self.definition;
         let fields = &definition.messages[message].fields;
+        if let Some(reason) = &definition.messages[message].wrong {
+            return Err(reason.clone());
+        }
         if depth > DEEPEST {
             return Err("its definition contains itself".to_owned());
         }

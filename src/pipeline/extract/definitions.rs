@@ -11,22 +11,18 @@ use crate::evidence::message::fields::KnownTypes;
 /// The most files and folders below a folder of definitions: ten times a whole installation of ROS.
 const MOST_FILES: usize = 1 << 16;
 
-/// The types of `.msg` and `.idl` files in folders.
+/// The types of `.msg` and `.idl` files in folders. A file that cannot be used is an error of the topics that need it.
 ///
 /// # Errors
-/// If a folder or a file cannot be read, or is not a definition.
+/// If a folder cannot be read or contains no such file.
 pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
     let mut types = KnownTypes::default();
     for folder in folders {
         let files = msg_files(folder)?;
         for (name, path) in &files {
-            let text = file::read_text(path, budget::USER_TEXT)?;
-            types.add(name, &text).map_err(|reason| Error::BadFile {
-                path: path.clone(),
-                line: 0,
-                reason,
-                hint: "a `.msg` file lists one field per line, in ROS's syntax".to_owned(),
-            })?;
+            let text = file::read_text(path, budget::USER_TEXT);
+            let text = text.map_err(|error| error.to_string());
+            types.add(name, path, text);
         }
         if files.is_empty() {
             return Err(Error::usage(
@@ -42,7 +38,11 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
 /// `my_msgs/Thing`.
 fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
     let whole = folder.canonicalize().map_err(Error::io("read", folder))?;
-    let (mut waiting, mut found) = (vec![whole], Vec::new());
+    let typed = |path: PathBuf| match path.strip_prefix(&whole) {
+        Ok(below) => folder.join(below),
+        Err(_) => path,
+    };
+    let (mut waiting, mut found) = (vec![whole.clone()], Vec::new());
     while let Some(folder) = waiting.pop() {
         let entries = fs::read_dir(&folder).map_err(Error::io("read", &folder))?;
         for entry in entries {
@@ -58,7 +58,7 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
                 let name = |path: Option<&OsStr>| path.map(|n| n.to_string_lossy().into_owned());
                 let package = name(outer.unwrap_or(&folder).file_name()).unwrap_or_default();
                 let own = name(path.file_stem()).unwrap_or_default();
-                found.push((format!("{package}/{own}"), path));
+                found.push((format!("{package}/{own}"), typed(path)));
             }
         }
         if waiting.len() + found.len() > MOST_FILES {

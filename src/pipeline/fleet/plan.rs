@@ -221,8 +221,12 @@ fn missions(uris: &[String], pattern: Option<&str>) -> Result<Vec<String>> {
         return Ok(split_groups(&stems));
     };
     let pattern = Regex::new(pattern).map_err(|error| {
+        // The lines before show the pattern.
+        let error = error.to_string();
+        let reason = error.lines().last().unwrap_or_default();
+        let reason = reason.trim().trim_start_matches("error: ");
         Error::usage(
-            format!("`{pattern}` is not a regular expression: {error}"),
+            format!("`{pattern}` is not a regular expression: {reason}"),
             "its first group, or the whole match, names the mission",
         )
     })?;

@@ -41,6 +41,8 @@ pub(crate) struct MessageFields {
     pub(super) package: String,
     pub(crate) name: String,
     pub(crate) fields: Vec<Field>,
+    /// The reason why its definition cannot be used.
+    pub(super) wrong: Option<String>,
 }
 
 /// A parsed definition, the outermost message first.
@@ -124,11 +126,14 @@ pub(super) fn messages(text: &str, type_name: &str) -> Result<Vec<MessageFields>
         return Ok(messages);
     }
     let mut messages = vec![own];
-    for line in text.lines() {
+    for (number, line) in (1..).zip(text.lines()) {
         let line = without_comment(line);
+        let at_line = |reason| format!("{reason} in line {number}");
         if let Some(name) = line.strip_prefix("MSG:") {
             messages.push(MessageFields::new(name.trim()));
-        } else if let (Some(field), Some(message)) = (field(line)?, messages.last_mut()) {
+        } else if let (Some(field), Some(message)) =
+            (field(line).map_err(at_line)?, messages.last_mut())
+        {
             message.fields.push(field);
         }
     }
@@ -152,12 +157,34 @@ impl MessageFields {
             package: parts.next().unwrap_or_default().to_owned(),
             name: last.to_owned(),
             fields: Vec::new(),
+            wrong: None,
+        }
+    }
+
+    /// A message whose definition cannot be used for this reason.
+    pub(super) fn malformed(name: &str, reason: String) -> Self {
+        Self {
+            wrong: Some(reason),
+            ..Self::new(name)
         }
     }
 }
 
 fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default().trim()
+}
+
+/// The first line of a `.msg` file that is none of a field, a constant, a comment and a separator, with its number.
+pub(super) fn unreadable(text: &str) -> Option<(usize, &str)> {
+    let is_readable = |line: &str| {
+        let (kind, name) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let is_name = |text: &str| text.starts_with(|c: char| c.is_ascii_alphabetic());
+        let is_separator = line.bytes().all(|byte| byte == b'=');
+        is_separator || kind == "MSG:" || is_name(kind) && is_name(name.trim_start())
+    };
+    let lines = (1..).zip(text.lines().map(without_comment));
+    let mut lines = lines.filter(|(_, line)| !line.is_empty());
+    lines.find(|(_, line)| !is_readable(line))
 }
 
 /// The field of a line; `None` for a constant, a separator or nothing.

@@ -35,7 +35,21 @@ pub(super) fn is_idl(text: &str) -> bool {
 /// # Errors
 /// The reason why it cannot be used.
 pub(super) fn messages(text: &str) -> Result<Vec<MessageFields>, String> {
-    let mut tokens = tokens(text).into_iter().peekable();
+    let mut read = 0_usize;
+    let tokens = tokens(text);
+    let mut counted = tokens.iter().copied().inspect(|_| read += 1);
+    let found = structures(&mut counted);
+    found.map_err(|reason| {
+        let last = tokens.get(read.saturating_sub(1)).copied();
+        // Tokens are parts of the text.
+        let at = last.map_or(0, |token| token.as_ptr().addr() - text.as_ptr().addr());
+        let line = text[..at].matches('\n').count() + 1;
+        format!("{reason} in line {line}")
+    })
+}
+
+fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageFields>, String> {
+    let mut tokens = tokens.peekable();
     let (mut modules, mut statement, mut found) = (Vec::new(), Vec::new(), Vec::new());
     let mut is_inside = false;
     let mut aliases: BTreeMap<&str, Kind> = BTreeMap::new();
@@ -56,6 +70,7 @@ pub(super) fn messages(text: &str) -> Result<Vec<MessageFields>, String> {
                     package: modules.first().copied().unwrap_or_default().to_owned(),
                     name: (*name).to_owned(),
                     fields: Vec::new(),
+                    wrong: None,
                 });
             }
             ("}", []) if is_inside => is_inside = false,

@@ -2,9 +2,12 @@
 //!
 //! rosbag2's sqlite3 recordings contain no definitions before ROS 2 Iron.
 
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 use super::definition::{self, MessageFields};
+use super::idl;
+use crate::base::words::visible;
 
 /// The suffix of a type's name for its fields before they changed.
 const BEFORE: &str = " before";
@@ -42,15 +45,31 @@ fn carried(text: &str) -> CarriedTypes {
     named.collect()
 }
 
+/// The types of a `.msg` or `.idl` file.
+fn of_file(name: &str, path: &Path, text: &str) -> Result<Vec<MessageFields>, String> {
+    let is_idl = idl::is_idl(text);
+    if path.extension().is_some_and(|end| end == "idl") && !is_idl {
+        return Err("it has no `module` with a `struct`".to_owned());
+    }
+    match definition::unreadable(text).filter(|_| !is_idl) {
+        Some((number, line)) => Err(format!(
+            "`{}` is not a field in line {number}",
+            visible(line)
+        )),
+        None => definition::messages(text, name),
+    }
+}
+
 impl KnownTypes {
-    /// Adds the type `name`, `my_msgs/Thing`, by the text of its `.msg` or `.idl` file.
-    ///
-    /// # Errors
-    /// The reason why the text cannot be used.
-    pub(crate) fn add(&mut self, name: &str, text: &str) -> Result<(), String> {
-        let all = definition::messages(text, name)?;
+    /// Adds the type `name`, `my_msgs/Thing`, by the text of its `.msg` or `.idl` file, or the reason why there is none. One
+    /// that cannot be used is an error of the messages that need it; `path` names it.
+    pub(crate) fn add(&mut self, name: &str, path: &Path, text: Result<String, String>) {
+        let all = text.and_then(|text| {
+            let all = of_file(name, path, &text);
+            all.map_err(|reason| format!("`{}`: {reason}", path.display()))
+        });
+        let all = all.unwrap_or_else(|reason| vec![MessageFields::malformed(name, reason)]);
         self.own.extend(all.into_iter().map(Arc::new));
-        Ok(())
     }
 
     /// All types. The first match is used.

@@ -1,5 +1,7 @@
 //! Tests of hand-made payloads against their columns.
 
+use std::path::Path;
+
 use super::*;
 use crate::bag::ConnectionId;
 
@@ -149,15 +151,14 @@ fn common_types_need_no_definition_in_either_version() {
     assert!(fits(&older, 1) && !fits(&older, 2));
     // The user's types take precedence over built-in ones, and may contain them.
     let mut types = KnownTypes::default();
-    types
-        .add("my_msgs/Place", "geometry_msgs/Point32 at\nHeader header\n")
-        .unwrap();
+    let mut add = |name: &str, text: &str| types.add(name, Path::new(""), Ok(text.to_owned()));
+    add("my_msgs/Place", "geometry_msgs/Point32 at\nHeader header\n");
+    add("my_msgs/Odd", "Pose pose\n");
     connection.type_name = "my_msgs/msg/Place".into();
     let (own, _) = Decoder::new(&connection, &types).unwrap();
     let names: Vec<_> = own.columns.iter().map(|(name, ..)| name.as_str()).collect();
     assert_eq!(names[..3], ["at.x", "at.y", "at.z"]);
     assert_eq!(names.last(), Some(&"header.frame_id"));
-    types.add("my_msgs/Odd", "Pose pose\n").unwrap();
     connection.type_name = "my_msgs/msg/Odd".into();
     let why = Decoder::new(&connection, &types).unwrap_err();
     assert!(
