@@ -29,7 +29,7 @@ impl Noise {
 }
 
 /// A recorded mission, message by message.
-fn loaded(bag: &str) -> Recording {
+pub(crate) fn loaded(bag: &str) -> Recording {
     let (_, kept) = support::read(Path::new(bag), Want::Payload).unwrap();
     let text = |text: &Option<std::sync::Arc<str>>| text.as_deref().unwrap_or("").to_owned();
     let publishers = kept.connections.iter().map(|own| Publisher {

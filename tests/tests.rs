@@ -42,6 +42,7 @@ mod properties;
 mod reading;
 #[cfg(feature = "remote")]
 mod remote;
+mod restarts;
 mod ros2_example;
 mod source;
 mod story;

@@ -372,6 +372,7 @@ impl Collector {
             facts: self.facts,
             notices: self.notices,
             falls: Vec::new(),
+            overlaps: false,
             believed: span,
             span: None,
         };

@@ -1,6 +1,6 @@
 //! Differences between the clocks of several recorders, by the messages that two of them recorded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::collector::Recorded;
@@ -8,6 +8,8 @@ use crate::base::time::Stamp;
 
 /// The fewest common messages that are significant.
 const FEWEST: usize = 10;
+/// The fewest topics that must agree: a node may send the same sequence again.
+const TOPICS: usize = 2;
 /// The share, in per cent, of the messages in common that must agree about the offset.
 const SHARE: usize = 80;
 /// The largest difference between the offsets of two messages, in nanoseconds: they take different paths to
@@ -72,15 +74,16 @@ pub(crate) fn offsets(recorded: &Recorded) -> io::Result<Vec<ClockOffset>> {
 fn apart(one: &Contents<'_>, other: &Contents<'_>) -> Option<(i64, usize)> {
     let both = other.iter().filter_map(|(key, time)| {
         let before = one.get(key)?.as_ref()?;
-        Some(time.as_ref()?.since(*before))
+        Some((time.as_ref()?.since(*before), key.0))
     });
-    let mut lags: Vec<i64> = both.collect();
+    let mut lags: Vec<(i64, &str)> = both.collect();
     lags.sort_unstable();
-    let median = *lags.get(lags.len() / 2)?;
-    let near = lags.iter().filter(|lag| (**lag - median).abs() <= NEAR_NS);
-    let agreeing = near.count();
+    let median = lags.get(lags.len() / 2)?.0;
+    let near = lags.iter().filter(|lag| (lag.0 - median).abs() <= NEAR_NS);
+    let agreeing = near.clone().count();
+    let topics: BTreeSet<&str> = near.map(|lag| lag.1).collect();
     let is_clear = agreeing >= FEWEST && agreeing * 100 >= lags.len() * SHARE;
-    is_clear.then_some((median, agreeing))
+    (is_clear && topics.len() >= TOPICS).then_some((median, agreeing))
 }
 
 #[cfg(test)]
@@ -88,7 +91,7 @@ mod tests {
     use super::*;
 
     fn contents(times: &[i64]) -> Contents<'static> {
-        let keys = (0..).map(|hash| ("/tf", hash));
+        let keys = (0..).map(|hash| (["/tf", "/odom"][hash as usize % 2], hash));
         keys.zip(times.iter().map(|t| Some(Stamp(t * 1_000_000))))
             .collect()
     }
@@ -102,5 +105,10 @@ mod tests {
         let wild: Vec<i64> = one.iter().map(|t| t * 2).collect();
         assert_eq!(apart(&contents(&one), &contents(&wild)), None);
         assert_eq!(apart(&contents(&one[..5]), &contents(&later)), None);
+        let only = |mut all: Contents<'static>| {
+            all.retain(|key, _| key.0 == "/tf");
+            all
+        };
+        assert_eq!(apart(&only(contents(&one)), &only(contents(&later))), None);
     }
 }

@@ -79,6 +79,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         .flat_map(|seams| straight::falls(seams, !is_pipe))
         .collect();
     recorded.falls.sort_unstable();
+    recorded.overlaps = is_pipe && !is_straight;
     for fall in &recorded.falls {
         let length = words::duration(fall.length);
         let shown = if is_pipe {

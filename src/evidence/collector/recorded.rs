@@ -25,6 +25,8 @@ pub struct Recorded {
     pub notices: Notices,
     /// The points at which a recorder's clock went back, sorted by time.
     pub(crate) falls: Vec<ClockFall>,
+    /// Whether runs overlap in time, since they could not be shifted.
+    pub(crate) overlaps: bool,
     /// The credible times; `None` if all of them are.
     pub(crate) believed: Option<Span>,
     /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is

@@ -88,6 +88,29 @@ fn around(times: &[Stamp], gap: (Stamp, Stamp)) -> Option<(Stamp, Stamp)> {
     Some((*times.get(next.checked_sub(1)?)?, *times.get(next)?))
 }
 
+/// A message: its time and the index of its stream.
+type Place = (Stamp, usize);
+
+/// The numbered streams of a sender, with the times of their messages. A split recording has one for each part.
+fn numbered(recorded: &Recorded, own: &Own<'_>) -> io::Result<Vec<(usize, Vec<Stamp>)>> {
+    let is_numbered = |at: &&usize| recorded.numbers.contains_key(at);
+    let times = |at: &usize| Ok((*at, recorded.messages.times(recorded.streams[*at].times)?));
+    own.streams.iter().filter(is_numbered).map(times).collect()
+}
+
+/// The last message of several streams before the middle of a gap, and the first one after it.
+fn around_all(streams: &[(usize, Vec<Stamp>)], gap: (Stamp, Stamp)) -> Option<(Place, Place)> {
+    let middle = middle(gap);
+    let cut = |times: &[Stamp]| times.partition_point(|time| *time <= middle);
+    let before = streams
+        .iter()
+        .filter_map(|(at, times)| Some((*times.get(cut(times).checked_sub(1)?)?, *at)));
+    let after = streams
+        .iter()
+        .filter_map(|(at, times)| Some((*times.get(cut(times))?, *at)));
+    Some((before.max()?, after.min()?))
+}
+
 /// The unread messages, by stream and time, that could reveal more restarts by their numbers.
 pub(crate) fn unread(
     recorded: &Recorded,
@@ -100,21 +123,16 @@ pub(crate) fn unread(
             let read = recorded.numbers.get(at).map(|numbers| numbers.read);
             read.is_some_and(|read| read < recorded.messages.count(recorded.streams[**at].times))
         };
-        let streams = own.iter().flat_map(|own| &own.streams).filter(is_unread);
-        let unread: Vec<usize> = streams.copied().collect();
-        let gaps = if unread.is_empty() {
-            BTreeSet::new()
-        } else {
-            gaps(own)
-        };
-        if gaps.is_empty() {
+        let is_known = |own: &Own<'_>| !own.streams.iter().any(|at| is_unread(&at));
+        if own.iter().all(is_known) {
             continue;
         }
-        for at in unread {
-            let times = recorded.messages.times(recorded.streams[at].times);
-            let times = times.map_err(spool_error)?;
-            let around = gaps.iter().filter_map(|gap| around(&times, *gap));
-            asked.extend(around.flat_map(|(from, to)| [(at, from), (at, to)]));
+        let gaps = gaps(own);
+        for one in own.iter().filter(|one| !gaps.is_empty() && !is_known(one)) {
+            let streams = numbered(recorded, one).map_err(spool_error)?;
+            let around = gaps.iter().filter_map(|gap| around_all(&streams, *gap));
+            let places = around.flat_map(|(before, after)| [before, after]);
+            asked.extend(places.map(|(time, at)| (at, time)));
             if asked.len() > 2 * MOST_ASKED {
                 return Ok(asked);
             }
@@ -123,13 +141,16 @@ pub(crate) fn unread(
     Ok(asked)
 }
 
-/// Finds the restarts of all nodes, except those that several recordings show at the same time.
+/// Finds the restarts of all nodes, except those that several recordings or runs show at the same time.
 pub(crate) fn restarts(
     recorded: &Recorded,
     findings: &Findings,
     traffic: &Traffic,
     doubled: &BTreeSet<Name>,
 ) -> io::Result<Restarts> {
+    if recorded.overlaps {
+        return Ok(Restarts::new());
+    }
     let mut nodes = own_streams(findings, traffic);
     // The messages of two robots under one name overlap in time.
     nodes.retain(|node, _| !doubled.contains(node));
@@ -157,11 +178,7 @@ pub(crate) fn restarts(
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
         let mut breaks = narrowed(breaks);
-        let is_log = |own: &&Own<'_>| {
-            let mut streams = own.streams.iter().map(|at| &recorded.streams[*at]);
-            streams.any(|stream| stream.connection.topic.as_str() == "/rosout")
-        };
-        for log in own.iter().filter(is_log) {
+        for log in own.iter().filter(|own| is_log(recorded, own)) {
             breaks.retain(|gap| !counts_on(recorded, log, *gap));
         }
         if breaks.is_empty() {
@@ -231,36 +248,71 @@ fn falls_of(
     let mut falls = Vec::new();
     let gaps = gaps(own);
     for one in own {
-        let is_copy = findings.copies.contains(&(node, one.topic));
-        for at in one.streams.iter().filter(|_| !is_copy) {
-            let (stream, numbers) = (&recorded.streams[*at], recorded.numbers.get(at));
-            let Some(numbers) = numbers else { continue };
-            let mut breaks = BTreeSet::new();
-            if stream.connection.topic.as_str() == "/rosout" {
-                // These number all log records of a process, which have no rhythm.
-                breaks.extend(numbers.falls.iter().map(|fall| (*fall, *fall)));
+        if findings.copies.contains(&(node, one.topic)) {
+            continue;
+        }
+        let streams = numbered(recorded, one)?;
+        // Between two messages, possibly of two parts of a recording, and the gaps between them.
+        let mut breaks: BTreeMap<(Place, Place), Vec<(Stamp, Stamp)>> = BTreeMap::new();
+        for gap in &gaps {
+            if let Some(places) = around_all(&streams, *gap) {
+                breaks.entry(places).or_default().push(*gap);
             }
-            if !gaps.is_empty() {
-                let times = recorded.messages.times(stream.times)?;
-                let known = gaps
-                    .iter()
-                    .filter_map(|gap| Some((around(&times, *gap)?, *gap)));
-                breaks.extend(known);
-            }
-            for ((last, next), gap) in breaks {
-                let numbers = numbers.at(last).zip(numbers.at(next));
-                let begun = numbers.filter(|(before, first)| first.begins_after(*before));
-                falls.extend(begun.map(|(before, first)| Fall {
-                    from: last.max(gap.0),
-                    to: next.min(gap.1),
-                    kind: stream.connection.type_name.clone(),
-                    before: before.number,
-                    first,
-                }));
-            }
+        }
+        if is_log(recorded, one) {
+            // Its numbers are those of all log records of a process, which have no rhythm.
+            breaks.extend(between_records(recorded, &streams).map(|places| (places, Vec::new())));
+        }
+        for (((last, before), (next, after)), gaps) in breaks {
+            let number = |at: usize, time| recorded.numbers.get(&at)?.at(time);
+            let numbers = number(before, last).zip(number(after, next));
+            let common = gaps.iter().fold((last, next), |all, gap| {
+                (all.0.max(gap.0), all.1.min(gap.1))
+            });
+            // Which of several gaps the restart was in, this stream does not show.
+            let (from, to) = if common.0 < common.1 {
+                common
+            } else {
+                (last, next)
+            };
+            let begun = numbers.filter(|(before, first)| first.begins_after(*before));
+            falls.extend(begun.map(|(number, first)| Fall {
+                from,
+                to,
+                kind: recorded.streams[after].connection.type_name.clone(),
+                before: number.number,
+                first,
+            }));
         }
     }
     Ok(falls)
+}
+
+/// Whether a node publishes its log records there.
+fn is_log(recorded: &Recorded, own: &Own<'_>) -> bool {
+    let mut streams = own.streams.iter().map(|at| &recorded.streams[*at]);
+    streams.any(|stream| stream.connection.topic.as_str() == "/rosout")
+}
+
+/// The log records between which numbers start over after a gap, or may do so between two parts of a recording.
+fn between_records(
+    recorded: &Recorded,
+    streams: &[(usize, Vec<Stamp>)],
+) -> impl Iterator<Item = (Place, Place)> {
+    let ends =
+        |(at, times): &(usize, Vec<Stamp>)| Some(((*times.first()?, *at), (*times.last()?, *at)));
+    let mut parts: Vec<(Place, Place)> = streams.iter().filter_map(ends).collect();
+    parts.sort_unstable();
+    let next: Vec<(Place, Place)> = parts
+        .windows(2)
+        .map(|pair| (pair[0].1, pair[1].0))
+        .collect();
+    let next = next.into_iter().filter(|(last, first)| last.0 < first.0);
+    let inside = streams.iter().flat_map(|(at, _)| {
+        let falls = recorded.numbers[at].falls.iter();
+        falls.map(|(from, to)| ((*from, *at), (*to, *at)))
+    });
+    next.chain(inside)
 }
 
 /// All statements about each node.

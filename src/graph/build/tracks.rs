@@ -10,7 +10,7 @@ use crate::base::rhythm::broken_after;
 use crate::base::time::Stamp;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
-use crate::evidence::inference::{ElementKey, Inference, Validity};
+use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence, SOURCES};
 use crate::graph::history::begins_steadily;
@@ -34,6 +34,8 @@ pub(crate) fn tracks(
     let mut tracks = Tracks::new();
     let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
+    let mut streams = findings.streams.iter();
+    let is_rewritten = streams.any(|stream| stream.trust == Reliability::First);
     let starved = starved(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
     let findings = &*findings;
@@ -79,10 +81,7 @@ pub(crate) fn tracks(
             Validity::Signs { signs, ends } => {
                 let ends = together(ends, &deaths);
                 track.sign_all(signs, &ends);
-                if SOURCES
-                    .get(inference.source)
-                    .is_some_and(|s| s.word == "statistics")
-                {
+                if is_from(&inference, "statistics") {
                     track.counted.extend(signs.first());
                 }
                 if SOURCES.get(inference.source).is_some_and(|s| s.own) {
@@ -93,7 +92,10 @@ pub(crate) fn tracks(
             Validity::Begins { signs, ends } => {
                 let ends = together(ends, &deaths);
                 track.bound_all(signs, &ends);
-                track.begins.extend(signs);
+                // Earlier messages of the node may have another's name.
+                if !is_rewritten || !is_from(&inference, "rosout") {
+                    track.begins.extend(signs);
+                }
             }
             Validity::Moments(signs) => track.bound_all(signs, &deaths),
             Validity::Unending => track.unending = true,
@@ -174,6 +176,13 @@ fn sent(inferences: &[Inference]) -> BTreeSet<usize> {
         _ => None,
     });
     sent.collect()
+}
+
+/// Whether an inference is from the source of this name.
+fn is_from(inference: &Inference, source: &str) -> bool {
+    SOURCES
+        .get(inference.source)
+        .is_some_and(|s| s.word == source)
 }
 
 /// Whether an inference is still valid after its last sign.

@@ -1,0 +1,101 @@
+//! Tests that restarts are found across the parts of a recording, and are not inferred from faults of the recorder's
+//! clock.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::pairs::loaded;
+use crate::support::rosbag1::{Pack, write};
+use crate::support::shared;
+
+const MILLISECOND: i64 = 1_000_000;
+
+/// The lines of the event log about restarts.
+fn restarts(bags: &[PathBuf], stdin: Stdio) -> Vec<String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .arg("events")
+        .args(bags)
+        .stdin(stdin)
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines = text.lines().filter(|line| line.contains(" restarted"));
+    lines.map(|line| line.trim().to_owned()).collect()
+}
+
+/// The restarts in a copy of a bag with other times, in milliseconds since the first; `None` for messages that are left out.
+/// The copy is read as a file and from a pipe.
+fn copied(bag: &Path, time: impl Fn(i64) -> Option<i64>) -> [Vec<String>; 2] {
+    let mut copy = loaded(bag.to_str().unwrap());
+    let begin = copy.messages[0].1;
+    copy.messages.retain_mut(|(_, at, _)| {
+        let moved = time((*at - begin) / MILLISECOND);
+        *at = begin + moved.unwrap_or(0) * MILLISECOND;
+        moved.is_some()
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("copy.bag");
+    fs::write(&path, write(&copy, Pack::None, 64 * 1024)).unwrap();
+    let file = restarts(std::slice::from_ref(&path), Stdio::null());
+    let pipe = Stdio::from(File::open(&path).unwrap());
+    [file, restarts(&["-".into()], pipe)]
+}
+
+#[test]
+fn a_node_that_restarts_between_two_parts_of_a_recording_is_found() {
+    let (Some(whole), Some(folder)) = (
+        shared("data/bags/mission/mission.bag"),
+        shared("data/bags/mission"),
+    ) else {
+        return;
+    };
+    let parts = (0..4).map(|part| folder.join(format!("split_lz4_{part}.bag")));
+    let parts: Vec<PathBuf> = parts.collect();
+    let found = restarts(&[whole], Stdio::null());
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert_eq!(restarts(&parts, Stdio::null()), found);
+}
+
+#[test]
+fn a_pause_of_the_recorder_is_no_restart() {
+    if let Some(bag) = shared("data/bags/mission/mission.bag") {
+        let holes = [65_100, 130_300, 260_600];
+        let is_lost = |at: i64| holes.iter().any(|hole| (*hole..hole + 3_000).contains(&at));
+        let [file, _] = copied(&bag, |at| Some(at).filter(|at| !is_lost(*at)));
+        assert_eq!(file, restarts(&[bag], Stdio::null()));
+    }
+}
+
+#[test]
+fn runs_that_overlap_show_no_restart() {
+    if let Some(bag) = shared("data/warehouse/warehouse.bag") {
+        let [file, pipe] = copied(&bag, |at| {
+            Some(if at < 163_000 { at } else { at - 163_000 })
+        });
+        assert!(
+            file.iter().any(|line| line.contains("lidar_driver")),
+            "{file:?}"
+        );
+        // The anonymous names of a role show a restart in any order of time.
+        assert!(
+            pipe.iter().all(|line| line.contains("object_detector")),
+            "{pipe:?}"
+        );
+    }
+}
+
+#[test]
+fn a_first_log_record_in_a_rewritten_bag_is_no_start() {
+    let Some(bag) = shared("data/warehouse/warehouse_lz4.bag") else {
+        return;
+    };
+    let output = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .arg("events")
+        .arg(bag)
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("/robot1/planner started"), "{text}");
+    assert!(!text.contains("lifecycle_manager started"), "{text}");
+}
