@@ -17,7 +17,7 @@ const MOST: usize = 3;
 /// The number of letters above which a rate is drawn below its name, so that lines need not be long.
 const LONGEST: usize = 15;
 /// The largest width of a name, in text heights.
-const WIDEST: f64 = 13.0;
+const WIDEST: f64 = 15.0;
 /// The last parts of the names of a group of topics, and of image transports.
 const FAMILIES: [&str; 8] = [
     "/action_topics",
