@@ -15,7 +15,7 @@ pub(crate) fn write(scene: &Scene) -> String {
     write_measured(scene, Some(&Fonts::bundled()))
 }
 
-/// The scene as [`write`] writes it; its texts have lengths if there are fonts to measure them.
+/// The scene as [`write()`] writes it; its texts have lengths if there are fonts to measure them.
 pub(super) fn write_measured(scene: &Scene, fonts: Option<&Fonts>) -> String {
     let mut xml = Xml::with_capacity(4096 + scene.groups.len() * 512);
     open(&mut xml, scene);

@@ -34,8 +34,12 @@ pub(crate) fn tracks(
     let mut tracks = Tracks::new();
     let mut likes = Likes::new();
     let sent = sent(&findings.inferences);
-    let mut streams = findings.streams.iter();
-    let is_rewritten = streams.any(|stream| stream.trust == Reliability::First);
+    // Records of `/rosout` name their nodes themselves.
+    let mut data = findings
+        .streams
+        .iter()
+        .filter(|s| s.connection.topic.as_str() != "/rosout");
+    let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
     let starved = starved(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
     let findings = &*findings;
