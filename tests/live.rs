@@ -124,10 +124,11 @@ fn a_crowd_that_starts_at_once_is_not_listed_whole() {
     });
     let folder = TempDir::new().unwrap();
     let done = follow_for("2500ms", folder.path(), &[&address]);
-    let (printed, said) = (done.stdout, String::from_utf8_lossy(&done.stderr));
-    let printed = String::from_utf8(printed).unwrap();
-    assert!(printed.lines().count() <= 1000 + 10, "{}", printed.len());
-    assert!(said.contains("more events"), "{said}");
+    let [printed, said] = [done.stdout, done.stderr].map(|text| String::from_utf8(text).unwrap());
+    // A slow machine needs several updates, each with at most a thousand lines.
+    let cut = said.matches("more events").count();
+    assert!(cut > 0, "{said}");
+    assert!(printed.lines().count() <= 1000 * (cut + 1), "{printed}");
     assert!(graph(folder.path()).0.len() > 1100, "all are written");
 }
 
