@@ -30,9 +30,8 @@ pub(super) fn extract(
             (true, count) => format!("{count} tables, "),
         };
         let rows = usize::try_from(done.rows).unwrap_or(usize::MAX);
-        let (path, rows) = (job.target.path().display(), words::count(rows, "row"));
-        let seconds = terminal.seconds();
-        terminal.say(&format!("wrote {path}: {tables}{rows}, in {seconds:.1} s"));
+        let rows = words::count(rows, "row");
+        terminal.wrote([job.target.path()], &format!("{tables}{rows}"));
     }
     Ok((done.notices, done.undecoded))
 }

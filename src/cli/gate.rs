@@ -65,18 +65,12 @@ fn notices(missions: &[Mission]) -> Notices {
     all
 }
 
-/// Prints the files written, what is in them, and the time taken, in one line.
+/// Prints the files written and what is in them, if there are files.
 fn wrote<'a>(targets: impl Iterator<Item = &'a Target>, what: &str, terminal: &mut Terminal) {
     let files = targets.filter(|target| **target != Target::Stdout);
-    let files: Vec<String> = files
-        .map(|target| target.path().display().to_string())
-        .collect();
-    if !files.is_empty() {
-        let seconds = terminal.seconds();
-        terminal.say(&format!(
-            "wrote {}: {what}, in {seconds:.1} s",
-            files.join(", ")
-        ));
+    let mut files = files.map(Target::path).peekable();
+    if files.peek().is_some() {
+        terminal.wrote(files, what);
     }
 }
 

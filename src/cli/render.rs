@@ -82,7 +82,7 @@ pub(super) fn figure(
     let done = crate::pipeline::render(&job, terminal)?;
     // A figure shows continuous time, independent of windows.
     terminal.notices(&done.notices.without(NoticeKind::Chosen));
-    terminal.say(&wrote(&done, "", terminal.seconds()));
+    wrote(&done, "", terminal);
     Ok(code(&done.mission))
 }
 
@@ -173,20 +173,16 @@ pub(super) fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
         terminal.timings();
     }
     let windows = format!("{}, ", division(&done.mission));
-    terminal.say(&wrote(done, &windows, terminal.seconds()));
+    wrote(done, &windows, terminal);
 }
 
-/// The files written, what is in them, and the time taken, in one line.
-fn wrote(done: &Rendered, what: &str, seconds: f64) -> String {
+/// Prints the files written and what is in them.
+fn wrote(done: &Rendered, what: &str, terminal: &mut Terminal) {
     let mission = &done.mission;
-    let names = done.written.iter().map(|w| w.path.display().to_string());
-    let names: Vec<String> = names.collect();
     let changes = mission.log.headlines(mission.span).count();
     let changes = words::count(changes, "change");
-    format!(
-        "wrote {}: {what}{changes}, in {seconds:.1} s",
-        names.join(", ")
-    )
+    let files = done.written.iter().map(|w| &*w.path);
+    terminal.wrote(files, &format!("{what}{changes}"));
 }
 
 /// The division of the mission as text: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in

@@ -143,12 +143,8 @@ pub(super) fn paper(args: &PaperArgs, terminal: &mut Terminal) -> Result<u8, Err
     for remark in &done.remarks {
         terminal.note(remark);
     }
-    terminal.say(&format!(
-        "wrote {}: {} about {}, in {:.1} s",
-        job.folder.display(),
-        words::count(done.files, "file"),
-        words::count(done.runs, "recording"),
-        terminal.seconds()
-    ));
+    let files = words::count(done.files, "file");
+    let runs = words::count(done.runs, "recording");
+    terminal.wrote([&*job.folder], &format!("{files} about {runs}"));
     Ok(if done.skipped { SKIPPED } else { DONE })
 }

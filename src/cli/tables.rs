@@ -38,12 +38,7 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
             words::some_of(&done.copies, 4)
         ));
     }
-    let seconds = terminal.seconds();
-    let to = args.output.display();
-    terminal.say(&format!(
-        "wrote {to}: {}, in {seconds:.1} s",
-        summary(&done)
-    ));
+    terminal.wrote([&*args.output], &summary(&done));
     Ok(match &done {
         done if !done.refused.is_empty() => FAILED,
         done if done.unreadable + done.incomplete > 0 => SKIPPED,

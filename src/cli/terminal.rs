@@ -112,6 +112,14 @@ impl Terminal {
         }
     }
 
+    /// Prints the files written, what is in them, and the time taken, in one line, as [`Terminal::say`].
+    pub(crate) fn wrote<'a>(&mut self, files: impl IntoIterator<Item = &'a Path>, what: &str) {
+        let names = files.into_iter().map(|file| file.display().to_string());
+        let names = names.collect::<Vec<_>>().join(", ");
+        let seconds = self.seconds();
+        self.say(&format!("wrote {names}: {what}, in {seconds:.1} s"));
+    }
+
     /// Prints results on standard output. A closed pipe is not an error.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider as _};
@@ -80,18 +80,22 @@ impl Fonts {
 
     /// The bundled font alone.
     pub fn bundled() -> Self {
-        let face = |data| {
-            let broken = Face {
-                data: Cow::Borrowed(data),
-                advances: Vec::new(),
+        // Read once: every SVG document is measured with them.
+        static BUNDLED: LazyLock<Fonts> = LazyLock::new(|| {
+            let face = |data| {
+                let broken = Face {
+                    data: Cow::Borrowed(data),
+                    advances: Vec::new(),
+                };
+                Arc::new(Face::read(Cow::Borrowed(data)).unwrap_or(broken))
             };
-            Arc::new(Face::read(Cow::Borrowed(data)).unwrap_or(broken))
-        };
-        Self {
-            regular: face(REGULAR),
-            semibold: face(SEMIBOLD),
-            extra: Vec::new(),
-        }
+            Fonts {
+                regular: face(REGULAR),
+                semibold: face(SEMIBOLD),
+                extra: Vec::new(),
+            }
+        });
+        BUNDLED.clone()
     }
 
     /// The fonts with one more for characters that the previous ones lack.
