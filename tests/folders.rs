@@ -248,6 +248,40 @@ fn info_and_tables_take_several_recordings_as_a_fleet() {
 }
 
 #[test]
+fn the_order_of_bags_does_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    mcap2(&at("late.mcap"), 2);
+    bag1(&at("early.bag"), 1);
+    let mut later = run(3);
+    let begin = later.messages[0].1;
+    later
+        .messages
+        .retain(|(_, time, _)| *time > begin + 1_000_000_000);
+    let bytes = rosbag1::write(&later, rosbag1::Pack::None, 4000);
+    fs::write(at("afternoon.bag"), bytes).unwrap();
+    let shown = |line: &str| {
+        let (code, said, text) = bagreel(folder.path(), line, "");
+        assert_eq!(code, 0, "{line}: {said}");
+        text
+    };
+    for line in [
+        "info",
+        "events",
+        "render -o - --format json",
+        "render -o - --format md",
+        "render -o - --format svg",
+    ] {
+        let one = shown(&format!("{line} late.mcap early.bag afternoon.bag"));
+        let other = shown(&format!("{line} afternoon.bag late.mcap early.bag"));
+        assert_eq!(one, other, "{line}");
+    }
+    let info = shown("info afternoon.bag late.mcap early.bag");
+    let order = ["early.bag", "late.mcap", "afternoon.bag"].map(|name| info.find(name).unwrap());
+    assert!(order.is_sorted(), "{info}");
+}
+
+#[test]
 fn copies_of_one_recording_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -10,15 +10,15 @@ use super::phases::{Basis, wanted};
 use super::probe::probe;
 use super::verify::{Verified, verify};
 use super::{Phases, Stage, Watch};
-use crate::bag::{self, Input, InputKind};
+use crate::bag::{self, Input, InputKind, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::base::{budget, file, words};
 use crate::evidence::EvidenceLine;
 #[cfg(feature = "source")]
 use crate::evidence::code::{self, SourceCode};
-use crate::evidence::collector;
+use crate::evidence::collector::{self, Recorded};
 use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::history::Sending;
@@ -317,11 +317,12 @@ fn mission(
         let text = format!("using {period} windows (change with `--period`)");
         notices.add(Notice::new(NoticeKind::Chosen, text));
     }
-    let (bags, remarks) = match verified {
+    let (mut bags, remarks) = match verified {
         Some(verified) => (verified.reports, verified.notices),
         None => (collected.reports.clone(), Vec::new()),
     };
     notices.extend(remarks);
+    in_order(&mut bags, recorded);
     Ok(Mission {
         bags,
         span: windows.span,
@@ -337,6 +338,19 @@ fn mission(
         layout: None,
         notices,
     })
+}
+
+/// Sorts bags by their first messages, then by name: the order in which they were given does not matter.
+fn in_order(bags: &mut Vec<Report>, recorded: &Recorded) {
+    let mut first = vec![Stamp::MAX; bags.len()];
+    for stream in &recorded.streams {
+        if let Some((begin, _)) = recorded.messages.bounds(stream.times) {
+            first[stream.bag] = first[stream.bag].min(begin);
+        }
+    }
+    let mut all: Vec<_> = first.into_iter().zip(bags.drain(..)).collect();
+    all.sort_by(|(a, x), (b, y)| (a, &x.name).cmp(&(b, &y.name)));
+    bags.extend(all.into_iter().map(|(_, bag)| bag));
 }
 
 /// The notice about nodes that appear in several recordings at the same time.

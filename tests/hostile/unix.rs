@@ -233,6 +233,45 @@ fn a_hundred_thousand_nodes_fit_into_memory() {
     assert_eq!(run.status.code(), Some(0), "{}", errors(&run));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_run_leaves_no_ffmpeg() {
+    let dir = tempfile::tempdir().unwrap();
+    let bin = tempfile::tempdir().unwrap();
+    // It ends with its pipe, as ffmpeg does, and says its process id in a file's name.
+    let reads = format!(
+        "[ $# = 1 ] && exit; touch {}/$$.pid; cat > /dev/null",
+        dir.path().display()
+    );
+    let path = with_program(bin.path(), "ffmpeg", &reads);
+    let running = || {
+        let all = names(dir.path()).into_iter();
+        let ids: Vec<String> = all
+            .filter_map(|name| Some(name.strip_suffix(".pid")?.to_owned()))
+            .collect();
+        // A process that ended but was not waited for has no command line.
+        let line = |id: &String| fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
+        ids.iter().filter(|id| !line(id).is_empty()).count()
+    };
+    let await_count = |expected: usize, what: &str| {
+        let begun = Instant::now();
+        while running() != expected {
+            assert!(begun.elapsed() < Duration::from_mins(1), "{what}");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    };
+    for name in ["INT", "KILL"] {
+        let mut run = command(dir.path(), &["render", COURIER, "--period", "0.05"]);
+        run.args(["-o", "a.mp4", "-o", "b.webm"]);
+        let child = run.env("PATH", &path).spawn().unwrap();
+        await_count(2, "no video begins");
+        signal(&child, name);
+        ended(child);
+        await_count(0, "ffmpeg goes on");
+    }
+    assert!(!dir.path().join("a.mp4").exists() && !dir.path().join("b.webm").exists());
+}
+
 #[test]
 fn an_empty_video_is_an_error() {
     let dir = tempfile::tempdir().unwrap();
