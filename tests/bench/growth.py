@@ -6,7 +6,7 @@
 Makes recordings of three sizes, each twice the one before, and prints as Markdown the processor time and the most memory
 of each command at the largest, and how many times as much it took as at half the size. Ends with 1 where twice the size
 takes more than 2.3 times as much (of runs of at least a third of a second or 64 MB), an evidence command more than
-256 MB, a drawing more than 512 MB, or a command fails without telling why.
+256 MB, a drawing more than 512 MB, or a command fails without refusing a drawing as too large.
 """
 
 import os
@@ -19,6 +19,8 @@ from pathlib import Path
 SIZES = (10_000, 20_000, 40_000)
 MOST = 2.3
 EVIDENCE_MB, DRAWING_MB = 256, 512
+# Seconds from which a run is measured once.
+LONG = 8
 BEGIN = 1_600_000_000
 
 STATISTICS = b"""string topic
@@ -203,7 +205,14 @@ DRAWINGS = ("page", "gif", "png")
 
 
 def measured(program, command, inputs, folder):
-    """Seconds of processor time, megabytes, and the words of a refusal."""
+    """Seconds of processor time, megabytes, and the words of a failure: the least of three runs, unless they are long."""
+    runs = [measured_once(program, command, inputs, folder)]
+    while runs[0][0] < LONG and len(runs) < 3:
+        runs.append(measured_once(program, command, inputs, folder))
+    return min(runs)
+
+
+def measured_once(program, command, inputs, folder):
     with open(folder / "printed", "w+b") as printed, open(folder / "said", "w+b") as said:
         child = subprocess.Popen([program, *command, *inputs], cwd=folder, stdout=printed, stderr=said)
         _, status, usage = os.wait4(child.pid, 0)
@@ -212,7 +221,9 @@ def measured(program, command, inputs, folder):
         words = said.read().decode(errors="replace").strip()
     seconds = usage.ru_utime + usage.ru_stime
     if child.returncode not in (0, 3):
-        return seconds, usage.ru_maxrss / 1024, f"exit {child.returncode}: {words[:160]}"
+        is_refused = child.returncode == 2 and "is too large" in words
+        wrong = "refused" if is_refused else f"exit {child.returncode}: {words[:160]}"
+        return seconds, usage.ru_maxrss / 1024, wrong
     return seconds, usage.ru_maxrss / 1024, ""
 
 
@@ -246,9 +257,9 @@ def main():
             cells = [f"{seconds:.2f} s, {mb:.0f} MB" for seconds, mb, _ in of]
             growth = [f"×{b[at] / a[at]:.2f}" if a[at] > 0 else "" for at in (0, 1) for a, b in zip(of, of[1:])]
             wrong = [fault(command, *pair) for pair in zip(of, of[1:])] + [words for *_, words in of]
-            wrong = "; ".join(dict.fromkeys(word for word in wrong if word))
-            faults += bool(wrong)
-            row = [kind, command, *cells, ", ".join(growth[:2]), ", ".join(growth[2:]), wrong]
+            wrong = list(dict.fromkeys(word for word in wrong if word))
+            faults += wrong not in ([], ["refused"])
+            row = [kind, command, *cells, ", ".join(growth[:2]), ", ".join(growth[2:]), "; ".join(wrong)]
             print("| " + " | ".join(row) + " |", flush=True)
     sys.exit(faults > 0)
 
