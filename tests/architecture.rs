@@ -115,6 +115,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "pipeline/live/bridge",
         ],
     ),
+    // Work on all cores: frames, and the ways of laying out a graph.
+    ("rayon", &["export/run", "layout/layered"]),
     // Temporary files: outputs, decompressed bags, and times that exceed the memory limit.
     (
         "tempfile",

@@ -16,6 +16,8 @@ pub(crate) mod wrap;
 
 use std::collections::BTreeSet;
 
+use rayon::prelude::*;
+
 use super::layers::{Lane, cut, items};
 use super::spacing::{Spacing, turned};
 use super::{
@@ -52,15 +54,18 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         labels::place(plan, &mut layout);
         return layout;
     };
-    let tries =
-        orientations(options).map(|orientation| draft.assembled(plan, options, orientation));
-    let labelled = tries.map(|(crossings, mut layout)| {
+    let tried = |orientation| {
+        let (crossings, mut layout) = draft.assembled(plan, options, orientation);
         let length = layout.routes.iter().map(Route::length).sum();
         let quality = quality(layout.size, (crossings, length), plan.links.len(), options);
         labels::place(plan, &mut layout);
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
-    });
-    let best = labelled.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    };
+    let tries = orientations(options).into_par_iter().map(tried);
+    let tries: Vec<(f64, Layout)> = tries.collect();
+    let best = tries
+        .into_iter()
+        .reduce(|best, next| if next.0 > best.0 { next } else { best });
     let mut best = best.map_or_else(Layout::default, |best| best.1);
     labels::make_room(plan, &mut best);
     best
@@ -142,12 +147,15 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     let pairs = ways
         .iter()
         .flat_map(|rank| lanes.iter().map(move |lane| (rank, *lane)));
-    let layers: Vec<Layers> = pairs
+    let pairs: Vec<(&Vec<usize>, Lane)> = pairs.collect();
+    let layers = pairs.into_par_iter();
+    let layers: Vec<Layers> = layers
         .map(|(rank, lane)| cut(plan, part, rank, lane))
         .collect();
-    let searches: Vec<Search> = layers.iter().map(|cut| Search::new(cut, effort)).collect();
+    let searches = layers.par_iter().map(|cut| Search::new(cut, effort));
+    let searches: Vec<Search> = searches.collect();
     let is_promising = promising(plan, options, part, &searches);
-    let both = searches.into_iter().zip(is_promising);
+    let both = searches.into_par_iter().zip(is_promising);
     let found: Vec<_> = both
         .map(|(search, is)| is.then(|| search.finished()))
         .collect();
@@ -174,8 +182,11 @@ fn promising(
     part: &Component,
     searches: &[Search],
 ) -> Vec<bool> {
-    let mut promising = vec![searches.len() == 1; searches.len()];
-    for orientation in orientations(options).filter(|_| searches.len() > 1) {
+    if searches.len() == 1 {
+        return vec![true];
+    }
+    let mut promising = vec![false; searches.len()];
+    for orientation in orientations(options) {
         let hope = |search: &Search| {
             let (rows, crossings) = search.found();
             hope(
@@ -196,11 +207,9 @@ fn promising(
 }
 
 /// The orientations to try.
-fn orientations(options: &LayoutOptions) -> impl Iterator<Item = Orientation> {
-    let wished = options.orientation;
-    let both = [Orientation::LeftRight, Orientation::TopBottom];
-    both.into_iter()
-        .filter(move |o| wished.is_none_or(|wished| wished == *o))
+fn orientations(options: &LayoutOptions) -> Vec<Orientation> {
+    let both = vec![Orientation::LeftRight, Orientation::TopBottom];
+    options.orientation.map_or(both, |asked| vec![asked])
 }
 
 /// The upper bound of the quality of a part with this order.
