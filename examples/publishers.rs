@@ -16,11 +16,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (window, graph) in mission.each() {
         println!("{:.0} s", mission.offset(window.span.start) as f64 / 1e9);
         for state in &graph.publishes {
-            let edge = &elements.publishes[state.id as usize];
-            if elements.topics[edge.topic as usize].name.as_str() != topic {
+            let edge = &elements.publishes[state.id];
+            if elements.topics[edge.topic].name.as_str() != topic {
                 continue;
             }
-            let node = &elements.nodes[edge.node as usize].name;
+            let node = &elements.nodes[edge.node].name;
             let evidence: Vec<&str> = edge.evidence.words().collect();
             let rate = state
                 .hz

@@ -4,7 +4,7 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
-use bagreel::values::{Detail, Event};
+use bagreel::values::{Detail, Event, NodeId};
 use bagreel::{Mission, Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -33,18 +33,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn name(mission: &Mission, event: &Event) -> String {
     let elements = &mission.elements;
     let (node, topic) = elements.ends(event.what);
-    let node = node.map(|id| elements.nodes[id as usize].name.as_str());
-    let topic = topic.map(|id| elements.topics[id as usize].name.as_str());
+    let node = node.map(|id| elements.nodes[id].name.as_str());
+    let topic = topic.map(|id| elements.topics[id].name.as_str());
     let names: Vec<&str> = node.into_iter().chain(topic).collect();
     names.join(" ")
 }
 
 /// The details of an event: rates, senders, values before and after.
 fn detail(mission: &Mission, event: &Event) -> String {
-    let nodes = |ids: &[u32]| {
+    let nodes = |ids: &[NodeId]| {
         let names = ids
             .iter()
-            .map(|id| mission.elements.nodes[*id as usize].name.as_str());
+            .map(|id| mission.elements.nodes[*id].name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
     match &event.detail {

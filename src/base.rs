@@ -9,6 +9,7 @@ pub(crate) mod digest;
 pub mod error;
 pub(crate) mod file;
 pub mod geometry;
+pub(crate) mod ids;
 pub(crate) mod leftovers;
 pub mod name;
 pub(crate) mod nearest;

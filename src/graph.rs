@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::base::ids::ids;
+pub use crate::base::ids::{ById, Id};
 use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder, is_service};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
@@ -30,12 +32,14 @@ pub(crate) use build::{
 };
 pub use per_element::PerElement;
 
-/// A node's index in [`Elements::nodes`].
-pub type NodeId = u32;
-/// A topic's index in [`Elements::topics`].
-pub type TopicId = u32;
-/// An edge's index in [`Elements::publishes`] or [`Elements::subscribes`].
-pub type EdgeId = u32;
+ids! {
+    /// The id of a node: its index in [`Elements::nodes`].
+    NodeId,
+    /// The id of a topic: its index in [`Elements::topics`].
+    TopicId,
+    /// The id of an edge: its index in [`Elements::publishes`] or [`Elements::subscribes`].
+    EdgeId,
+}
 
 /// A node, over the whole mission.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -137,13 +141,13 @@ pub struct Edge {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Elements {
     /// Nodes, sorted by name.
-    pub nodes: Vec<Node>,
+    pub nodes: ById<NodeId, Node>,
     /// Topics, sorted by name.
-    pub topics: Vec<Topic>,
+    pub topics: ById<TopicId, Topic>,
     /// Publications, sorted by (node, topic).
-    pub publishes: Vec<Edge>,
+    pub publishes: ById<EdgeId, Edge>,
     /// Subscriptions, sorted by (topic, node).
-    pub subscribes: Vec<Edge>,
+    pub subscribes: ById<EdgeId, Edge>,
 }
 
 worded! {
@@ -280,7 +284,7 @@ impl Graph {
             *sum = sum.zip(more).map(|(sum, more)| sum.saturating_add(more));
         };
         for state in &self.publishes {
-            let edge = elements.publishes.get(state.id as usize);
+            let edge = elements.publishes.get(state.id);
             let load = edge.and_then(|edge| all.get_mut(place(edge.node).ok()?));
             if let Some(load) = load {
                 load.topics_out += 1;
@@ -291,7 +295,7 @@ impl Graph {
             }
         }
         for state in &self.subscribes {
-            let Some(edge) = elements.subscribes.get(state.id as usize) else {
+            let Some(edge) = elements.subscribes.get(state.id) else {
                 continue;
             };
             let Some(load) = place(edge.node).ok().and_then(|at| all.get_mut(at)) else {
@@ -327,16 +331,20 @@ pub enum Element {
 
 impl Element {
     /// Makes an element of each kind from its id: nodes, topics, publications, subscriptions.
-    pub(crate) const KINDS: [fn(u32) -> Self; 4] =
-        [Self::Node, Self::Topic, Self::Publish, Self::Subscribe];
+    pub(crate) const KINDS: [fn(usize) -> Self; 4] = [
+        |at| Self::Node(Id::of(at)),
+        |at| Self::Topic(Id::of(at)),
+        |at| Self::Publish(Id::of(at)),
+        |at| Self::Subscribe(Id::of(at)),
+    ];
 
     /// The index of its kind in [`Element::KINDS`], and its id.
     pub(crate) fn place(self) -> (usize, usize) {
         match self {
-            Self::Node(id) => (0, id as usize),
-            Self::Topic(id) => (1, id as usize),
-            Self::Publish(id) => (2, id as usize),
-            Self::Subscribe(id) => (3, id as usize),
+            Self::Node(id) => (0, id.at()),
+            Self::Topic(id) => (1, id.at()),
+            Self::Publish(id) => (2, id.at()),
+            Self::Subscribe(id) => (3, id.at()),
         }
     }
 
@@ -354,12 +362,11 @@ impl Element {
 /// A value of an element's record, for any kind of element; `None` if the element does not exist.
 macro_rules! of_record {
     ($elements:expr, $get:ident, $element:expr, $record:ident => $value:expr) => {{
-        let id = $element.place().1;
         match $element {
-            Element::Node(_) => $elements.nodes.$get(id).map(|$record| $value),
-            Element::Topic(_) => $elements.topics.$get(id).map(|$record| $value),
-            Element::Publish(_) => $elements.publishes.$get(id).map(|$record| $value),
-            Element::Subscribe(_) => $elements.subscribes.$get(id).map(|$record| $value),
+            Element::Node(id) => $elements.nodes.$get(id).map(|$record| $value),
+            Element::Topic(id) => $elements.topics.$get(id).map(|$record| $value),
+            Element::Publish(id) => $elements.publishes.$get(id).map(|$record| $value),
+            Element::Subscribe(id) => $elements.subscribes.$get(id).map(|$record| $value),
         }
     }};
 }
@@ -374,20 +381,22 @@ impl Elements {
             self.subscribes.len(),
         ];
         let kinds = Element::KINDS.into_iter().zip(many);
-        kinds.flat_map(|(kind, many)| (0..u32::try_from(many).unwrap_or(u32::MAX)).map(kind))
+        kinds.flat_map(|(kind, many)| (0..many).map(kind))
     }
 
     /// Every edge: publications, then subscriptions.
     pub(crate) fn edges(&self) -> impl Iterator<Item = (Element, &Edge)> {
-        let publishes = (0..).map(Element::Publish).zip(&self.publishes);
-        publishes.chain((0..).map(Element::Subscribe).zip(&self.subscribes))
+        let publishes = self.publishes.with_ids();
+        let subscribes = self.subscribes.with_ids();
+        let publishes = publishes.map(|(id, edge)| (Element::Publish(id), edge));
+        publishes.chain(subscribes.map(|(id, edge)| (Element::Subscribe(id), edge)))
     }
 
     /// The names of the node and the topic of an element: both for an edge, otherwise one.
     pub(crate) fn names(&self, element: Element) -> (Option<&str>, Option<&str>) {
         let (node, topic) = self.ends(element);
-        let node = node.and_then(|id| self.nodes.get(id as usize));
-        let topic = topic.and_then(|id| self.topics.get(id as usize));
+        let node = node.and_then(|id| self.nodes.get(id));
+        let topic = topic.and_then(|id| self.topics.get(id));
         (
             node.map(|node| node.name.as_str()),
             topic.map(|topic| topic.name.as_str()),
@@ -399,7 +408,7 @@ impl Elements {
         let at = self
             .nodes
             .binary_search_by(|node| node.name.as_str().cmp(name));
-        NodeId::try_from(at.ok()?).ok()
+        at.ok().map(Id::of)
     }
 
     /// The topic of this name.
@@ -407,21 +416,21 @@ impl Elements {
         let at = self
             .topics
             .binary_search_by(|topic| topic.name.as_str().cmp(name));
-        TopicId::try_from(at.ok()?).ok()
+        at.ok().map(Id::of)
     }
 
     /// The publication of a topic by a node.
     pub fn publication(&self, node: NodeId, topic: TopicId) -> Option<EdgeId> {
         let key = |edge: &Edge| (edge.node, edge.topic);
         let at = self.publishes.binary_search_by_key(&(node, topic), key);
-        EdgeId::try_from(at.ok()?).ok()
+        at.ok().map(Id::of)
     }
 
     /// The subscription of a topic by a node.
     pub fn subscription(&self, topic: TopicId, node: NodeId) -> Option<EdgeId> {
         let key = |edge: &Edge| (edge.topic, edge.node);
         let at = self.subscribes.binary_search_by_key(&(topic, node), key);
-        EdgeId::try_from(at.ok()?).ok()
+        at.ok().map(Id::of)
     }
 
     /// As [`Elements::publication`], of a node and a topic.
@@ -440,15 +449,15 @@ impl Elements {
         match element {
             Element::Node(id) => (Some(id), None),
             Element::Topic(id) => (None, Some(id)),
-            Element::Publish(id) => ends(self.publishes.get(id as usize)),
-            Element::Subscribe(id) => ends(self.subscribes.get(id as usize)),
+            Element::Publish(id) => ends(self.publishes.get(id)),
+            Element::Subscribe(id) => ends(self.subscribes.get(id)),
         }
     }
 
     /// Whether an element is a service, or an end of one.
     pub(crate) fn is_service(&self, what: Element) -> bool {
         let topic = self.ends(what).1;
-        topic.is_some_and(|id| self.topics.get(id as usize).is_some_and(Topic::is_service))
+        topic.is_some_and(|id| self.topics.get(id).is_some_and(Topic::is_service))
     }
 
     /// The kinds of evidence for an element.
@@ -468,10 +477,10 @@ impl Elements {
 
     /// The only publication of each topic; `None` if none or several are known, or if the bag counts
     /// publishers that it does not name.
-    pub(crate) fn sole_publishers(&self) -> Vec<Option<EdgeId>> {
-        let mut found = vec![(0, None); self.topics.len()];
-        for (id, edge) in (0..).zip(&self.publishes) {
-            if let Some(found) = found.get_mut(edge.topic as usize) {
+    pub(crate) fn sole_publishers(&self) -> ById<TopicId, Option<EdgeId>> {
+        let mut found = ById::like(&self.topics, (0, None));
+        for (id, edge) in self.publishes.with_ids() {
+            if let Some(found) = found.get_mut(edge.topic) {
                 *found = (found.0 + 1, Some(id));
             }
         }

@@ -130,8 +130,8 @@ pub mod values {
     pub use crate::evidence::{Confidence, Evidence};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
-        Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Measures, Node, NodeId,
-        NodeLoad, NodeState, State, Topic, TopicId, TopicState,
+        ById, Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Id, Measures, Node,
+        NodeId, NodeLoad, NodeState, State, Topic, TopicId, TopicState,
     };
     pub use crate::mission::event_log::{
         Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,

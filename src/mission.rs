@@ -21,7 +21,7 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
 use crate::graph::history::Sending;
-use crate::graph::{Element, Elements, Graph, Graphs, NodeId};
+use crate::graph::{ById, Element, Elements, Graph, Graphs, NodeId, TopicId};
 
 pub(crate) use event_log::EventId;
 pub use event_log::EventLog;
@@ -111,7 +111,7 @@ impl Mission {
 
     /// The skew of each topic: the coefficient of variation of its rate over the windows, 0 for one that is always the
     /// same; `None` without two whole windows or without messages. A partial window at the end does not count.
-    pub(crate) fn skews(&self) -> Vec<Option<f64>> {
+    pub(crate) fn skews(&self) -> ById<TopicId, Option<f64>> {
         let many = self.windows.iter().filter(|w| !w.partial).count() as f64;
         let skew = |topic| {
             let (mut sum, mut squares) = (0.0, 0.0);
@@ -126,7 +126,7 @@ impl Mission {
             let spread = libm::sqrt((squares / many - mean * mean).max(0.0));
             (many > 1.0 && mean > 0.0).then(|| spread / mean)
         };
-        let topics = (0..).zip(&self.elements.topics);
+        let topics = self.elements.topics.with_ids();
         topics.map(|(id, _)| skew(id)).collect()
     }
 

@@ -139,7 +139,7 @@ fn details(mission: &Mission) -> String {
         .filter(|e| e.kind == Kind::Restarted && e.is_headline())
     {
         let (node, _) = mission.elements.ends(entry.what);
-        let role = &mission.elements.nodes[node.unwrap() as usize].role;
+        let role = &mission.elements.nodes[node.unwrap()].role;
         write!(text, "\n  {} restarted at {} s", role, seconds(entry.time)).unwrap();
     }
     for one in &mission.log.interruptions {

@@ -10,6 +10,7 @@ use bagreel::internals::evidence::topology::{NamedElement, Topology, TopologyEnt
 use bagreel::internals::evidence::{Confidence, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
 use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::values::{EdgeId, TopicId};
 
 use crate::support::cdr::Cdr;
 use crate::support::rosbag1::{Pack, write};
@@ -69,10 +70,10 @@ fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
     let all = &built.elements;
     let by =
         |evidence: bagreel::internals::evidence::Evidence| evidence.words().any(|word| word == by);
-    let node = |id: u32| all.nodes[id as usize].name.as_str();
-    let topic = |id: u32| all.topics[id as usize].name.as_str();
+    let node = |id| all.nodes[id].name.as_str();
+    let topic = |id| all.topics[id].name.as_str();
     let confidence = |states: &[graph::EdgeState], id: usize| {
-        let state = states.iter().find(|s| s.id as usize == id);
+        let state = states.iter().find(|s| s.id.0 as usize == id);
         state.map_or("never", |s| s.confidence.word())
     };
     let graph = &built.graphs[0];
@@ -454,7 +455,7 @@ fn unnamed_publishers_are_counted() {
     assert_eq!(edges(&bag, "unknown"), ["/scan ? > /scan declared"]);
     let (built, _) = concluded(&bag, CollectOptions::default());
     let begins = |id: u32| {
-        built.lives.of(graph::Element::Topic(id)).unwrap()[0]
+        built.lives.of(graph::Element::Topic(TopicId(id))).unwrap()[0]
             .span
             .start
     };
@@ -640,7 +641,7 @@ fn diagnostics_count_before_lists_are_read() {
         .elements
         .subscribes
         .iter()
-        .map(|e| topics[e.topic as usize].name.as_str());
+        .map(|e| topics[e.topic].name.as_str());
     assert!(subscribed.into_iter().all(|topic| topic != "/diagnostics"));
 }
 
@@ -825,7 +826,10 @@ fn rosbridge_subscribes_for_its_clients() {
     bag.at(log, 9000, says("[Client 0] Unsubscribed from /odom"));
     assert_eq!(edges(&bag, "log_text"), ["/odom > /bridge stated"]);
     let (built, _) = concluded(&bag, CollectOptions::default());
-    let end = built.lives.of(graph::Element::Subscribe(0)).unwrap()[0]
+    let end = built
+        .lives
+        .of(graph::Element::Subscribe(EdgeId(0)))
+        .unwrap()[0]
         .span
         .end;
     assert_eq!(end, Stamp(ORIGIN + 9 * SECOND + 1));
@@ -927,7 +931,7 @@ fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
         .map(|n| n.name.to_string())
         .collect();
     let id = names.iter().position(|name| name == node);
-    let is_there = |g: &graph::Graph| g.nodes.iter().any(|n| Some(n.id as usize) == id);
+    let is_there = |g: &graph::Graph| g.nodes.iter().any(|n| Some(n.id.0 as usize) == id);
     (built.graphs.iter().map(is_there).collect(), names)
 }
 

@@ -15,10 +15,10 @@ use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::run;
 use bagreel::internals::export::sequence::{Drawings, Sequence, SequenceOptions};
 use bagreel::internals::export::{Output, Written};
-use bagreel::internals::graph::Element;
 use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::{Mission, read_json};
 use bagreel::internals::view::{Frame, Headline, View};
+use bagreel::values::{Element, NodeId};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
@@ -65,7 +65,7 @@ fn mission(windows: usize) -> (Mission, View) {
             .then_some(Headline {
                 event: 0,
                 kind: Kind::Started,
-                what: Element::Node(0),
+                what: Element::Node(NodeId(0)),
                 time: second(index),
             })
             .into_iter()

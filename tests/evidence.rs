@@ -65,16 +65,10 @@ type Names = BTreeSet<Vec<String>>;
 /// Nodes, publications and subscriptions of one window, in the ground truth's notation.
 fn names(built: &Built, window: usize) -> [Names; 3] {
     let (all, graph) = (&built.elements, &built.graphs[window]);
-    let node = |id: u32| all.nodes[id as usize].name.as_str().to_owned();
-    let topic = |id: u32| all.topics[id as usize].name.as_str().to_owned();
-    let publishes = graph
-        .publishes
-        .iter()
-        .map(|e| &all.publishes[e.id as usize]);
-    let subscribes = graph
-        .subscribes
-        .iter()
-        .map(|e| &all.subscribes[e.id as usize]);
+    let node = |id| all.nodes[id].name.as_str().to_owned();
+    let topic = |id| all.topics[id].name.as_str().to_owned();
+    let publishes = graph.publishes.iter().map(|e| &all.publishes[e.id]);
+    let subscribes = graph.subscribes.iter().map(|e| &all.subscribes[e.id]);
     [
         graph.nodes.iter().map(|n| vec![node(n.id)]).collect(),
         publishes
@@ -96,8 +90,8 @@ fn confidences((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]
     let truth: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
     let all = &built.elements;
-    let node = |id: u32| all.nodes[id as usize].name.as_str();
-    let topic = |id: u32| all.topics[id as usize].name.as_str();
+    let node = |id| all.nodes[id].name.as_str();
+    let topic = |id| all.topics[id].name.as_str();
     let mut counts = [[0; 2]; 4];
     for real in truth["periods"]["10"].as_array().unwrap() {
         let start = Stamp(real["start_ns"].as_i64().unwrap());
@@ -115,12 +109,12 @@ fn confidences((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]
             )
         });
         let publishes = graph.publishes.iter().map(|s| {
-            let edge = &all.publishes[s.id as usize];
+            let edge = &all.publishes[s.id];
             let names = serde_json::json!([node(edge.node), topic(edge.topic)]);
             (s.confidence, "publishes", node(edge.node), names)
         });
         let subscribes = graph.subscribes.iter().map(|s| {
-            let edge = &all.subscribes[s.id as usize];
+            let edge = &all.subscribes[s.id];
             let names = serde_json::json!([topic(edge.topic), node(edge.node)]);
             (s.confidence, "subscribes", node(edge.node), names)
         });
@@ -376,7 +370,7 @@ fn starts_stops_crashes_and_restarts_are_detected_exactly() {
     for (node, windows) in expected {
         assert_eq!(life(&built, node), windows, "{node}");
     }
-    let name = |id: u32| built.elements.nodes[id as usize].name.as_str();
+    let name = |id| built.elements.nodes[id].name.as_str();
     let again = built.lives.iter().flat_map(|(what, lives)| {
         let again = lives.iter().skip(1);
         again.map(move |life| (life.span.start, what))

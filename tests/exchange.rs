@@ -201,10 +201,7 @@ fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     fs::write(&path, rosbag1::write(&measured(), Pack::Lz4, 16_384)).unwrap();
     let mission = in_windows_of(&path, 10);
     let all = &mission.elements;
-    let topic = (0..)
-        .zip(&all.topics)
-        .find(|(_, t)| t.name.as_str() == "/scan");
-    let topic = topic.unwrap().0;
+    let topic = all.topic("/scan").unwrap();
     let graph = mission.graphs.iter().nth(1).unwrap();
     let scan = graph.topics.iter().find(|t| t.id == topic).unwrap();
     let count = |n: Option<u64>| n.map(|n| n as f64);
@@ -212,7 +209,7 @@ fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     assert!(near(count(scan.measures.drops), 20.0), "{scan:?}");
     assert!(near(scan.measures.jitter_s, 0.02), "{scan:?}");
     assert!(near(scan.measures.age_s, 0.05), "{scan:?}");
-    let is_scan = |id: u32| all.subscribes[id as usize].topic == topic;
+    let is_scan = |id| all.subscribes[id].topic == topic;
     let edge = graph.subscribes.iter().find(|e| is_scan(e.id)).unwrap();
     assert!(near(count(edge.count), 80.0), "{edge:?}");
     assert!(near(edge.hz, 8.0), "{edge:?}");
@@ -220,13 +217,13 @@ fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     assert!(near(count(edge.measures.drops), 20.0), "{edge:?}");
     assert!(near(edge.measures.jitter_s, 0.02), "{edge:?}");
     assert!(near(edge.measures.age_s, 0.07), "{edge:?}");
-    let is_scan = |id: u32| all.publishes[id as usize].topic == topic;
+    let is_scan = |id| all.publishes[id].topic == topic;
     let edge = graph.publishes.iter().find(|e| is_scan(e.id)).unwrap();
     assert!(near(count(edge.bytes), 100_000.0), "{edge:?}");
     assert!(near(edge.measures.age_s, 0.05), "{edge:?}");
     let loads = graph.loads(all);
     let of = |name: &str| {
-        let is_it = |id: u32| all.nodes[id as usize].name.as_str() == name;
+        let is_it = |id| all.nodes[id].name.as_str() == name;
         loads[graph.nodes.iter().position(|n| is_it(n.id)).unwrap()]
     };
     let (lidar, slam) = (of("/lidar"), of("/slam"));
@@ -292,23 +289,17 @@ fn age_bytes_and_drops_are_checked() {
 /// The names of the elements in each window, as lines.
 fn seen(mission: &Mission) -> Vec<Vec<String>> {
     let all = &mission.elements;
-    let node = |id: u32| all.nodes[id as usize].name.as_str();
-    let topic = |id: u32| all.topics[id as usize].name.as_str();
+    let node = |id| all.nodes[id].name.as_str();
+    let topic = |id| all.topics[id].name.as_str();
     let graphs = mission.graphs.iter().map(|graph| {
         let nodes = graph.nodes.iter().map(|s| format!("node {}", node(s.id)));
         let topics = graph
             .topics
             .iter()
             .map(|s| format!("topic {}", topic(s.id)));
-        let publishes = graph
-            .publishes
-            .iter()
-            .map(|s| &all.publishes[s.id as usize]);
+        let publishes = graph.publishes.iter().map(|s| &all.publishes[s.id]);
         let publishes = publishes.map(|e| format!("{} -> {}", node(e.node), topic(e.topic)));
-        let subscribes = graph
-            .subscribes
-            .iter()
-            .map(|s| &all.subscribes[s.id as usize]);
+        let subscribes = graph.subscribes.iter().map(|s| &all.subscribes[s.id]);
         let subscribes = subscribes.map(|e| format!("{} <- {}", node(e.node), topic(e.topic)));
         nodes
             .chain(topics)

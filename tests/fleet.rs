@@ -492,7 +492,7 @@ fn finished_counts_equal_the_mission_read_directly() {
         for ((window, a), (_, b)) in made.each().zip(read.each()) {
             let topics = |m: &Mission, g: &bagreel::Graph| -> BTreeMap<String, String> {
                 let sent = g.topics.iter().filter(|t| t.count > 0);
-                let name = |id: u32| m.elements.topics[id as usize].name.to_string();
+                let name = |id| m.elements.topics[id].name.to_string();
                 sent.map(|t| (name(t.id), format!("{:?} {:?}", t.count, t.hz)))
                     .collect()
             };
@@ -508,10 +508,10 @@ fn finished_counts_equal_the_mission_read_directly() {
                     .iter()
                     .filter(|e| e.count.is_some_and(|n| n > 0));
                 let all = &m.elements;
-                let name = |id: u32| {
-                    let edge = &all.publishes[id as usize];
-                    let node = all.nodes[edge.node as usize].name.as_str();
-                    format!("{node} {}", all.topics[edge.topic as usize].name.as_str())
+                let name = |id| {
+                    let edge = &all.publishes[id];
+                    let node = all.nodes[edge.node].name.as_str();
+                    format!("{node} {}", all.topics[edge.topic].name.as_str())
                 };
                 sent.map(|e| (name(e.id), format!("{:?} {:?}", e.count, e.hz)))
                     .collect()

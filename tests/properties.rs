@@ -5,7 +5,7 @@ use bagreel::internals::graph::diff::{apply, diff};
 use bagreel::internals::graph::{EdgeState, Graph, Measures, NodeState, State, TopicState};
 use std::collections::BTreeSet;
 
-use bagreel::values::{Element, Kind, Length, Period};
+use bagreel::values::{EdgeId, Element, Kind, Length, NodeId, Period, TopicId};
 use bagreel::{Change, Mission, Reading, read};
 use proptest::collection::btree_map;
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn edges() -> impl Strategy<Value = Vec<EdgeState>> {
         let made = edges
             .into_iter()
             .map(|(id, (state, confidence, count))| EdgeState {
-                id,
+                id: EdgeId(id),
                 state,
                 confidence,
                 count,
@@ -46,7 +46,7 @@ fn graph() -> impl Strategy<Value = Graph> {
         nodes: nodes
             .into_iter()
             .map(|(id, (state, confidence))| NodeState {
-                id,
+                id: NodeId(id),
                 state,
                 confidence,
                 hz: None,
@@ -56,7 +56,7 @@ fn graph() -> impl Strategy<Value = Graph> {
         topics: topics
             .into_iter()
             .map(|(id, (state, confidence, count))| TopicState {
-                id,
+                id: TopicId(id),
                 state,
                 confidence,
                 count,

@@ -34,8 +34,8 @@ fn shown(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
     let name =
         |e: &bagreel::internals::mission::event_log::Event| match mission.elements.ends(e.what) {
-            (Some(node), _) => mission.elements.nodes[node as usize].role.to_string(),
-            (None, Some(topic)) => mission.elements.topics[topic as usize].name.to_string(),
+            (Some(node), _) => mission.elements.nodes[node].role.to_string(),
+            (None, Some(topic)) => mission.elements.topics[topic].name.to_string(),
             (None, None) => String::new(),
         };
     of_kind
@@ -176,7 +176,7 @@ fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
         let bagreel::values::Element::Node(node) = entry.what else {
             continue;
         };
-        let role = mission.elements.nodes[node as usize].role.to_string();
+        let role = mission.elements.nodes[node].role.to_string();
         let has_part = mission.log.parts(id).any(|part| part.kind == kind);
         let interval = (second(entry.earliest), second(entry.latest));
         match entry.kind {
@@ -246,7 +246,7 @@ fn commanded_rates_and_take_overs_are_logged_with_numbers() {
     let (mission, truth) = (mission("warehouse.bag", 60), truth());
     let second = |at| mission.offset(at) as f64 / 1e9;
     let name = |what| match mission.elements.ends(what) {
-        (_, Some(topic)) => mission.elements.topics[topic as usize].name.as_str(),
+        (_, Some(topic)) => mission.elements.topics[topic].name.as_str(),
         _ => "",
     };
     let near = |from: f64, to: f64, at: f64| from - 5.0 <= at && at <= to + 5.0;

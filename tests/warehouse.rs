@@ -37,12 +37,7 @@ fn all_counts_match_an_independent_reader() {
     for ((window, graph), expected) in mission.each().zip(expected["windows"].as_array().unwrap()) {
         let counted = graph.topics.iter().filter(|t| t.count > 0);
         let counted: BTreeMap<&str, u64> = counted
-            .map(|t| {
-                (
-                    mission.elements.topics[t.id as usize].name.as_str(),
-                    t.count,
-                )
-            })
+            .map(|t| (mission.elements.topics[t.id].name.as_str(), t.count))
             .collect();
         let expected: BTreeMap<&str, u64> = expected
             .as_object()
@@ -61,12 +56,10 @@ fn all_counts_match_an_independent_reader() {
 /// Whether a node is running in the window that begins at this second of the mission.
 fn alive(mission: &Mission, node: &str, second: usize) -> bool {
     let graph = mission.graphs.get(second / 10).unwrap();
-    graph.nodes.iter().any(|n| {
-        mission.elements.nodes[n.id as usize]
-            .name
-            .as_str()
-            .starts_with(node)
-    })
+    graph
+        .nodes
+        .iter()
+        .any(|n| mission.elements.nodes[n.id].name.as_str().starts_with(node))
 }
 
 #[test]
@@ -97,7 +90,7 @@ fn nodes_start_and_stop_at_the_true_times() {
 fn nodes_of_another_part_of_the_recording_are_not_in_the_graph() {
     let names = |mission: &Mission, window: usize| -> BTreeSet<String> {
         let graph = mission.graphs.get(window).unwrap();
-        let node = |id: u32| mission.elements.nodes[id as usize].name.to_string();
+        let node = |id| mission.elements.nodes[id].name.to_string();
         graph.nodes.iter().map(|n| node(n.id)).collect()
     };
     let (whole, part) = (mission(), part(Some("280"), None));

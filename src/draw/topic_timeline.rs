@@ -303,7 +303,7 @@ impl<'a> TopicTimeline<'a> {
     fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
-            let node = elements.nodes.get(*id as usize);
+            let node = elements.nodes.get(*id);
             node.is_some_and(|n| !n.evidence.is_guess())
         };
         let roles = self.source.roles.iter();

@@ -17,7 +17,7 @@ use crate::base::name::UNKNOWN_NODE;
 use crate::base::time::Stamp;
 use crate::evidence::unknown::unnamed as boxed;
 use crate::export::target::Target;
-use crate::graph::{Edge, Element, Topic};
+use crate::graph::{Edge, Element, NodeId, Topic, TopicId};
 use crate::mission::Mission;
 use crate::mission::events::sentence;
 
@@ -61,7 +61,7 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
 /// The written elements: the ends of every node.
 struct Ends<'a> {
     /// By node: publications and subscriptions.
-    of: BTreeMap<u32, [Vec<(Element, &'a Edge)>; 2]>,
+    of: BTreeMap<NodeId, [Vec<(Element, &'a Edge)>; 2]>,
     /// The publications of unnamed nodes, with the number of those.
     unnamed: Vec<(Element, &'a Edge, usize)>,
 }
@@ -71,11 +71,8 @@ impl<'a> Ends<'a> {
     fn new(mission: &'a Mission) -> Self {
         let all = &mission.elements;
         let is_known = |what| !all.evidence(what).is_guess();
-        let mut of: BTreeMap<u32, [Vec<(Element, &Edge)>; 2]> = BTreeMap::new();
-        for (id, _) in (0..)
-            .zip(&all.nodes)
-            .filter(|(id, _)| is_known(Element::Node(*id)))
-        {
+        let mut of: BTreeMap<NodeId, [Vec<(Element, &Edge)>; 2]> = BTreeMap::new();
+        for id in all.nodes.ids().filter(|id| is_known(Element::Node(*id))) {
             of.insert(id, Default::default());
         }
         let mut unnamed = Vec::new();
@@ -83,7 +80,7 @@ impl<'a> Ends<'a> {
             if !is_known(what) {
                 let is_source = all.evidence(what).words().any(|word| word == "source_only");
                 let is_box = !is_source && matches!(what, Element::Publish(_));
-                let node = all.nodes.get(edge.node as usize).filter(|_| is_box);
+                let node = all.nodes.get(edge.node).filter(|_| is_box);
                 unnamed.extend(node.map(|node| (what, edge, boxed(node.name.as_str()))));
                 continue;
             }
@@ -116,13 +113,13 @@ impl<'a> Ends<'a> {
             .of
             .iter()
             .filter(|(id, _)| is_there(Element::Node(**id)));
-        let topics = (0..).zip(&elements.topics).map(|(id, _)| id);
+        let topics = elements.topics.ids();
         let topics = topics.filter(|id| is_there(Element::Topic(*id)));
-        let mut alone: BTreeSet<u32> = topics.collect();
-        let topic = |id: u32| elements.topics.get(id as usize);
+        let mut alone: BTreeSet<TopicId> = topics.collect();
+        let topic = |id: TopicId| elements.topics.get(id);
         let mut there = Vec::new();
         for (id, ends) in nodes {
-            let name = elements.nodes.get(*id as usize);
+            let name = elements.nodes.get(*id);
             let mut node = GraphNode::new(name.map_or("", |node| node.name.as_str()));
             for (side, ends) in ends.iter().enumerate() {
                 for (_, edge) in ends.iter().filter(|(what, _)| is_there(*what)) {

@@ -81,14 +81,14 @@ fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>
         !elements.evidence(what).is_guess() && (has_inferred || is_sure)
     };
     let mut lists: BTreeMap<NodeId, [String; 6]> = BTreeMap::new();
-    for (id, node) in (0..).zip(&elements.nodes) {
+    for (id, node) in elements.nodes.with_ids() {
         if is_known(Element::Node(id)) && !node.records() {
             lists.insert(id, Default::default());
         }
     }
     let mut untyped = 0;
     for (what, edge) in elements.edges().filter(|(what, _)| is_known(*what)) {
-        let topic = &elements.topics[edge.topic as usize];
+        let topic = &elements.topics[edge.topic];
         let Some(lists) = lists.get_mut(&edge.node) else {
             continue;
         };
@@ -99,7 +99,7 @@ fn documents(mission: &Mission, has_inferred: bool) -> (BTreeMap<String, String>
         }
     }
     let documents = lists.into_iter().map(|(id, lists)| {
-        let name = elements.nodes[id as usize].name.to_string();
+        let name = elements.nodes[id].name.to_string();
         let mut text = "nodl_version: 2\n".to_owned();
         for (key, list) in LISTS
             .iter()

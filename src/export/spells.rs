@@ -39,8 +39,8 @@ impl SpellOf {
     fn new(mission: &Mission, what: Element) -> Self {
         let elements = &mission.elements;
         let (node, topic) = elements.ends(what);
-        let node = node.map(|id| visible(elements.nodes[id as usize].name.as_str()));
-        let topic = topic.map(|id| visible(elements.topics[id as usize].name.as_str()));
+        let node = node.map(|id| visible(elements.nodes[id].name.as_str()));
+        let topic = topic.map(|id| visible(elements.topics[id].name.as_str()));
         let node_id = format!("node:{}", node.as_deref().unwrap_or_default());
         let topic_id = format!("topic:{}", topic.as_deref().unwrap_or_default());
         let (id, label, ends) = match what {

@@ -12,7 +12,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::Bound;
-use crate::graph::{Edge, Element, NodeId, PerElement, State, TopicId};
+use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, State, Topic, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Event, Kind};
 
@@ -24,7 +24,7 @@ pub(crate) struct Facts<'a> {
     /// The strongest confidence to which each element is known.
     confidences: PerElement<Confidence>,
     /// The number of messages of each topic.
-    messages: Vec<u64>,
+    messages: ById<TopicId, u64>,
     /// Whether a tool rewrote the bag, so that it names wrong publishers.
     is_rewritten: bool,
     /// Present nodes by role.
@@ -33,7 +33,7 @@ pub(crate) struct Facts<'a> {
     names: BTreeMap<&'a str, &'a str>,
     topics: BTreeMap<&'a str, TopicId>,
     /// The publications and the subscriptions of each topic.
-    edges: [Vec<Vec<u32>>; 2],
+    edges: [ById<TopicId, Vec<EdgeId>>; 2],
 }
 
 /// Kinds of evidence for what should have run, not for what did. The user's topology file states what did.
@@ -70,10 +70,10 @@ impl<'a> Facts<'a> {
             let rows = mission.graphs.rows(Element::Topic(id));
             rows.filter_map(|(_, row)| row.count).sum()
         };
-        let topics = (0..).zip(&elements.topics);
+        let topics = elements.topics.with_ids();
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
         let mut names = BTreeMap::new();
-        for (id, node) in (0..).zip(&elements.nodes) {
+        for (id, node) in elements.nodes.with_ids() {
             // Elements in no window are outside the part that is checked.
             if is_there(id) && is_seen(node.evidence) {
                 roles.entry(&node.role).or_default().push(id);
@@ -83,7 +83,7 @@ impl<'a> Facts<'a> {
         Self {
             mission,
             confidences,
-            messages: topics.clone().map(|(id, _)| count(id)).collect(),
+            messages: elements.topics.ids().map(count).collect(),
             is_rewritten: mission
                 .notices
                 .iter()
@@ -94,7 +94,7 @@ impl<'a> Facts<'a> {
                 .map(|(id, topic)| (topic.name.as_str(), id))
                 .collect(),
             edges: [&elements.publishes, &elements.subscribes]
-                .map(|edges| by_topic(edges, elements.topics.len())),
+                .map(|edges| by_topic(edges, &elements.topics)),
         }
     }
 
@@ -141,7 +141,7 @@ impl<'a> Facts<'a> {
             let own = self.topics.get(pattern.as_str()).copied();
             return own.into_iter().filter(|id| self.is_there(*id)).collect();
         }
-        let topics = (0..).zip(&self.mission.elements.topics);
+        let topics = self.mission.elements.topics.with_ids();
         topics
             .filter(|(id, topic)| pattern.matches(topic.name.as_str()) && self.is_there(*id))
             .map(|(id, _)| id)
@@ -152,37 +152,37 @@ impl<'a> Facts<'a> {
     /// subscriber.
     pub(crate) fn is_there(&self, topic: TopicId) -> bool {
         let elements = &self.mission.elements;
-        let any = |of: usize, edges: &[Edge]| {
-            let mut own = self.edges[of][topic as usize].iter();
-            own.any(|id| is_seen(edges[*id as usize].evidence))
+        let any = |of: usize, edges: &ById<EdgeId, Edge>| {
+            let mut own = self.edges[of][topic].iter();
+            own.any(|id| is_seen(edges[*id].evidence))
         };
-        is_seen(elements.topics[topic as usize].evidence)
-            && (self.messages[topic as usize] > 0
+        is_seen(elements.topics[topic].evidence)
+            && (self.messages[topic] > 0
                 || any(0, &elements.publishes)
                 || !any(1, &elements.subscribes))
     }
 
     /// The number of messages of a topic.
     pub(crate) fn messages(&self, topic: TopicId) -> u64 {
-        self.messages[topic as usize]
+        self.messages[topic]
     }
 
     pub(crate) fn node(&self, id: NodeId) -> &'a str {
-        self.mission.elements.nodes[id as usize].name.as_str()
+        self.mission.elements.nodes[id].name.as_str()
     }
 
     pub(crate) fn role(&self, id: NodeId) -> &'a str {
-        &self.mission.elements.nodes[id as usize].role
+        &self.mission.elements.nodes[id].role
     }
 
     pub(crate) fn topic(&self, id: TopicId) -> &'a str {
-        self.mission.elements.topics[id as usize].name.as_str()
+        self.mission.elements.topics[id].name.as_str()
     }
 
     /// Whether a role is housekeeping or the recorder's.
     pub(crate) fn is_tool(&self, nodes: &[NodeId]) -> bool {
         let own = &self.mission.elements.nodes;
-        nodes.iter().any(|id| own[*id as usize].is_tool())
+        nodes.iter().any(|id| own[*id].is_tool())
     }
 
     /// Whether a topic is housekeeping.
@@ -203,27 +203,27 @@ impl<'a> Facts<'a> {
 
     /// The publishers of a topic: the node, the publication, and its confidence; one known only from code and launch
     /// files is declared.
-    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Confidence)> {
-        let own = self.edges[0][topic as usize].iter();
+    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, EdgeId, Confidence)> {
+        let own = self.edges[0][topic].iter();
         own.map(|id| {
-            let edge = &self.mission.elements.publishes[*id as usize];
+            let edge = &self.mission.elements.publishes[*id];
             (edge.node, *id, self.confidence(Element::Publish(*id)))
         })
         .collect()
     }
 
     /// The subscribers of a topic, in the same form.
-    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Confidence)> {
-        let own = self.edges[1][topic as usize].iter();
+    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, EdgeId, Confidence)> {
+        let own = self.edges[1][topic].iter();
         own.map(|id| {
-            let edge = &self.mission.elements.subscribes[*id as usize];
+            let edge = &self.mission.elements.subscribes[*id];
             (edge.node, *id, self.confidence(Element::Subscribe(*id)))
         })
         .collect()
     }
 
     /// The roles of the nodes of these edges, without tools and without what is only inferred.
-    pub(crate) fn sure_roles(&self, edges: &[(NodeId, u32, Confidence)]) -> BTreeSet<String> {
+    pub(crate) fn sure_roles(&self, edges: &[(NodeId, EdgeId, Confidence)]) -> BTreeSet<String> {
         let sure = edges
             .iter()
             .filter(|(node, _, known)| *known <= Confidence::Stated && !self.is_tool(&[*node]));
@@ -243,7 +243,7 @@ impl<'a> Facts<'a> {
         let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
         let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
         let any = |words: &[&str]| {
-            let says = |id: &NodeId| has(self.mission.elements.nodes[*id as usize].evidence, words);
+            let says = |id: &NodeId| has(self.mission.elements.nodes[*id].evidence, words);
             named.iter().any(|nodes| nodes.iter().any(says))
         };
         !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
@@ -257,7 +257,7 @@ impl<'a> Facts<'a> {
 
     /// Whether the bag names all publishers of a topic.
     pub(crate) fn lists_publishers(&self, topic: TopicId) -> bool {
-        let unknown = self.mission.elements.topics[topic as usize].unknown_publishers;
+        let unknown = self.mission.elements.topics[topic].unknown_publishers;
         let known = self.publishers(topic);
         !self.is_rewritten
             && unknown.unwrap_or(0) == 0
@@ -296,7 +296,7 @@ impl<'a> Facts<'a> {
     }
 
     /// The time in which a node published a topic, if known, and the number of its messages.
-    pub(crate) fn sent(&self, node: NodeId, edge: u32) -> Option<(Span, u64)> {
+    pub(crate) fn sent(&self, node: NodeId, edge: EdgeId) -> Option<(Span, u64)> {
         let mission = self.mission;
         let runs = match mission.elements.runs(Element::Publish(edge)) {
             [] => self.lives(&[node]),
@@ -328,7 +328,7 @@ impl<'a> Facts<'a> {
 
     /// Whether a topic is latched; `None` if unknown.
     pub(crate) fn is_latched(&self, topic: TopicId) -> Option<bool> {
-        let own = &self.mission.elements.topics[topic as usize];
+        let own = &self.mission.elements.topics[topic];
         let states = self.mission.graphs.rows(Element::Topic(topic));
         let states: BTreeSet<State> = states.map(|(_, row)| row.state).collect();
         match &own.qos {
@@ -380,7 +380,7 @@ impl<'a> Facts<'a> {
     pub(crate) fn is_logged_only(&self, nodes: &[NodeId]) -> bool {
         let elements = &self.mission.elements;
         let is_listed = |id: &NodeId| {
-            let evidence = elements.nodes[*id as usize].evidence;
+            let evidence = elements.nodes[*id].evidence;
             has(evidence, &LISTING) || has(evidence, &STARTING) || !has(evidence, &["rosout"])
         };
         !self.is_sender(nodes) && !nodes.iter().any(is_listed)
@@ -388,7 +388,7 @@ impl<'a> Facts<'a> {
 
     /// Whether any of these nodes sent a message on a topic other than housekeeping.
     pub(crate) fn is_sender(&self, nodes: &[NodeId]) -> bool {
-        let edges = (0..).zip(&self.mission.elements.publishes);
+        let edges = self.mission.elements.publishes.with_ids();
         let mut own = edges.filter(|(_, e)| nodes.contains(&e.node));
         own.any(|(id, e)| {
             let rows = self.mission.graphs.rows(Element::Publish(id));
@@ -409,12 +409,16 @@ impl<'a> Facts<'a> {
 }
 
 /// The edges of each topic, except those of unnamed nodes.
-fn by_topic(edges: &[Edge], topics: usize) -> Vec<Vec<u32>> {
-    let mut all = vec![Vec::new(); topics];
-    for (id, edge) in (0..).zip(edges) {
-        if let (false, Some(own)) = (edge.evidence.is_guess(), all.get_mut(edge.topic as usize)) {
-            own.push(id);
-        }
+fn by_topic(
+    edges: &ById<EdgeId, Edge>,
+    topics: &ById<TopicId, Topic>,
+) -> ById<TopicId, Vec<EdgeId>> {
+    let mut all = ById::like(topics, Vec::new());
+    for (id, edge) in edges
+        .with_ids()
+        .filter(|(_, edge)| !edge.evidence.is_guess())
+    {
+        all[edge.topic].push(id);
     }
     all
 }

@@ -107,27 +107,28 @@ pub struct Diff {
     pub subscribes: Delta<EdgeState>,
 }
 
+/// The elements of one part of a difference.
+macro_rules! elements {
+    ($diff:expr, $part:ident) => {{
+        let nodes = $diff.nodes.$part.iter().map(|s| Element::Node(s.id));
+        let topics = $diff.topics.$part.iter().map(|s| Element::Topic(s.id));
+        let publishes = $diff.publishes.$part.iter();
+        let subscribes = $diff.subscribes.$part.iter();
+        let publishes = publishes.map(|s| Element::Publish(s.id));
+        let subscribes = subscribes.map(|s| Element::Subscribe(s.id));
+        nodes.chain(topics).chain(publishes).chain(subscribes)
+    }};
+}
+
 impl Diff {
     /// The new elements.
     pub(crate) fn added(&self) -> impl Iterator<Item = Element> {
-        let nodes = self.nodes.added.iter().map(|s| Element::Node(s.id));
-        let topics = self.topics.added.iter().map(|s| Element::Topic(s.id));
-        let publishes = self.publishes.added.iter().map(|s| Element::Publish(s.id));
-        let subscribes = self.subscribes.added.iter();
-        let subscribes = subscribes.map(|s| Element::Subscribe(s.id));
-        nodes.chain(topics).chain(publishes).chain(subscribes)
+        elements!(self, added)
     }
 
     /// The removed elements.
     pub(crate) fn removed(&self) -> impl Iterator<Item = Element> {
-        let lists = [
-            &self.nodes.removed,
-            &self.topics.removed,
-            &self.publishes.removed,
-            &self.subscribes.removed,
-        ];
-        let lists = lists.into_iter().zip(Element::KINDS);
-        lists.flat_map(|(ids, kind)| ids.iter().copied().map(kind))
+        elements!(self, removed)
     }
 }
 
@@ -136,8 +137,8 @@ impl Diff {
 pub struct Delta<T> {
     /// States of new elements.
     pub added: Vec<T>,
-    /// Ids of removed elements.
-    pub removed: Vec<u32>,
+    /// States of removed elements, before.
+    pub removed: Vec<T>,
     /// States before and after of elements that differ.
     pub changed: Vec<(T, T)>,
 }
@@ -185,7 +186,7 @@ trait HasId {
 }
 
 macro_rules! placed {
-    ($($type:ty),*) => { $(impl HasId for $type { fn place(&self) -> u32 { self.id } })* };
+    ($($type:ty),*) => { $(impl HasId for $type { fn place(&self) -> u32 { self.id.0 } })* };
 }
 placed!(NodeState, TopicState, EdgeState);
 
@@ -203,7 +204,7 @@ fn delta<T: HasId + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
                 new.next();
             }
             (Some(b), a) if a.is_none_or(|a| b.place() < a.place()) => {
-                delta.removed.push(b.place());
+                delta.removed.push((*b).clone());
                 old.next();
             }
             (_, Some(a)) => {
@@ -216,7 +217,7 @@ fn delta<T: HasId + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
 }
 
 fn patched<T: HasId + Clone>(before: &[T], delta: &Delta<T>) -> Vec<T> {
-    let gone: BTreeSet<u32> = delta.removed.iter().copied().collect();
+    let gone: BTreeSet<u32> = delta.removed.iter().map(T::place).collect();
     let kept = before.iter().filter(|s| !gone.contains(&s.place()));
     let mut all: BTreeMap<u32, T> = kept.map(|s| (s.place(), s.clone())).collect();
     let fresh = delta

@@ -11,7 +11,7 @@ pub(crate) use walk::ColumnWalk;
 
 use std::sync::Arc;
 
-use super::{EdgeState, Element, Elements, Graph, NodeState, PerElement, TopicState};
+use super::{EdgeState, Element, Elements, Graph, Id, NodeState, PerElement, TopicState};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
 
@@ -176,10 +176,10 @@ impl<'a> IntoIterator for &'a Graphs {
 }
 
 /// The states of the elements in the next window, by id.
-fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
+fn states<I: Id, T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(I, &Row) -> T) -> Vec<T> {
     // Reserved at once: growing would take half as much again.
     let mut states = Vec::with_capacity(cursors.len());
-    let rows = (0..).zip(cursors);
+    let rows = (0..).map(I::of).zip(cursors);
     states.extend(rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?))));
     states
 }

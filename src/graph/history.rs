@@ -8,7 +8,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 
-use super::{EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
+use super::{ById, EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
 use crate::base::time::{Span, Stamp};
 
@@ -104,7 +104,7 @@ pub struct Sending {
     pub senders: Vec<Sender>,
     /// The longest pauses per topic, by id, at most 32, in order: each from one message to the next. Empty if
     /// single messages are unknown.
-    pub pauses: Vec<Vec<Span>>,
+    pub pauses: ById<TopicId, Vec<Span>>,
 }
 
 impl Sending {
@@ -126,14 +126,14 @@ impl Sending {
     /// rate.
     pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
         let mut published: BTreeMap<TopicId, Vec<(EdgeId, NodeId)>> = BTreeMap::new();
-        for (id, edge) in (0..).zip(&elements.publishes) {
+        for (id, edge) in elements.publishes.with_ids() {
             published
                 .entry(edge.topic)
                 .or_default()
                 .push((id, edge.node));
         }
         let mut senders = Vec::new();
-        for (topic, _) in (0..).zip(&elements.topics) {
+        for topic in elements.topics.ids() {
             let mut rest = vec![0; graphs.len()];
             for (at, row) in graphs.rows(Element::Topic(topic)) {
                 rest[at] = row.count.unwrap_or(0);
@@ -162,7 +162,7 @@ impl Sending {
         }
         Self {
             senders,
-            pauses: Vec::new(),
+            pauses: ById::default(),
         }
     }
 }
@@ -344,7 +344,7 @@ mod tests {
             is_joined: false,
         };
         let sender = Sender {
-            topic: 0,
+            topic: TopicId(0),
             node: None,
             is_latched: false,
             stretches: vec![stretch(0, 100, 50), stretch(200, 200, 3)],

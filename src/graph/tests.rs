@@ -56,12 +56,7 @@ fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usiz
 
 /// The state of one node in each window, `-` where it does not exist.
 fn states(built: &Built, node: &str) -> Vec<&'static str> {
-    let id = built
-        .elements
-        .nodes
-        .iter()
-        .position(|n| n.name.as_str() == node);
-    let id = u32::try_from(id.unwrap()).unwrap();
+    let id = built.elements.node(node).unwrap();
     let state = |g: &Graph| {
         g.nodes
             .iter()
@@ -82,7 +77,7 @@ fn a_node_lives_until_its_rhythm_breaks() {
     );
     assert_eq!(states(&built, "/x"), ["-", "active", "active", "-", "-"]);
     assert_eq!(built.messages, [1, 4, 2, 0, 1]);
-    let life = built.lives.of(Element::Node(1)).unwrap()[0];
+    let life = built.lives.of(Element::Node(NodeId(1))).unwrap()[0];
     let ended = life.ended.unwrap();
     assert_eq!((ended.time.0, ended.latest.0), (22 * SECOND, 24 * SECOND));
     assert_eq!(life.began.unwrap().time.0, 12 * SECOND);
@@ -99,7 +94,11 @@ fn missing_evidence_is_not_absence() {
     );
     assert_eq!(states(&built, "/x")[1..], ["active"; 9]);
     assert_eq!(states(&built, "/y"), ["active"; 10]);
-    assert!(built.lives.of(Element::Node(1)).unwrap()[0].ended.is_none());
+    assert!(
+        built.lives.of(Element::Node(NodeId(1))).unwrap()[0]
+            .ended
+            .is_none()
+    );
 }
 
 #[test]
@@ -122,8 +121,8 @@ fn a_node_starts_only_where_something_shows_that_it_was_absent() {
         .elements
         .publishes
         .iter()
-        .position(|e| all.elements.topics[e.topic as usize].name.as_str() == "/keys");
-    let edge = u32::try_from(edge.unwrap()).unwrap();
+        .position(|e| all.elements.topics[e.topic].name.as_str() == "/keys");
+    let edge = Id::of(edge.unwrap());
     let life = all.lives.of(Element::Publish(edge)).unwrap()[0];
     assert_eq!((life.span.start, life.began), (Stamp(0), None));
     // Before its first message it is only inferred.
@@ -171,7 +170,7 @@ fn one_stream_that_ends_just_before_the_end_does_not_end_its_node() {
             .nodes
             .iter()
             .position(|n| n.name.as_str() == node);
-        let id = u32::try_from(id.unwrap()).unwrap();
+        let id = Id::of(id.unwrap());
         built.lives.of(Element::Node(id)).unwrap()[0]
             .ended
             .is_some()
@@ -193,9 +192,7 @@ fn a_topic_with_an_uneven_rhythm_does_not_vanish() {
         .topics
         .iter()
         .position(|t| t.name.as_str() == "/keys");
-    let lives = built
-        .lives
-        .of(Element::Topic(u32::try_from(id.unwrap()).unwrap()));
+    let lives = built.lives.of(Element::Topic(Id::of(id.unwrap())));
     assert_eq!(lives.unwrap()[0].ended, None);
 }
 
@@ -234,7 +231,7 @@ fn elements_are_in_the_order_of_their_names() {
     assert!(all.topics.is_sorted_by_key(|t| t.name.clone()));
     let edges: Vec<_> = all.publishes.iter().map(|e| (e.node, e.topic)).collect();
     assert!(edges.is_sorted());
-    assert_eq!(all.nodes[0].name.as_str(), "/a");
+    assert_eq!(all.nodes[NodeId(0)].name.as_str(), "/a");
     assert_eq!(built.graphs[0].nodes[0].hz, Some(0.1));
 }
 
@@ -296,7 +293,7 @@ fn roles_combine_anonymous_nodes() {
     assert_eq!(names, ["/probe", "/rosout"]);
     assert_eq!(states(&all, "/probe"), ["active"; 3]);
     let plain = graphs(&talks, 10);
-    assert_eq!(&*plain.elements.nodes[0].role, "/probe");
+    assert_eq!(&*plain.elements.nodes[NodeId(0)].role, "/probe");
     assert_eq!(plain.elements.nodes.len(), 3);
 }
 
@@ -331,7 +328,10 @@ fn user_topology_is_added_without_overwriting() {
     let all = built(&talks, 10, &options, 0);
     assert_eq!(states(&all, "/x"), ["active", "-", "-"]);
     assert_eq!(states(&all, "/z"), ["-", "active", "-"]);
-    let words: Vec<_> = all.elements.subscribes[0].evidence.words().collect();
+    let words: Vec<_> = all.elements.subscribes[EdgeId(0)]
+        .evidence
+        .words()
+        .collect();
     assert_eq!(words, ["topology"]);
 }
 
@@ -471,7 +471,7 @@ fn twins_share_a_merged_topic_in_turns() {
     assert_eq!(there(&built, first), [0, 1]);
     assert_eq!(there(&built, second), [4, 5]);
     assert!(built.elements.subscribes.iter().all(|e| {
-        let topic = &built.elements.topics[e.topic as usize];
+        let topic = &built.elements.topics[e.topic];
         topic.name.as_str() != "/seen"
     }));
 }
@@ -497,10 +497,7 @@ fn a_refused_client_is_there_for_a_moment() {
         .nodes
         .iter()
         .position(|n| n.name.as_str() == "/bad");
-    let ended = built
-        .lives
-        .of(Element::Node(u32::try_from(bad.unwrap()).unwrap()))
-        .unwrap()[0]
+    let ended = built.lives.of(Element::Node(Id::of(bad.unwrap()))).unwrap()[0]
         .ended
         .unwrap();
     assert_eq!(

@@ -12,7 +12,7 @@ use crate::base::columns::hang;
 use crate::base::csv::table;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
-use crate::graph::Element;
+use crate::graph::{Element, NodeId};
 use crate::mission::Mission;
 use crate::mission::event_log::{
     Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
@@ -318,8 +318,8 @@ fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
 fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
     let elements = &mission.elements;
     let (node, topic) = elements.ends(event.what);
-    let node = node.map(|id| visible(elements.nodes[id as usize].name.as_str()).into_owned());
-    let topic = topic.map(|id| visible(elements.topics[id as usize].name.as_str()).into_owned());
+    let node = node.map(|id| visible(elements.nodes[id].name.as_str()).into_owned());
+    let topic = topic.map(|id| visible(elements.topics[id].name.as_str()).into_owned());
     let (name, topic) = match event.what {
         Element::Topic(_) => (topic, None),
         _ => (node, topic),
@@ -347,9 +347,8 @@ fn cells(mission: &Mission, id: EventId, event: &Event) -> Vec<String> {
 
 /// The values of an event before and after: numbers, names or texts.
 fn values(mission: &Mission, event: &Event) -> (String, String) {
-    let names = |nodes: &[u32]| {
-        let name =
-            |id: &u32| visible(mission.elements.nodes[*id as usize].name.as_str()).into_owned();
+    let names = |nodes: &[NodeId]| {
+        let name = |id: &NodeId| visible(mission.elements.nodes[*id].name.as_str()).into_owned();
         nodes.iter().map(name).collect::<Vec<_>>().join(" ")
     };
     match &event.detail {

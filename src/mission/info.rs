@@ -22,7 +22,7 @@ pub use why::why;
 use crate::base::name::is_recorder;
 use crate::base::words::visible_json;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::{Edge, EdgeId, Element, NodeId};
+use crate::graph::{ById, Edge, EdgeId, Element, NodeId, TopicId};
 use crate::mission::Mission;
 
 /// The output of `bagreel info` for one mission. Written as JSON with these names.
@@ -191,10 +191,10 @@ pub fn info(mission: &Mission) -> Info {
     };
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
-    let named = (0..).zip(&elements.nodes);
+    let named = elements.nodes.with_ids();
     let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
     let nodes = named.map(|(id, node)| {
-        let own = &traffic[id as usize];
+        let own = &traffic[id];
         let confidence = best.of(Element::Node(id));
         NodeInfo {
             name: node.name.to_string(),
@@ -225,7 +225,7 @@ pub fn info(mission: &Mission) -> Info {
         topics_without_subscriber: lacking(&topics, &mut listeners(mission).map(|(_, edge)| edge)),
         evidence: evidence(mission),
         nodes: nodes.collect(),
-        topics,
+        topics: topics.into_iter().collect(),
         advice: Vec::new(),
         figures: figures(mission),
         undrawn: mission.undrawn.clone(),
@@ -275,18 +275,18 @@ fn is_unnamed(evidence: Evidence) -> bool {
 fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
     let elements = &mission.elements;
     let is_recorder = |edge: &Edge| {
-        let node = &elements.nodes[edge.node as usize];
+        let node = &elements.nodes[edge.node];
         is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
     };
-    let edges = (0..).zip(&elements.subscribes);
+    let edges = elements.subscribes.with_ids();
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 
 /// The number of topics with messages but none of these edges.
-fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
+fn lacking(topics: &ById<TopicId, TopicInfo>, edges: &mut dyn Iterator<Item = &Edge>) -> usize {
     let known = edges.filter(|edge| !edge.evidence.is_guess());
-    let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();
-    let with_messages = topics.iter().enumerate().filter(|(_, t)| t.count > 0);
+    let known: BTreeSet<TopicId> = known.map(|edge| edge.topic).collect();
+    let with_messages = topics.with_ids().filter(|(_, t)| t.count > 0);
     with_messages.filter(|(id, _)| !known.contains(id)).count()
 }
 
@@ -302,29 +302,30 @@ struct NodeTraffic {
 }
 
 /// The traffic of every node, computed in one pass over the edges.
-fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<NodeTraffic> {
+fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId, NodeTraffic> {
     let elements = &mission.elements;
-    let mut traffic = vec![NodeTraffic::default(); elements.nodes.len()];
+    let mut traffic = ById::like(&elements.nodes, NodeTraffic::default());
     for edge in &elements.publishes {
-        traffic[edge.node as usize].publishes += 1;
+        traffic[edge.node].publishes += 1;
     }
     for (_, edge) in listeners(mission) {
-        let own = &mut traffic[edge.node as usize];
+        let own = &mut traffic[edge.node];
         own.subscribes += 1;
-        *own.received.get_or_insert(0) += topics[edge.topic as usize].count;
+        *own.received.get_or_insert(0) += topics[edge.topic].count;
     }
     for state in mission.graphs.iter().flat_map(|graph| graph.publishes) {
-        let node: NodeId = elements.publishes[state.id as usize].node;
         if let Some(count) = state.count {
-            *traffic[node as usize].sent.get_or_insert(0) += count;
+            *traffic[elements.publishes[state.id].node]
+                .sent
+                .get_or_insert(0) += count;
         }
     }
     traffic
 }
 
-fn topics(mission: &Mission) -> Vec<TopicInfo> {
+fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
     let elements = &mission.elements;
-    let mut topics: Vec<TopicInfo> = elements
+    let mut topics: ById<TopicId, TopicInfo> = elements
         .topics
         .iter()
         .zip(mission.skews())
@@ -344,7 +345,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
         .collect();
     for (window, graph) in mission.each() {
         for state in &graph.topics {
-            let topic = &mut topics[state.id as usize];
+            let topic = &mut topics[state.id];
             topic.count += state.count;
             topic.bytes = state
                 .bytes
@@ -352,18 +353,16 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             topic.activity[window.index] = state.count;
         }
     }
-    let name = |node: NodeId| elements.nodes[node as usize].name.to_string();
+    let name = |node: NodeId| elements.nodes[node].name.to_string();
     let named = elements.publishes.iter();
     for edge in named.filter(|e| !is_unnamed(e.evidence)) {
-        topics[edge.topic as usize].publishers.push(name(edge.node));
+        topics[edge.topic].publishers.push(name(edge.node));
     }
     for (_, edge) in listeners(mission) {
-        topics[edge.topic as usize]
-            .subscribers
-            .push(name(edge.node));
+        topics[edge.topic].subscribers.push(name(edge.node));
     }
-    for (id, topic) in topics.iter_mut().enumerate() {
-        let life = elements.life(Element::Topic(u32::try_from(id).unwrap_or(u32::MAX)));
+    for (topic, id) in topics.iter_mut().zip(elements.topics.ids()) {
+        let life = elements.life(Element::Topic(id));
         topic.hz = life
             .0
             .zip(life.1)

@@ -110,9 +110,7 @@ fn senders(elements: &Elements, sending: &Sending, span: Span) -> BTreeMap<Topic
         for sender in of {
             let count = sender.count_in(span);
             whole += count;
-            let node = sender
-                .node
-                .and_then(|node| elements.nodes.get(node as usize));
+            let node = sender.node.and_then(|node| elements.nodes.get(node));
             if let Some(node) = node {
                 *roles.entry(&node.role).or_default() += count;
             }

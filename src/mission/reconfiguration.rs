@@ -53,8 +53,8 @@ impl Reconfiguration {
         let elements = &mission.elements;
         let is_robot = |what: &Element| {
             let (node, topic) = elements.ends(*what);
-            let node = node.and_then(|id| elements.nodes.get(id as usize));
-            let topic = topic.and_then(|id| elements.topics.get(id as usize));
+            let node = node.and_then(|id| elements.nodes.get(id));
+            let topic = topic.and_then(|id| elements.topics.get(id));
             !elements.evidence(*what).is_guess()
                 && node.is_some_and(|node| !node.is_tool() && !node.evidence.is_guess())
                 && topic.is_none_or(|topic| !is_quiet(topic.name.as_str()))
@@ -96,7 +96,7 @@ impl Reconfiguration {
             });
             before = Some(own);
         }
-        let nodes = (0..).zip(&elements.nodes);
+        let nodes = elements.nodes.with_ids();
         let nodes = nodes.filter(|(id, _)| is_robot(&Element::Node(*id)));
         let lives = nodes.flat_map(|(_, node)| {
             let name = node.name.to_string();

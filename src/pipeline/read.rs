@@ -23,7 +23,7 @@ use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::history::Sending;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
-use crate::graph::{History, Windowed, graphs, made, traffic, unread};
+use crate::graph::{History, NodeId, Windowed, graphs, made, traffic, unread};
 use crate::mission::event_log::{self, EventLog, Interruption, InterruptionKind};
 use crate::mission::{Mission, Window, read_json};
 
@@ -355,7 +355,7 @@ fn in_order(bags: &mut Vec<Report>, recorded: &Recorded) {
 
 /// The notice about nodes that appear in several recordings at the same time.
 fn doubled(history: &History) -> Option<Notice> {
-    let name = |id: &u32| format!("`{}`", history.elements.nodes[*id as usize].name);
+    let name = |id: &NodeId| format!("`{}`", history.elements.nodes[*id].name);
     let names: Vec<String> = history.doubled.iter().map(name).collect();
     let text = format!(
         "several recordings contain messages of the same nodes at the same time, so restarts of these nodes are unknown: {}; put the names of one bag in a namespace with `--ns BAG=/robot2`",

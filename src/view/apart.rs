@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use super::bundles;
 use super::collapse::headlines;
-use super::homes::ItemKey;
+use super::homes::{ItemKey, NodeKeys, TopicKeys};
 use super::items::{EdgePlace, Viewed, arrow};
 use super::{ArrowKind, ItemKind, Mode, ViewOptions};
-use crate::graph::{Element, Elements, TopicId};
+use crate::graph::{ById, Element, Elements, TopicId};
 use crate::mission::Mission;
 
 impl Viewed {
@@ -18,13 +18,14 @@ impl Viewed {
         &mut self,
         mission: &Mission,
         options: &ViewOptions,
-        (nodes, topics): (&[Option<ItemKey>], &mut [Option<ItemKey>]),
+        (nodes, topics): (&NodeKeys, &mut TopicKeys),
     ) {
         let elements = &mission.elements;
-        let mut ends: Vec<[BTreeSet<&ItemKey>; 2]> = vec![Default::default(); topics.len()];
+        let mut ends: ById<TopicId, [BTreeSet<&ItemKey>; 2]> =
+            ById::like(topics, Default::default());
         for (edges, way) in [(&elements.publishes, 0), (&elements.subscribes, 1)] {
             for edge in edges {
-                ends[edge.topic as usize][way].extend(&nodes[edge.node as usize]);
+                ends[edge.topic][way].extend(&nodes[edge.node]);
             }
         }
         let is_bundled = options.mode == Mode::Bundles;
@@ -35,24 +36,23 @@ impl Viewed {
         if !is_bundled {
             self.set_nodes_apart(mission);
         }
-        for ((key, ends), id) in topics.iter_mut().zip(&ends).zip(0_u32..) {
-            let at = id as usize;
+        for (key, (at, ends)) in topics.iter_mut().zip(ends.with_ids()) {
             let [senders, receivers] = ends;
             let all: BTreeSet<&ItemKey> = senders.union(receivers).copied().collect();
             if !is_bundled {
-                self.is_in_words[1][at] = is_anything && all.is_empty();
+                self.topics_in_words[at] = is_anything && all.is_empty();
                 continue;
             }
-            let is_seen = self.selection.topics[at].is_none() && reported.contains(&id);
+            let is_seen = self.selection.topics[at].is_none() && reported.contains(&at);
             let is_carried =
                 self.drawn[at] && all.len() > 1 && !senders.is_empty() && !receivers.is_empty();
             if key.is_some() || !is_seen || is_carried {
                 continue;
             }
             *key = Some((ItemKind::Topic, elements.topics[at].name.shared()));
-            self.is_in_words[1][at] = all.len() != 1;
+            self.topics_in_words[at] = all.len() != 1;
             if let Some(owner) = all.first().filter(|_| all.len() == 1) {
-                for (node, words) in nodes.iter().zip(&mut self.is_in_words[0]) {
+                for (node, words) in nodes.iter().zip(self.nodes_in_words.iter_mut()) {
                     *words &= node.as_ref() != Some(owner);
                 }
             }
@@ -61,10 +61,9 @@ impl Viewed {
 
     /// Finds the nodes to list as words: those without a connection and without an event, if most nodes have a connection.
     fn set_nodes_apart(&mut self, mission: &Mission) {
-        let mut is_busy = vec![false; mission.elements.nodes.len()];
+        let mut is_busy = ById::like(&mission.elements.nodes, false);
         for (_, edge) in mission.elements.edges() {
-            let is_seen = self.selection.topics[edge.topic as usize].is_none();
-            is_busy[edge.node as usize] |= is_seen;
+            is_busy[edge.node] |= self.selection.topics[edge.topic].is_none();
         }
         let seen = self
             .selection
@@ -74,16 +73,16 @@ impl Viewed {
         let is_rule = 2 * is_busy.iter().filter(|busy| **busy).count() >= seen.count();
         for event in bundles::changed(mission) {
             if let (Some(node), _) = mission.elements.ends(event.what) {
-                is_busy[node as usize] = true;
+                is_busy[node] = true;
             }
         }
-        self.is_in_words[0] = is_busy.iter().map(|busy| is_rule && !busy).collect();
+        self.nodes_in_words = is_busy.iter().map(|busy| is_rule && !busy).collect();
     }
 
     /// The arrows between the topics with a box of their own and the only box that they are connected to.
     pub(super) fn set_leaves(&mut self, elements: &Elements) {
         for (edges, publishes) in [(&elements.publishes, true), (&elements.subscribes, false)] {
-            for (edge, id) in edges.iter().zip(0_u32..) {
+            for (id, edge) in edges.with_ids() {
                 let Some((node, topic)) = self.ends(edge).filter(|(node, topic)| {
                     let kind = self.items[*topic as usize].kind;
                     kind == ItemKind::Topic && self.is_drawn(*node) && self.is_drawn(*topic)
@@ -104,7 +103,7 @@ impl Viewed {
                         &mut self.subscribe,
                     )
                 };
-                places[id as usize] = EdgePlace::Arrow(place);
+                places[id] = EdgePlace::Arrow(place);
                 self.arrows.push(arrow(elements, ends, vec![element]));
             }
         }

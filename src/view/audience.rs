@@ -42,8 +42,8 @@ impl<'a> Audience<'a> {
     /// these subscribers.
     pub(super) fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
         let topics = self.published.get(&node)?.iter().copied();
-        let name = |topic: TopicId| self.elements.topics.get(topic as usize).map(|t| &t.name);
-        let role = |id: NodeId| self.elements.nodes.get(id as usize).map(|n| &n.role);
+        let name = |topic: TopicId| self.elements.topics.get(topic).map(|t| &t.name);
+        let role = |id: NodeId| self.elements.nodes.get(id).map(|n| &n.role);
         let own = topics.filter(|topic| {
             let is_shown = name(*topic).is_some_and(|name| !is_quiet(name.as_str()));
             let mut publishers = self.publishers.get(topic).into_iter().flatten();

@@ -10,17 +10,18 @@ use super::{AlsoHere, Item, Looks, Namespace, ViewOptions};
 use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
-use crate::graph::{Elements, NodeId, Topic};
+use crate::graph::{ById, Elements, NodeId, Topic, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Event, Kind};
 
 /// The name of each topic in a bundle: that of its group, if it is in one.
-pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
-    let mut names: Vec<Arc<str>> = elements.topics.iter().map(|t| t.name.shared()).collect();
+pub(crate) fn names(elements: &Elements, groups: &Groups) -> ById<TopicId, Arc<str>> {
+    let names = elements.topics.iter().map(|t| t.name.shared());
+    let mut names: ById<TopicId, Arc<str>> = names.collect();
     for (name, ids) in groups {
         let name: Arc<str> = name.as_str().into();
         for id in ids {
-            names[*id as usize] = Arc::clone(&name);
+            names[*id] = Arc::clone(&name);
         }
     }
     names
@@ -28,14 +29,14 @@ pub(crate) fn names(elements: &Elements, groups: &Groups) -> Vec<Arc<str>> {
 
 /// Whether bundles draw each topic: those that half the system is connected to are not drawn, unless one of
 /// their connections changes or there is no other topic.
-pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
+pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> ById<TopicId, bool> {
     let elements = &mission.elements;
     let drawn = plain(elements, options);
-    let mut connected = vec![0_u8; drawn.len()];
+    let mut connected = ById::like(&drawn, 0_u8);
     let both = [(&elements.publishes, 1), (&elements.subscribes, 2)];
     for (edges, end) in both {
         for edge in edges {
-            connected[edge.topic as usize] |= end;
+            connected[edge.topic] |= end;
         }
     }
     if !drawn
@@ -43,28 +44,28 @@ pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
         .zip(&connected)
         .any(|(drawn, ends)| *drawn && *ends == 3)
     {
-        return vec![true; drawn.len()];
+        return ById::like(&drawn, true);
     }
     with_changing(mission, drawn)
 }
 
 /// Whether pages draw each topic: all but infrastructure without a connection that changes.
-pub(super) fn drawn_in_pages(mission: &Mission, options: &ViewOptions) -> Vec<bool> {
+pub(super) fn drawn_in_pages(mission: &Mission, options: &ViewOptions) -> ById<TopicId, bool> {
     with_changing(mission, plain(&mission.elements, options))
 }
 
 /// Whether each topic is no infrastructure.
-fn plain(elements: &Elements, options: &ViewOptions) -> Vec<bool> {
+fn plain(elements: &Elements, options: &ViewOptions) -> ById<TopicId, bool> {
     let plain = |topic: &Topic| !options.hide.quiet || !is_infrastructure(topic.name.as_str());
     elements.topics.iter().map(plain).collect()
 }
 
 /// These topics, and those with a connection that changes.
-fn with_changing(mission: &Mission, mut drawn: Vec<bool>) -> Vec<bool> {
+fn with_changing(mission: &Mission, mut drawn: ById<TopicId, bool>) -> ById<TopicId, bool> {
     let events = mission.log.events.iter();
     for event in events.filter(|event| event.is_headline()) {
         if let (Some(_), Some(topic)) = mission.elements.ends(event.what) {
-            drawn[topic as usize] = true;
+            drawn[topic] = true;
         }
     }
     drawn
@@ -74,15 +75,15 @@ fn with_changing(mission: &Mission, mut drawn: Vec<bool>) -> Vec<bool> {
 /// change; no node if fewer than half of the nodes have a line.
 pub(crate) fn nodes_in_words(
     mission: &Mission,
-    (selection, drawn): (&Selection, &[bool]),
+    (selection, drawn): (&Selection, &ById<TopicId, bool>),
     are_leaves_in_words: bool,
-) -> Vec<bool> {
+) -> ById<NodeId, bool> {
     let elements = &mission.elements;
-    let mut ends = vec![[Vec::new(), Vec::new()]; elements.topics.len()];
+    let mut ends = ById::like(&elements.topics, [Vec::new(), Vec::new()]);
     for (edges, end) in [(&elements.publishes, 0), (&elements.subscribes, 1)] {
         for edge in edges {
-            if selection.nodes[edge.node as usize].is_none() {
-                ends[edge.topic as usize][end].push(edge.node);
+            if selection.nodes[edge.node].is_none() {
+                ends[edge.topic][end].push(edge.node);
             }
         }
     }
@@ -90,13 +91,13 @@ pub(crate) fn nodes_in_words(
     let is_drawn = drawn.iter().zip(&selection.topics);
     let is_drawn = is_drawn.map(|(drawn, reason)| *drawn && reason.is_none());
     // The only partner of each node; itself where there are several.
-    let mut partner: Vec<Option<NodeId>> = vec![None; elements.nodes.len()];
+    let mut partner: ById<NodeId, Option<NodeId>> = ById::like(&elements.nodes, None);
     for (ends, _) in ends.iter().zip(is_drawn).filter(|(_, drawn)| *drawn) {
         for (these, others) in [(&ends[0], &ends[1]), (&ends[1], &ends[0])] {
             for node in these {
                 // Two are enough to know that there are several.
                 for other in others.iter().filter(|other| *other != node).take(2) {
-                    let partner = &mut partner[*node as usize];
+                    let partner = &mut partner[*node];
                     *partner = Some(if partner.is_none_or(|old| old == *other) {
                         *other
                     } else {
@@ -112,17 +113,17 @@ pub(crate) fn nodes_in_words(
         .filter(|reason| reason.is_none())
         .count();
     if 2 * partner.iter().flatten().count() < seen {
-        return vec![false; partner.len()];
+        return ById::like(&partner, false);
     }
-    let is_hub = |node: NodeId| partner[node as usize] == Some(node);
-    let is_in_words = |(node, changes): (NodeId, &bool)| match partner[node as usize] {
+    let is_hub = |node: NodeId| partner[node] == Some(node);
+    let is_in_words = |(node, changes): (NodeId, &bool)| match partner[node] {
         None => true,
         Some(other) if other != node && are_leaves_in_words => {
-            is_hub(other) && !changes && !changes_itself[other as usize]
+            is_hub(other) && !changes && !changes_itself[other]
         }
         Some(_) => false,
     };
-    (0..).zip(&changes).map(is_in_words).collect()
+    changes.with_ids().map(is_in_words).collect()
 }
 
 /// For each node, whether there is an event about it, its connections or a topic of its own, and whether
@@ -130,22 +131,22 @@ pub(crate) fn nodes_in_words(
 /// in most of the picture.
 fn changing_nodes(
     mission: &Mission,
-    drawn: &[bool],
-    ends: &[[Vec<NodeId>; 2]],
-) -> (Vec<bool>, Vec<bool>) {
-    let mut changes = vec![false; mission.elements.nodes.len()];
+    drawn: &ById<TopicId, bool>,
+    ends: &ById<TopicId, [Vec<NodeId>; 2]>,
+) -> (ById<NodeId, bool>, ById<NodeId, bool>) {
+    let mut changes = ById::like(&mission.elements.nodes, false);
     let mut changes_itself = changes.clone();
     for event in changed(mission) {
         let nodes = match mission.elements.ends(event.what) {
             (Some(node), _) => {
-                changes_itself[node as usize] = true;
+                changes_itself[node] = true;
                 vec![node]
             }
-            (None, Some(topic)) if drawn[topic as usize] => ends[topic as usize].concat(),
+            (None, Some(topic)) if drawn[topic] => ends[topic].concat(),
             (None, _) => Vec::new(),
         };
         for node in nodes {
-            changes[node as usize] = true;
+            changes[node] = true;
         }
     }
     (changes, changes_itself)

@@ -314,11 +314,11 @@ impl<'a> CaptionWriter<'a> {
 
     /// The label of its box; its role if it has no box of its own.
     fn node_name(&self, id: NodeId) -> Option<&'a str> {
-        let item = self.viewed.node.get(id as usize).copied().flatten();
+        let item = self.viewed.node.get(id).copied().flatten();
         let item = item.and_then(|at| self.viewed.items.get(at as usize));
         match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
             Some(item) => Some(&item.label),
-            None => self.elements.nodes.get(id as usize).map(|n| &*n.role),
+            None => self.elements.nodes.get(id).map(|n| &*n.role),
         }
     }
 

@@ -5,7 +5,7 @@ use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
-use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
+use crate::graph::{ById, Edge, EdgeId, EdgeState, Element, Elements, Graph, Id, NodeId, TopicId};
 use crate::mission::event_log::{Detail, Event};
 use crate::mission::{EventId, EventLog, Mission, Window};
 
@@ -29,28 +29,30 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     }
 }
 
-/// The new ids: per element, its id if it stays.
+/// Per old id, the new one, if its element stays.
+type NewIds<I> = ById<I, Option<I>>;
+
+/// The elements that stay.
 struct Keep {
-    nodes: Vec<Option<u32>>,
-    topics: Vec<Option<u32>>,
-    publishes: Vec<Option<u32>>,
-    subscribes: Vec<Option<u32>>,
+    nodes: NewIds<NodeId>,
+    topics: NewIds<TopicId>,
+    publishes: NewIds<EdgeId>,
+    subscribes: NewIds<EdgeId>,
     /// Per event of the log, its new index, if it stays.
-    events: Vec<Option<EventId>>,
+    events: NewIds<EventId>,
 }
 
 impl Keep {
     fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed) -> Self {
         let nodes = numbered(viewed.node.iter().map(Option::is_some));
-        let topics = (0..)
-            .zip(&viewed.topic)
-            .map(|(id, item)| match options.mode {
-                Mode::Nodes => viewed.carriers.contains_key(&Element::Topic(id)),
-                Mode::Bundles => {
-                    item.is_some() || viewed.carriers.contains_key(&Element::Topic(id))
-                }
+        let topics = viewed.topic.with_ids().map(|(id, item)| {
+            let is_carried = viewed.carriers.contains_key(&Element::Topic(id));
+            match options.mode {
+                Mode::Nodes => is_carried,
+                Mode::Bundles => item.is_some() || is_carried,
                 _ => item.is_some(),
-            });
+            }
+        });
         let topics = numbered(topics);
         let stays =
             |e: &Edge| new_id(&nodes, e.node).is_some() && new_id(&topics, e.topic).is_some();
@@ -59,7 +61,7 @@ impl Keep {
             subscribes: numbered(elements.subscribes.iter().map(stays)),
             nodes,
             topics,
-            events: Vec::new(),
+            events: ById::default(),
         }
     }
 
@@ -103,11 +105,9 @@ impl Keep {
 
     fn elements(&self, all: &Elements) -> Elements {
         let edge = |edge: &Edge| {
-            let node = new_id(&self.nodes, edge.node)?;
-            let topic = new_id(&self.topics, edge.topic)?;
             Some(Edge {
-                node,
-                topic,
+                node: new_id(&self.nodes, edge.node)?,
+                topic: new_id(&self.topics, edge.topic)?,
                 ..edge.clone()
             })
         };
@@ -142,19 +142,16 @@ impl Keep {
         let mut topics: Vec<_> = topics.cloned().collect();
         nodes.retain_mut(|n| moved(&mut n.id, &self.nodes));
         topics.retain_mut(|t| moved(&mut t.id, &self.topics));
-        let there = |node: Option<u32>, topic: Option<u32>| {
+        let there = |node: Option<NodeId>, topic: Option<TopicId>| {
             node.is_some_and(|id| nodes.binary_search_by_key(&id, |n| n.id).is_ok())
                 && topic.is_some_and(|id| topics.binary_search_by_key(&id, |t| t.id).is_ok())
         };
-        let edges = |states: &[EdgeState], ids: &[Option<u32>], ends: &[(u32, u32)]| {
+        let edges = |states: &[EdgeState], ids: &NewIds<EdgeId>, ends: &ById<EdgeId, _>| {
             let mut states: Vec<EdgeState> = states.to_vec();
             states.retain_mut(|s| {
-                let (node, topic) = ends
-                    .get(s.id as usize)
-                    .copied()
-                    .unwrap_or((u32::MAX, u32::MAX));
-                let ends = (new_id(&self.nodes, node), new_id(&self.topics, topic));
-                there(ends.0, ends.1) && moved(&mut s.id, ids)
+                let (node, topic) = ends[s.id];
+                there(new_id(&self.nodes, node), new_id(&self.topics, topic))
+                    && moved(&mut s.id, ids)
             });
             states
         };
@@ -214,29 +211,25 @@ impl Keep {
 }
 
 /// New ids, counted from 0 in the old order, for the elements that stay.
-fn numbered(stays: impl Iterator<Item = bool>) -> Vec<Option<u32>> {
-    let mut next = 0;
-    let number = |stays: bool| {
-        stays.then(|| {
-            next += 1;
-            next - 1
-        })
-    };
-    stays.map(number).collect()
+fn numbered<I: Id>(stays: impl Iterator<Item = bool>) -> NewIds<I> {
+    let mut next = (0..).map(I::of);
+    stays
+        .map(|stays| stays.then(|| next.next()).flatten())
+        .collect()
 }
 
-fn new_id(ids: &[Option<u32>], id: u32) -> Option<u32> {
-    ids.get(id as usize).copied().flatten()
+fn new_id<I: Id>(ids: &NewIds<I>, id: I) -> Option<I> {
+    ids.get(id).copied().flatten()
 }
 
 /// Gives a state its new id; false if its element does not stay.
-fn moved(id: &mut u32, ids: &[Option<u32>]) -> bool {
+fn moved<I: Id>(id: &mut I, ids: &NewIds<I>) -> bool {
     let new = new_id(ids, *id);
     *id = new.unwrap_or(*id);
     new.is_some()
 }
 
-fn kept<T: Clone>(all: &[T], ids: &[Option<u32>]) -> Vec<T> {
+fn kept<I: Id, T: Clone>(all: &ById<I, T>, ids: &NewIds<I>) -> ById<I, T> {
     let kept = all.iter().zip(ids).filter(|(_, id)| id.is_some());
     kept.map(|(one, _)| one.clone()).collect()
 }

@@ -25,7 +25,7 @@ impl Headline {
         Self {
             event: 0,
             kind: Kind::Started,
-            what: Element::Node(0),
+            what: Element::Node(crate::graph::NodeId(0)),
             time: Stamp(0),
         }
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::names::is_tf;
 use super::options::Grouping;
 use crate::base::name::namespace;
-use crate::graph::{Elements, TopicId};
+use crate::graph::{ById, Elements, TopicId};
 
 /// The groups by name, and the topics in each, sorted. No topic is in two groups.
 pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;
@@ -13,13 +13,10 @@ pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;
 /// Groups the topics that are still `seen`. ROS 1 actions, images and the transform tree follow `rqt_graph`'s
 /// rules; ROS 2 actions and service events, which it does not know, are grouped if at least two of their
 /// topics are present.
-pub(crate) fn groups(elements: &Elements, seen: &[bool], wish: Grouping) -> Groups {
-    let topics = elements.topics.iter().zip(0..);
-    let mut free: BTreeMap<&str, TopicId> = topics
-        .zip(seen)
-        .filter(|(_, seen)| **seen)
-        .map(|((topic, id), _)| (topic.name.as_str(), id))
-        .collect();
+pub(crate) fn groups(elements: &Elements, seen: &ById<TopicId, bool>, wish: Grouping) -> Groups {
+    let topics = elements.topics.with_ids().filter(|(id, _)| seen[*id]);
+    let topics = topics.map(|(id, topic)| (topic.name.as_str(), id));
+    let mut free: BTreeMap<&str, TopicId> = topics.collect();
     let mut groups = Groups::new();
     if wish.actions {
         by_suffix(&mut free, &mut groups, &ACTION);
@@ -125,8 +122,8 @@ mod tests {
         let windows: Vec<String> = topics.iter().map(|t| format!("/n>{t}")).collect();
         let mission = mission(&[&windows.join(" ")]);
         let names = &mission.elements.topics;
-        let groups = groups(&mission.elements, &vec![true; names.len()], wish);
-        let name = |id: &TopicId| names[*id as usize].name.as_str();
+        let groups = groups(&mission.elements, &ById::like(names, true), wish);
+        let name = |id: &TopicId| names[*id].name.as_str();
         groups
             .iter()
             .map(|(group, ids)| {

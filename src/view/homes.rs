@@ -7,10 +7,15 @@ use super::ItemKind;
 use super::collapse::{Collapse, swallows};
 use super::group::Groups;
 use super::select::Selection;
-use crate::graph::{Edge, Elements, Topic};
+use crate::graph::{ById, Edge, Elements, NodeId, Topic, TopicId};
 
 /// The kind and name of a box.
 pub(crate) type ItemKey = (ItemKind, Arc<str>);
+
+/// The box of each node, if it has one.
+pub(crate) type NodeKeys = ById<NodeId, Option<ItemKey>>;
+/// The box of each topic, if it has one.
+pub(crate) type TopicKeys = ById<TopicId, Option<ItemKey>>;
 
 /// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their
 /// name. Changes of topics that several boxes publish are only shown on the arrows, so these topics are in
@@ -18,14 +23,14 @@ pub(crate) type ItemKey = (ItemKind, Arc<str>);
 pub(crate) fn inside(
     elements: &Elements,
     collapse: &Collapse<'_>,
-    nodes: &[Option<ItemKey>],
+    nodes: &NodeKeys,
     selection: &Selection,
-) -> Vec<Option<ItemKey>> {
-    let mut homes: Vec<BTreeSet<Option<&ItemKey>>> = vec![BTreeSet::new(); elements.topics.len()];
+) -> TopicKeys {
+    let mut homes: ById<TopicId, BTreeSet<Option<&ItemKey>>> =
+        ById::like(&elements.topics, BTreeSet::new());
     for edge in &elements.publishes {
-        let node = nodes.get(edge.node as usize).and_then(Option::as_ref);
-        if let (Some(homes), Some(node)) = (homes.get_mut(edge.topic as usize), node) {
-            homes.insert((node.0 == ItemKind::Namespace).then_some(node));
+        if let Some(node) = &nodes[edge.node] {
+            homes[edge.topic].insert((node.0 == ItemKind::Namespace).then_some(node));
         }
     }
     let topics = elements.topics.iter().zip(&homes).zip(&selection.topics);
@@ -44,10 +49,10 @@ pub(crate) fn inside(
 }
 
 /// Puts the topics of each group into its box, whose name is made different from that of every topic.
-pub(crate) fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
+pub(crate) fn set_groups(topics: &mut TopicKeys, groups: &Groups) {
     for ids in groups.values() {
         for id in ids {
-            topics[*id as usize] = None;
+            topics[*id] = None;
         }
     }
     let mut taken: BTreeSet<Arc<str>> = topics
@@ -63,7 +68,7 @@ pub(crate) fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
         let name: Arc<str> = name.into();
         taken.insert(Arc::clone(&name));
         for id in ids {
-            topics[*id as usize] = Some((ItemKind::Group, Arc::clone(&name)));
+            topics[*id] = Some((ItemKind::Group, Arc::clone(&name)));
         }
     }
 }
@@ -71,9 +76,9 @@ pub(crate) fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
 /// Moves topics and groups that belong inside a collapsed namespace into it.
 pub(crate) fn swallow(
     elements: &Elements,
-    (collapse, names): (&Collapse<'_>, &[Arc<str>]),
-    nodes: &[Option<ItemKey>],
-    topics: &mut [Option<ItemKey>],
+    (collapse, names): (&Collapse<'_>, &ById<NodeId, Arc<str>>),
+    nodes: &NodeKeys,
+    topics: &mut TopicKeys,
 ) {
     type Spaces<'a> = Vec<Option<&'a str>>;
     let mut ends: BTreeMap<ItemKey, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
@@ -81,14 +86,13 @@ pub(crate) fn swallow(
         ends.entry(key.clone()).or_default();
     }
     let space = |edge: &Edge| {
-        let node = edge.node as usize;
-        nodes.get(node)?.as_ref()?;
-        Some(names.get(node).and_then(|name| collapse.of(name)))
+        nodes[edge.node].as_ref()?;
+        Some(collapse.of(&names[edge.node]))
     };
     let publishes = elements.publishes.iter().map(|e| (e, true));
     let subscribes = elements.subscribes.iter().map(|e| (e, false));
     for (edge, publishes) in publishes.chain(subscribes) {
-        let key = topics.get(edge.topic as usize).and_then(Option::as_ref);
+        let key = topics.get(edge.topic).and_then(Option::as_ref);
         let lists = key.and_then(|key| ends.get_mut(key));
         if let (Some((p, s)), Some(space)) = (lists, space(edge)) {
             if publishes {

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use super::bundles;
 use super::collapse::Collapse;
 use super::group::{Groups, groups};
-use super::homes::{ItemKey, inside, set_groups, swallow};
+use super::homes::{ItemKey, NodeKeys, TopicKeys, inside, set_groups, swallow};
 use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, LineWidth, Mode, ViewOptions};
-use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
+use crate::graph::{ById, Edge, EdgeId, Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
 
 /// The part of the picture that shows an edge of the graph.
@@ -37,30 +37,31 @@ pub(crate) struct Viewed {
     pub(crate) items: Vec<Item>,
     pub(crate) arrows: Vec<Arrow>,
     /// Per node of the mission, its item.
-    pub(crate) node: Vec<Option<u32>>,
+    pub(crate) node: ById<NodeId, Option<u32>>,
     /// Per topic of the mission, its item.
-    pub(crate) topic: Vec<Option<u32>>,
+    pub(crate) topic: ById<TopicId, Option<u32>>,
     /// The part that shows each publication. In mode *nodes* a publication may be part of several arrows,
     /// which only `pairs` lists.
-    pub(crate) publish: Vec<EdgePlace>,
+    pub(crate) publish: ById<EdgeId, EdgePlace>,
     /// The part that shows each subscription.
-    pub(crate) subscribe: Vec<EdgePlace>,
+    pub(crate) subscribe: ById<EdgeId, EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
     /// Per topic of the mission, its name in a bundle: that of its group, if it is in one.
-    pub(crate) bundled: Vec<Arc<str>>,
+    pub(crate) bundled: ById<TopicId, Arc<str>>,
     /// Node and topic of each publication.
-    pub(crate) published: Vec<(NodeId, TopicId)>,
+    pub(crate) published: ById<EdgeId, (NodeId, TopicId)>,
     /// Node and topic of each subscription.
-    pub(crate) subscribed: Vec<(NodeId, TopicId)>,
+    pub(crate) subscribed: ById<EdgeId, (NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
     /// Per topic, whether bundles draw it.
-    pub(super) drawn: Vec<bool>,
+    pub(super) drawn: ById<TopicId, bool>,
     /// The number of items at the end of the list that are listed as words, because no line leads to them.
     pub(crate) in_words: usize,
-    /// Whether each node is in one of these, and whether each topic is.
-    pub(super) is_in_words: [Vec<bool>; 2],
+    /// Whether each node is in one of these, and each topic.
+    pub(super) nodes_in_words: ById<NodeId, bool>,
+    pub(super) topics_in_words: ById<TopicId, bool>,
     /// The number of arrows from node to node that were left out because they were too many.
     pub(crate) dropped: usize,
 }
@@ -87,13 +88,11 @@ impl Viewed {
             Mode::Nodes => super::Grouping::NONE,
             _ => options.group,
         };
-        let seen: Vec<bool> = selection.topics.iter().map(Option::is_none).collect();
+        let seen: ById<TopicId, bool> = selection.topics.iter().map(Option::is_none).collect();
         let groups = groups(elements, &seen, grouping);
-        let mut grouped = vec![false; elements.topics.len()];
+        let mut grouped = ById::like(&elements.topics, false);
         for id in groups.values().flatten() {
-            if let Some(grouped) = grouped.get_mut(*id as usize) {
-                *grouped = true;
-            }
+            grouped[*id] = true;
         }
         finish(&mut selection, elements, options, &grouped);
         let pair = |edge: &Edge| (edge.node, edge.topic);
@@ -104,14 +103,14 @@ impl Viewed {
             subscribed: elements.subscribes.iter().map(pair).collect(),
             ..Self::default()
         };
-        viewed.drawn = vec![true; elements.topics.len()];
-        viewed.is_in_words[0] = vec![false; elements.nodes.len()];
+        viewed.drawn = ById::like(&elements.topics, true);
+        viewed.nodes_in_words = ById::like(&elements.nodes, false);
         if options.mode == Mode::Bundles {
             viewed.drawn = bundles::drawn(mission, options);
         }
         // Outputs that are files of data or can be expanded have a box for each.
         if options.mode == Mode::Bundles && options.is_picture {
-            viewed.is_in_words[0] = bundles::nodes_in_words(
+            viewed.nodes_in_words = bundles::nodes_in_words(
                 mission,
                 (&viewed.selection, &viewed.drawn),
                 options.are_leaves_in_words,
@@ -135,7 +134,7 @@ impl Viewed {
                     .iter()
                     .filter_map(|what| elements.ends(*what).1);
                 let topics: BTreeSet<TopicId> = topics.collect();
-                let sizes = topics.iter().map(|topic| sizes[*topic as usize]);
+                let sizes = topics.iter().map(|topic| sizes[*topic]);
                 let (count, bytes) = sizes.fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
                 arrow.kilobytes = Some(bytes as f64 / 1000.0 / count.max(1) as f64);
             }
@@ -147,45 +146,41 @@ impl Viewed {
     fn set_items(&mut self, mission: &Mission, options: &ViewOptions, groups: &Groups) {
         let elements = &mission.elements;
         let mut collapse = Collapse::new(options);
-        let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
-        let mut names: Vec<Arc<str>> = if options.exact_names {
+        let mut names: ById<NodeId, Arc<str>> = if options.exact_names {
             elements.nodes.iter().map(|n| n.name.shared()).collect()
         } else {
             roles::boxes(elements)
         };
-        for name in &mut names {
+        for name in names.iter_mut() {
             if let Some(stand_in) = self.fleets.stand_in(name) {
                 *name = stand_in;
             }
         }
         if !collapse.is_empty() {
-            let shown = |(at, name)| seen(&self.selection.nodes, at).then_some(name);
-            let folded = names
-                .iter()
-                .map(|name| &**name)
-                .enumerate()
-                .filter_map(shown);
+            let folded = names.iter().zip(&self.selection.nodes);
+            let folded = folded.filter_map(|(name, reason)| reason.is_none().then_some(&**name));
             let topics = elements.topics.iter().map(|topic| topic.name.as_str());
             let topics = topics.filter(|_| !options.mode.is_direct());
             collapse.open_single(&folded.collect(), &topics.collect());
         }
-        let nodes: Vec<Option<ItemKey>> = (elements.nodes.iter().zip(&names).enumerate())
-            .map(|(at, (_, name))| {
+        let nodes: NodeKeys = (names.iter().zip(&self.selection.nodes))
+            .map(|(name, reason)| {
                 let plain = || (ItemKind::Node, Arc::clone(name));
-                seen(&self.selection.nodes, at).then(|| {
+                reason.is_none().then(|| {
                     let space = collapse.of(name);
                     space.map_or_else(plain, |s| (ItemKind::Namespace, s.into()))
                 })
             })
             .collect();
-        let mut topics: Vec<Option<ItemKey>> = vec![None; elements.topics.len()];
+        let mut topics: TopicKeys = ById::like(&elements.topics, None);
         if options.mode == Mode::Bundles {
             topics = inside(elements, &collapse, &nodes, &self.selection);
         } else if options.mode != Mode::Nodes {
-            for (at, topic) in elements.topics.iter().enumerate() {
-                if seen(&self.selection.topics, at) {
-                    topics[at] = Some((ItemKind::Topic, topic.name.shared()));
-                }
+            let all = elements.topics.iter().zip(&self.selection.topics);
+            for ((topic, reason), key) in all.zip(topics.iter_mut()) {
+                *key = reason
+                    .is_none()
+                    .then(|| (ItemKind::Topic, topic.name.shared()));
             }
             set_groups(&mut topics, groups);
             for key in topics.iter_mut().flatten() {
@@ -197,22 +192,22 @@ impl Viewed {
                 swallow(elements, (&collapse, &names), &nodes, &mut topics);
             }
         }
-        self.is_in_words[1] = vec![false; topics.len()];
+        self.topics_in_words = ById::like(&topics, false);
         if options.is_picture {
             self.set_apart(mission, options, (&nodes, &mut topics));
         }
         let mut members: BTreeMap<&ItemKey, Vec<Element>> = BTreeMap::new();
-        let own = nodes.iter().zip((0..).map(Element::Node));
-        for (key, what) in own.chain(topics.iter().zip((0..).map(Element::Topic))) {
+        let own = nodes.with_ids().map(|(id, key)| (key, Element::Node(id)));
+        let others = topics.with_ids().map(|(id, key)| (key, Element::Topic(id)));
+        for (key, what) in own.chain(others) {
             if let Some(key) = key {
                 members.entry(key).or_default().push(what);
             }
         }
-        let [node_words, topic_words] = &self.is_in_words;
         let is_in_words = |key: &ItemKey, members: &[Element]| {
             let is = |what: &Element| match what {
-                Element::Node(id) => node_words[*id as usize],
-                Element::Topic(id) => topic_words[*id as usize],
+                Element::Node(id) => self.nodes_in_words[*id],
+                Element::Topic(id) => self.topics_in_words[*id],
                 Element::Publish(_) | Element::Subscribe(_) => false,
             };
             key.0 != ItemKind::Namespace && members.iter().all(is)
@@ -247,7 +242,7 @@ impl Viewed {
 
     fn set_arrows(&mut self, elements: &Elements) {
         let mut arrows: BTreeMap<ArrowEnds, Vec<Element>> = BTreeMap::new();
-        let publish: Vec<Option<ArrowEnds>> = elements
+        let publish: ById<EdgeId, Option<ArrowEnds>> = elements
             .publishes
             .iter()
             .map(|edge| {
@@ -255,7 +250,7 @@ impl Viewed {
                 Some((node, topic, ArrowKind::Publish))
             })
             .collect();
-        let subscribe: Vec<Option<ArrowEnds>> = elements
+        let subscribe: ById<EdgeId, Option<ArrowEnds>> = elements
             .subscribes
             .iter()
             .map(|edge| {
@@ -263,9 +258,13 @@ impl Viewed {
                 Some((topic, node, ArrowKind::Subscribe))
             })
             .collect();
-        let all = publish.iter().zip((0..).map(Element::Publish));
-        let all = all.chain(subscribe.iter().zip((0..).map(Element::Subscribe)));
-        for (ends, element) in all {
+        let all = publish
+            .with_ids()
+            .map(|(id, ends)| (ends, Element::Publish(id)));
+        let others = subscribe
+            .with_ids()
+            .map(|(id, ends)| (ends, Element::Subscribe(id)));
+        for (ends, element) in all.chain(others) {
             if let Some(ends) = ends.as_ref().filter(|(from, to, _)| from != to) {
                 arrows.entry(ends.clone()).or_default().push(element);
             }
@@ -286,47 +285,42 @@ impl Viewed {
 
     /// The items of an edge's node and topic.
     pub(super) fn ends(&self, edge: &Edge) -> Option<(u32, u32)> {
-        Some((
-            self.item_of_node(edge.node)?,
-            *self.topic.get(edge.topic as usize)?.as_ref()?,
-        ))
+        Some((self.item_of_node(edge.node)?, self.topic[edge.topic]?))
     }
 
     fn item_of_node(&self, node: NodeId) -> Option<u32> {
-        self.node.get(node as usize).copied().flatten()
+        self.node.get(node).copied().flatten()
     }
 
     /// Arrows from publishers to subscribers: one per topic between two of them, or one for all topics in a bundle.
     fn set_direct(&mut self, elements: &Elements, options: &ViewOptions) {
         let is_bundled = options.mode == Mode::Bundles;
-        let mut subscribers: Vec<Vec<(EdgeId, u32)>> = vec![Vec::new(); elements.topics.len()];
-        for (edge, id) in elements.subscribes.iter().zip(0..) {
-            let item = self.item_of_node(edge.node);
-            if let (Some(list), Some(item)) = (subscribers.get_mut(edge.topic as usize), item) {
-                list.push((id, item));
+        let mut subscribers = ById::like(&elements.topics, Vec::new());
+        for (id, edge) in elements.subscribes.with_ids() {
+            if let Some(item) = self.item_of_node(edge.node) {
+                subscribers[edge.topic].push((id, item));
             }
         }
         let mut arrows: BTreeMap<ArrowEnds, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
         let mut pairs = 0;
-        self.publish = vec![EdgePlace::Hidden; elements.publishes.len()];
-        self.subscribe = vec![EdgePlace::Hidden; elements.subscribes.len()];
-        for (edge, publish) in elements.publishes.iter().zip(0..) {
-            let at = edge.topic as usize;
-            let (Some(from), Some(topic)) = (self.item_of_node(edge.node), elements.topics.get(at))
-            else {
+        self.publish = ById::like(&elements.publishes, EdgePlace::Hidden);
+        self.subscribe = ById::like(&elements.subscribes, EdgePlace::Hidden);
+        for (publish, edge) in elements.publishes.with_ids() {
+            let Some(from) = self.item_of_node(edge.node) else {
                 continue;
             };
+            let topic = &elements.topics[edge.topic];
             let name = topic.name.as_str();
-            if self.selection.topics.get(at) != Some(&None)
-                || !self.drawn[at]
+            if self.selection.topics[edge.topic].is_some()
+                || !self.drawn[edge.topic]
                 || options.hide.debug && is_debug_label(name)
             {
                 continue;
             }
-            for (subscribe, to) in subscribers.get(at).into_iter().flatten() {
+            for (subscribe, to) in &subscribers[edge.topic] {
                 if from == *to && self.is_namespace(from) {
-                    self.publish[publish as usize] = EdgePlace::Inside(from);
-                    self.subscribe[*subscribe as usize] = EdgePlace::Inside(from);
+                    self.publish[publish] = EdgePlace::Inside(from);
+                    self.subscribe[*subscribe] = EdgePlace::Inside(from);
                     continue;
                 }
                 if !self.is_drawn(from) || !self.is_drawn(*to) {
@@ -362,7 +356,7 @@ impl Viewed {
             if is_bundled {
                 let topics = pairs
                     .iter()
-                    .map(|(_, s)| &self.bundled[self.subscribed[*s as usize].1 as usize]);
+                    .map(|(_, s)| &self.bundled[self.subscribed[*s].1]);
                 let topics: BTreeSet<&Arc<str>> = topics.collect();
                 arrow.topics = topics.into_iter().cloned().collect();
             }
@@ -377,7 +371,7 @@ impl Viewed {
             let of = pairs
                 .iter()
                 .filter(|(p, _)| self.item_of_sender(*p) == Some(from));
-            let topics = of.map(|(p, _)| &self.bundled[self.published[*p as usize].1 as usize]);
+            let topics = of.map(|(p, _)| &self.bundled[self.published[*p].1]);
             topics.collect::<BTreeSet<_>>().len()
         };
         if topics(ends.1) > topics(ends.0) {
@@ -392,7 +386,7 @@ impl Viewed {
 
     /// The item of the node that publishes.
     fn item_of_sender(&self, publish: EdgeId) -> Option<u32> {
-        self.item_of_node(self.published.get(publish as usize)?.0)
+        self.item_of_node(self.published.get(publish)?.0)
     }
 
     /// The topic of a bundle that a pair of edges is part of, and whether it runs against the arrow.
@@ -401,8 +395,8 @@ impl Viewed {
         arrow: &Arrow,
         (publish, subscribe): (EdgeId, EdgeId),
     ) -> Option<(u32, usize)> {
-        let topic = self.subscribed.get(subscribe as usize)?.1;
-        let name = self.bundled.get(topic as usize)?;
+        let topic = self.subscribed.get(subscribe)?.1;
+        let name = self.bundled.get(topic)?;
         let at = arrow.topics.binary_search(name).ok()?;
         let is_back = self.item_of_sender(publish) != Some(arrow.from);
         Some((u32::try_from(at).ok()?, usize::from(is_back)))
@@ -413,8 +407,8 @@ impl Viewed {
         match what {
             Element::Node(id) => (Some(id), None),
             Element::Topic(id) => (None, Some(id)),
-            Element::Publish(id) => self.published.get(id as usize).copied().unzip(),
-            Element::Subscribe(id) => self.subscribed.get(id as usize).copied().unzip(),
+            Element::Publish(id) => self.published.get(id).copied().unzip(),
+            Element::Subscribe(id) => self.subscribed.get(id).copied().unzip(),
         }
     }
 
@@ -429,7 +423,7 @@ impl Viewed {
             for member in &arrow.members {
                 self.carriers.entry(*member).or_default().push(id);
                 let edge = match member {
-                    Element::Publish(publish) => elements.publishes.get(*publish as usize),
+                    Element::Publish(publish) => elements.publishes.get(*publish),
                     _ => None,
                 };
                 if let Some(edge) = edge {
@@ -443,10 +437,9 @@ impl Viewed {
     /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not reported
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
-        let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
         let (node, topic) = self.both_of(what);
-        let is_node = node.is_none_or(|id| is(&self.selection.nodes, id));
-        let is_topic = topic.is_none_or(|id| is(&self.selection.topics, id));
+        let is_node = node.is_none_or(|id| self.selection.nodes.get(id) == Some(&None));
+        let is_topic = topic.is_none_or(|id| self.selection.topics.get(id) == Some(&None));
         (node.is_some() || topic.is_some()) && is_node && is_topic
     }
 
@@ -478,11 +471,11 @@ pub(super) fn arrow(
 }
 
 /// The messages and the payload bytes of each topic in all windows in which its bytes are known.
-fn sizes(mission: &Mission) -> Vec<(u64, u64)> {
-    let mut sizes = vec![(0_u64, 0_u64); mission.elements.topics.len()];
+fn sizes(mission: &Mission) -> ById<TopicId, (u64, u64)> {
+    let mut sizes = ById::like(&mission.elements.topics, (0_u64, 0_u64));
     for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
         if let Some(bytes) = state.bytes {
-            let size = &mut sizes[state.id as usize];
+            let size = &mut sizes[state.id];
             *size = (
                 size.0.saturating_add(state.count),
                 size.1.saturating_add(bytes),

@@ -5,7 +5,7 @@
 //! vanishes or changes its look without an event.
 
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Element, Elements, PerElement};
+use crate::graph::{ById, Element, Elements, PerElement, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::Kind;
 
@@ -86,16 +86,16 @@ impl<'a> ItemTurns<'a> {
                 .of(what)
                 .is_some_and(|pauses| pauses.iter().any(covers))
         };
-        let mut sent: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
-        for (what, edge) in (0..).map(Element::Publish).zip(&self.elements.publishes) {
-            if alive.is(what)
-                && let Some(all) = sent.get_mut(edge.topic as usize)
-            {
+        let mut sent: ById<TopicId, Option<bool>> = ById::like(&self.elements.topics, None);
+        for (id, edge) in self.elements.publishes.with_ids() {
+            let what = Element::Publish(id);
+            if alive.is(what) {
                 let is_paused = own(what) || own(Element::Node(edge.node));
+                let all = &mut sent[edge.topic];
                 *all = Some(all.unwrap_or(true) && is_paused);
             }
         }
-        let topic = |id: u32| own(Element::Topic(id)) || sent.get(id as usize) == Some(&Some(true));
+        let topic = |id: TopicId| own(Element::Topic(id)) || sent[id] == Some(true);
         PerElement::new(self.elements, |what| {
             match (what, self.elements.ends(what)) {
                 (Element::Topic(_) | Element::Subscribe(_), (_, Some(id))) => topic(id),
@@ -122,15 +122,14 @@ impl<'a> ItemTurns<'a> {
                 _ => is(what),
             }
         });
-        let mut carried: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
+        let mut carried: ById<TopicId, Option<bool>> = ById::like(&self.elements.topics, None);
         for (what, edge) in self.elements.edges() {
-            if let Some(carried) = carried.get_mut(edge.topic as usize) {
-                *carried = Some(carried.unwrap_or(false) || alive.is(what));
-            }
+            let carried = &mut carried[edge.topic];
+            *carried = Some(carried.unwrap_or(false) || alive.is(what));
         }
-        for (id, carried) in (0..).zip(carried) {
+        for (id, carried) in carried.with_ids() {
             let topic = Element::Topic(id);
-            let first = self.elements.topics.get(id as usize).and_then(|t| t.first);
+            let first = self.elements.topics[id].first;
             let lives = carried.unwrap_or(first.is_none_or(|first| first < end));
             if let (None, Some(is)) = (own(topic), alive.of_mut(topic)) {
                 *is = lives;

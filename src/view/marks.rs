@@ -6,7 +6,7 @@ use super::items::{EdgePlace, Viewed};
 use super::lasting::Part;
 use super::{Headline, ItemKind, Lasting, Mark};
 use crate::base::time::{Span, Stamp};
-use crate::graph::Element;
+use crate::graph::{Element, Id};
 use crate::mission::EventLog;
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
@@ -84,14 +84,14 @@ impl WindowMarks {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
                 for node in from.iter().chain(to) {
                     if let Ok(edge) = viewed.published.binary_search(&(*node, topic)) {
-                        let edge = u32::try_from(edge).unwrap_or(u32::MAX);
-                        self.add_carriers(viewed, Element::Publish(edge), &sign);
+                        let edge = Element::Publish(Id::of(edge));
+                        self.add_carriers(viewed, edge, &sign);
                     }
                 }
             }
             (Detail::Rates { .. }, Element::Publish(edge)) => {
                 self.add_carriers(viewed, event.what, &sign);
-                let topic = viewed.published.get(edge as usize);
+                let topic = viewed.published.get(edge);
                 let topic = topic.map(|(_, topic)| Element::Topic(*topic));
                 if let Some(topic) = topic.filter(|t| viewed.has_single_sender(*t)) {
                     self.add(viewed, topic, &sign);
@@ -107,12 +107,12 @@ impl WindowMarks {
     }
 
     fn add(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
-        let item = |items: &[Option<u32>], id: u32| items.get(id as usize).copied().flatten();
+        let item = |item: Option<&Option<u32>>| item.copied().flatten().map(EdgePlace::Item);
         let place = match what {
-            Element::Node(id) => item(&viewed.node, id).map(EdgePlace::Item),
-            Element::Topic(id) => item(&viewed.topic, id).map(EdgePlace::Item),
-            Element::Publish(id) => viewed.publish.get(id as usize).copied(),
-            Element::Subscribe(id) => viewed.subscribe.get(id as usize).copied(),
+            Element::Node(id) => item(viewed.node.get(id)),
+            Element::Topic(id) => item(viewed.topic.get(id)),
+            Element::Publish(id) => viewed.publish.get(id).copied(),
+            Element::Subscribe(id) => viewed.subscribe.get(id).copied(),
         };
         if !viewed.pairs.is_empty() && matches!(what, Element::Publish(_) | Element::Subscribe(_)) {
             self.add_carriers(viewed, what, sign);

@@ -188,11 +188,11 @@ impl ViewOptions {
 }
 
 fn names(elements: &Elements) -> impl Iterator<Item = (&str, Element)> {
-    let nodes = elements.nodes.iter().zip(0..);
-    let topics = elements.topics.iter().zip(0..);
+    let nodes = elements.nodes.with_ids();
+    let topics = elements.topics.with_ids();
     nodes
-        .map(|(n, id)| (n.name.as_str(), Element::Node(id)))
-        .chain(topics.map(|(t, id)| (t.name.as_str(), Element::Topic(id))))
+        .map(|(id, n)| (n.name.as_str(), Element::Node(id)))
+        .chain(topics.map(|(id, t)| (t.name.as_str(), Element::Topic(id))))
 }
 
 /// The outermost namespace around a name that ends in a number, or else the name itself if it does.

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use super::{Item, ItemKind};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
-use crate::graph::{Elements, Node};
+use crate::graph::{ById, Elements, Node, NodeId};
 
 /// Per node of the mission, the name of its box: its role, if all nodes of that role existed one after the
 /// other.
-pub(crate) fn boxes(elements: &Elements) -> Vec<Arc<str>> {
+pub(crate) fn boxes(elements: &Elements) -> ById<NodeId, Arc<str>> {
     let mut by_role: BTreeMap<&str, Vec<&Node>> = BTreeMap::new();
     for node in elements.nodes.iter().filter(|n| is_anonymous(n)) {
         by_role.entry(&node.role).or_default().push(node);
@@ -67,7 +67,7 @@ pub(crate) fn label_unknown(items: &mut [Item], elements: &Elements) {
 
 fn single_node<'a>(item: &Item, elements: &'a Elements) -> Option<&'a Node> {
     match (item.kind, &item.members[..]) {
-        (ItemKind::Node, [crate::graph::Element::Node(id)]) => elements.nodes.get(*id as usize),
+        (ItemKind::Node, [crate::graph::Element::Node(id)]) => elements.nodes.get(*id),
         _ => None,
     }
 }
@@ -120,9 +120,9 @@ mod tests {
     #[test]
     fn publishers_without_a_name_are_question_marks() {
         let mut mission = mission(&["/boss /scan"]);
-        mission.elements.nodes[1].name = "/scan ? ×3".into();
-        mission.elements.nodes[1].role = "/scan ? ×3".into();
-        mission.elements.nodes[1].evidence = Evidence::of("unknown");
+        mission.elements.nodes[NodeId(1)].name = "/scan ? ×3".into();
+        mission.elements.nodes[NodeId(1)].role = "/scan ? ×3".into();
+        mission.elements.nodes[NodeId(1)].evidence = Evidence::of("unknown");
         let (view, _) = view(&mission, &ViewOptions::default());
         let labels: Vec<_> = view.items.iter().map(|i| &*i.label).collect();
         assert_eq!(labels, ["/boss", "? ×3"]);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::ViewOptions;
-use crate::graph::{Elements, Topic};
+use crate::graph::{ById, Elements, NodeId, Topic, TopicId};
 
 /// The reason for leaving a node or topic out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,8 +26,8 @@ pub(crate) enum Reason {
 /// Per node and topic of the mission, the reason for leaving it out; `None` for a visible one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Selection {
-    pub(crate) nodes: Vec<Option<Reason>>,
-    pub(crate) topics: Vec<Option<Reason>>,
+    pub(crate) nodes: ById<NodeId, Option<Reason>>,
+    pub(crate) topics: ById<TopicId, Option<Reason>>,
 }
 
 /// The number of connections of a topic.
@@ -45,12 +45,12 @@ struct TopicDegrees {
 /// remaining nodes.
 pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let hide_recorder = options.hide.quiet && !options.show_recorder;
-    let recorders: Vec<bool> = elements
+    let recorders: ById<NodeId, bool> = elements
         .nodes
         .iter()
         .map(|n| hide_recorder && n.records())
         .collect();
-    let nodes: Vec<Option<Reason>> = elements
+    let nodes: ById<NodeId, Option<Reason>> = elements
         .nodes
         .iter()
         .map(|n| (!options.ns_filter.passes(n.name.as_str())).then_some(Reason::NsFilter))
@@ -74,22 +74,23 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     selection
 }
 
-fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Vec<TopicDegrees> {
-    let mut all = vec![TopicDegrees::default(); elements.topics.len()];
+fn ends(
+    elements: &Elements,
+    nodes: &ById<NodeId, Option<Reason>>,
+    recorders: &ById<NodeId, bool>,
+) -> ById<TopicId, TopicDegrees> {
+    let mut all = ById::like(&elements.topics, TopicDegrees::default());
     let publishes = elements.publishes.iter().map(|e| (e, true));
     let subscribes = elements.subscribes.iter().map(|e| (e, false));
     for (edge, publishes) in publishes.chain(subscribes) {
-        let node = edge.node as usize;
-        let Some(ends) = all.get_mut(edge.topic as usize) else {
-            continue;
-        };
-        if recorders.get(node) != Some(&false) {
+        let ends = &mut all[edge.topic];
+        if recorders[edge.node] {
             ends.is_recorded = true;
             continue;
         }
         ends.publishers += usize::from(publishes);
         ends.subscribers += usize::from(!publishes);
-        ends.kept += usize::from(nodes.get(node) == Some(&None));
+        ends.kept += usize::from(nodes[edge.node].is_none());
     }
     all
 }
@@ -132,16 +133,15 @@ pub(crate) fn finish(
     selection: &mut Selection,
     elements: &Elements,
     options: &ViewOptions,
-    grouped: &[bool],
+    grouped: &ById<TopicId, bool>,
 ) {
-    let nobody = vec![false; elements.nodes.len()];
+    let nobody = ById::like(&elements.nodes, false);
     let ends = ends(elements, &selection.nodes_by_filter(), &nobody);
-    for (at, reason) in selection.topics.iter_mut().enumerate() {
-        let Some(topic) = elements.topics.get(at).filter(|_| reason.is_none()) else {
+    for (reason, (id, topic)) in selection.topics.iter_mut().zip(elements.topics.with_ids()) {
+        let (ends, grouped) = (ends[id], grouped[id]);
+        if reason.is_some() {
             continue;
-        };
-        let ends = ends.get(at).copied().unwrap_or_default();
-        let grouped = grouped.get(at).copied().unwrap_or_default();
+        }
         if !grouped && ends.kept == 0 && ends.publishers + ends.subscribers > 0 {
             *reason = Some(Reason::Orphan);
         } else if !grouped
@@ -152,7 +152,7 @@ pub(crate) fn finish(
             *reason = Some(Reason::Debug);
         }
     }
-    for (node, reason) in elements.nodes.iter().zip(&mut selection.nodes) {
+    for (node, reason) in elements.nodes.iter().zip(selection.nodes.iter_mut()) {
         let name = node.name.as_str();
         if options.hide.debug && is_debug(name) {
             reason.get_or_insert(Reason::Debug);
@@ -165,7 +165,7 @@ pub(crate) fn finish(
 impl Selection {
     /// The nodes that the filter of namespaces alone accepts: nodes hidden for another reason still keep
     /// their topics visible.
-    fn nodes_by_filter(&self) -> Vec<Option<Reason>> {
+    fn nodes_by_filter(&self) -> ById<NodeId, Option<Reason>> {
         let by_filter = |reason: &Option<Reason>| reason.filter(|r| *r == Reason::NsFilter);
         self.nodes.iter().map(by_filter).collect()
     }

@@ -7,7 +7,7 @@ use super::lives::Alive;
 use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions, sum};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
-use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::{EventId, Mission};
 
@@ -79,7 +79,7 @@ impl LivingItems {
             .iter()
             .map(|item| item.members.iter().any(lives));
         let items: Vec<bool> = items.collect();
-        let pair = |(p, s): &(u32, u32)| {
+        let pair = |(p, s): &(EdgeId, EdgeId)| {
             alive.is(Element::Publish(*p)) && alive.is(Element::Subscribe(*s))
         };
         let arrow = |(at, arrow): (usize, &super::Arrow)| {
@@ -132,9 +132,9 @@ pub(crate) struct Now<'a> {
     /// The row of the graph for each element that is in it, by element.
     rows: PerElement<Option<Row>>,
     /// The only publication of each topic; `None` if there are several.
-    sole: Vec<Option<EdgeId>>,
+    sole: ById<TopicId, Option<EdgeId>>,
     /// The publications of each topic.
-    senders: Vec<Vec<EdgeId>>,
+    senders: ById<TopicId, Vec<EdgeId>>,
     /// The subscriptions that receive nothing, each from a time on.
     starved: Vec<(Element, Span)>,
 }
@@ -142,9 +142,9 @@ pub(crate) struct Now<'a> {
 impl<'a> Now<'a> {
     /// The state before the first window, in which nothing is known.
     pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
-        let mut senders = vec![Vec::new(); mission.elements.topics.len()];
-        for (id, (_, topic)) in (0..).zip(&viewed.published) {
-            senders[*topic as usize].push(id);
+        let mut senders = ById::like(&mission.elements.topics, Vec::new());
+        for (id, (_, topic)) in viewed.published.with_ids() {
+            senders[*topic].push(id);
         }
         Self {
             mission,
@@ -213,8 +213,8 @@ impl<'a> Now<'a> {
         let Element::Publish(id) = what else {
             return None;
         };
-        let (_, topic) = self.viewed.published.get(id as usize)?;
-        let sole = self.sole.get(*topic as usize)?;
+        let (_, topic) = self.viewed.published.get(id)?;
+        let sole = self.sole.get(*topic)?;
         sole.filter(|sole| *sole == id)?;
         self.rows.of(Element::Topic(*topic))?.as_ref()
     }
@@ -222,7 +222,7 @@ impl<'a> Now<'a> {
     /// The topic of an element, if its first message comes after the window. A latched one needs no message.
     fn waits_for(&self, what: Element) -> Option<TopicId> {
         let (_, topic) = self.mission.elements.ends(what);
-        let first = self.mission.elements.topics.get(topic? as usize)?.first;
+        let first = self.mission.elements.topics.get(topic?)?.first;
         let row = self
             .rows
             .of(Element::Topic(topic?))
@@ -233,7 +233,7 @@ impl<'a> Now<'a> {
 
     /// The state of a topic before its first message: only subscribed to, if no publisher is known.
     fn state_of_waiting(&self, topic: TopicId) -> State {
-        let mut senders = self.senders.get(topic as usize).into_iter().flatten();
+        let mut senders = self.senders.get(topic).into_iter().flatten();
         if senders.any(|id| self.lives.0.is(Element::Publish(*id))) {
             State::Silent
         } else {
@@ -241,7 +241,7 @@ impl<'a> Now<'a> {
         }
     }
 
-    fn node(&self, id: u32) -> Option<One> {
+    fn node(&self, id: NodeId) -> Option<One> {
         // The count of a node is that of its topics' messages.
         let one = self.one(Element::Node(id))?;
         Some(One { count: None, ..one })
@@ -322,7 +322,7 @@ impl<'a> Now<'a> {
             let one = match member {
                 Element::Publish(edge) => self.one(Element::Publish(*edge)).filter(shows),
                 Element::Subscribe(edge) => {
-                    let ends = self.viewed.subscribed.get(*edge as usize);
+                    let ends = self.viewed.subscribed.get(*edge);
                     let topic = ends.and_then(|(_, topic)| self.one(Element::Topic(*topic)));
                     self.one(Element::Subscribe(*edge))
                         .filter(|_| topic.as_ref().is_some_and(shows))
@@ -361,7 +361,7 @@ impl<'a> Now<'a> {
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
-            let topic = self.viewed.subscribed.get(*subscribe as usize).map(|s| s.1);
+            let topic = self.viewed.subscribed.get(*subscribe).map(|s| s.1);
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
@@ -433,13 +433,13 @@ impl<'a> Now<'a> {
             _ => &[],
         };
         match what {
-            Element::Node(id) => (self.viewed.node.get(id as usize).copied().flatten(), &[]),
+            Element::Node(id) => (self.viewed.node.get(id).copied().flatten(), &[]),
             Element::Topic(id) => {
-                let item = self.viewed.topic.get(id as usize).copied().flatten();
+                let item = self.viewed.topic.get(id).copied().flatten();
                 (item, carriers())
             }
-            Element::Publish(id) => (None, edge(self.viewed.publish.get(id as usize))),
-            Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id as usize))),
+            Element::Publish(id) => (None, edge(self.viewed.publish.get(id))),
+            Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id))),
         }
     }
 }

@@ -6,7 +6,8 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
-    Edge, EdgeState, Elements, Graph, Measures, Node, NodeState, State, Topic, TopicState,
+    ById, Edge, EdgeId, EdgeState, Elements, Graph, Measures, Node, NodeId, NodeState, State,
+    Topic, TopicId, TopicState,
 };
 use crate::mission::{Mission, Window};
 
@@ -121,8 +122,8 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
         all.dedup();
         all.into_iter()
             .map(|(node, topic)| Edge {
-                node,
-                topic,
+                node: NodeId(node),
+                topic: TopicId(topic),
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
@@ -162,7 +163,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
 
 fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
     let mut graph = Graph::default();
-    for (node, id) in elements.nodes.iter().zip(0..) {
+    for (id, node) in elements.nodes.with_ids() {
         let own = |w: &&Word<'_>| w.node == node.name.as_str();
         if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
             let hz = words
@@ -179,7 +180,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             });
         }
     }
-    for (topic, id) in elements.topics.iter().zip(0..) {
+    for (id, topic) in elements.topics.with_ids() {
         let own = |w: &&Word<'_>| w.topic == topic.name.as_str();
         if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
             let hz = words
@@ -200,20 +201,19 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             });
         }
     }
-    let edges = |edges: &[Edge], kind: EdgeKind| -> Vec<EdgeState> {
+    let edges = |edges: &ById<EdgeId, Edge>, kind: EdgeKind| -> Vec<EdgeState> {
         let word = |edge: &Edge| {
             let (node, topic) = (
-                elements.nodes[edge.node as usize].name.as_str(),
-                elements.topics[edge.topic as usize].name.as_str(),
+                elements.nodes[edge.node].name.as_str(),
+                elements.topics[edge.topic].name.as_str(),
             );
             words
                 .iter()
                 .find(|w| w.kind == kind && w.node == node && w.topic == topic)
         };
         edges
-            .iter()
-            .zip(0..)
-            .filter_map(|(edge, id)| {
+            .with_ids()
+            .filter_map(|(id, edge)| {
                 word(edge).map(|w| EdgeState {
                     id,
                     state: w.state,
@@ -245,24 +245,21 @@ fn count(hz: Option<f64>) -> Option<u64> {
 pub(crate) fn text(mission: &Mission) -> Vec<String> {
     let all = &mission.elements;
     let ends = |edge: &Edge| {
-        let node = all.nodes[edge.node as usize].name.to_string();
-        (node, all.topics[edge.topic as usize].name.to_string())
+        let node = all.nodes[edge.node].name.to_string();
+        (node, all.topics[edge.topic].name.to_string())
     };
     let windows = mission.graphs.iter().map(|graph| {
-        let nodes = graph
-            .nodes
-            .iter()
-            .map(|n| all.nodes[n.id as usize].name.to_string());
+        let nodes = graph.nodes.iter().map(|n| all.nodes[n.id].name.to_string());
         let topics = graph
             .topics
             .iter()
-            .map(|t| format!("={}", all.topics[t.id as usize].name));
+            .map(|t| format!("={}", all.topics[t.id].name));
         let publishes = graph.publishes.iter().map(|e| {
-            let (node, topic) = ends(&all.publishes[e.id as usize]);
+            let (node, topic) = ends(&all.publishes[e.id]);
             format!("{node}>{topic}")
         });
         let subscribes = graph.subscribes.iter().map(|e| {
-            let (node, topic) = ends(&all.subscribes[e.id as usize]);
+            let (node, topic) = ends(&all.subscribes[e.id]);
             format!("{node}<{topic}")
         });
         let words = nodes.chain(topics).chain(publishes).chain(subscribes);

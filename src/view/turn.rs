@@ -98,7 +98,7 @@ impl WindowTurn {
                     let name = &arrow.topics[row.topic as usize];
                     for event in shown.events.iter().filter_map(|id| now.event(*id)) {
                         let topic = viewed.topic_of(event.what);
-                        if topic.is_some_and(|topic| viewed.bundled[topic as usize] == *name) {
+                        if topic.is_some_and(|topic| viewed.bundled[topic] == *name) {
                             (row.mark, row.rates) = changed(event);
                         }
                     }

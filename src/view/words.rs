@@ -27,7 +27,7 @@ pub(crate) fn drawn_part(
 ) -> Option<DrawnPart> {
     let topics = drawn_in_pages(mission, options);
     let is_hidden = |what: &Element| match what {
-        Element::Topic(id) => !topics[*id as usize],
+        Element::Topic(id) => !topics[*id],
         _ => false,
     };
     let is_hidden = |item: &Item| item.members.iter().all(is_hidden);

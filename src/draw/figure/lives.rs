@@ -382,10 +382,7 @@ fn talk(
     let name = &track.name;
     if let Some(topic) = track.topic {
         let elements = &source.mission.elements;
-        let kind = elements
-            .topics
-            .get(topic as usize)
-            .map(|t| t.types.join(", "));
+        let kind = elements.topics.get(topic).map(|t| t.types.join(", "));
         let text = canvas.cut(&kind.unwrap_or_default(), Type::Small, width);
         canvas.text(x, y, Type::Small, ink::QUIET, &text);
         return;
@@ -440,7 +437,7 @@ fn sent_by<'s>(source: &'s FigureSource<'_>, track: &Track) -> Vec<&'s str> {
         let hz = senders
             .first()
             .and_then(|s| mean(&steps.pieces(s, source.span())));
-        if let Some(of) = source.mission.elements.publishes.get(edge as usize)
+        if let Some(of) = source.mission.elements.publishes.get(edge)
             && !source.is_hub(of.topic)
         {
             rated.push((hz.unwrap_or(0.0), source.topic(of.topic)));

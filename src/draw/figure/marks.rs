@@ -258,7 +258,7 @@ fn text(source: &FigureSource<'_>, event: &Event, track: &Track) -> String {
     match topic.map(|topic| relative(source.topic(topic), &track.name)) {
         Some(topic) => format!("{row}: {} {said}", words::visible(topic)),
         None if node.is_some() && track.topic.is_some() => {
-            let node = node.and_then(|id| source.mission.elements.nodes.get(id as usize));
+            let node = node.and_then(|id| source.mission.elements.nodes.get(id));
             let node = node.map_or("", |n| last_part(n.name.as_str()));
             format!("{row}: {} {said}", words::visible(node))
         }

@@ -7,7 +7,7 @@ use crate::base::name::{is_quiet, last_part};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::history::Sender;
-use crate::graph::{Edge, EdgeId, Element, Node, NodeId, TopicId};
+use crate::graph::{ById, Edge, EdgeId, Element, Node, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::Phase;
 use crate::mission::phases::knows_publishers;
@@ -20,11 +20,11 @@ pub(crate) struct FigureSource<'a> {
     /// Roles with their nodes.
     pub(crate) roles: BTreeMap<Arc<str>, Vec<NodeId>>,
     /// Per topic, whether it is shown.
-    topics: Vec<bool>,
+    topics: ById<TopicId, bool>,
     /// Per node, its publications on shown topics.
-    published: Vec<Vec<EdgeId>>,
+    published: ById<NodeId, Vec<EdgeId>>,
     /// The only publication of each topic; `None` if there are several.
-    sole: Vec<Option<EdgeId>>,
+    sole: ById<TopicId, Option<EdgeId>>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
     /// Whether their names are the user's.
@@ -40,7 +40,7 @@ impl<'a> FigureSource<'a> {
         is_named: bool,
     ) -> Self {
         let mut roles: BTreeMap<Arc<str>, Vec<NodeId>> = BTreeMap::new();
-        for (id, node) in (0..).zip(&mission.elements.nodes) {
+        for (id, node) in mission.elements.nodes.with_ids() {
             if !node.is_tool() && nodes.passes(node.name.as_str()) {
                 roles.entry(Arc::clone(&node.role)).or_default().push(id);
             }
@@ -49,11 +49,11 @@ impl<'a> FigureSource<'a> {
             let name = t.name.as_str();
             !is_quiet(name) && topics.passes(name)
         });
-        let topics: Vec<bool> = shown.collect();
-        let mut published = vec![Vec::new(); mission.elements.nodes.len()];
-        for (id, edge) in (0..).zip(&mission.elements.publishes) {
-            if topics[edge.topic as usize] {
-                published[edge.node as usize].push(id);
+        let topics: ById<TopicId, bool> = shown.collect();
+        let mut published = ById::like(&mission.elements.nodes, Vec::new());
+        for (id, edge) in mission.elements.publishes.with_ids() {
+            if topics[edge.topic] {
+                published[edge.node].push(id);
             }
         }
         let phases = &mission.log.phases[..];
@@ -84,7 +84,7 @@ impl<'a> FigureSource<'a> {
     }
 
     pub(crate) fn shows(&self, topic: TopicId) -> bool {
-        self.topics.get(topic as usize) == Some(&true)
+        self.topics.get(topic) == Some(&true)
     }
 
     /// Whether nearly every node uses this topic, so that its arrows and lists are not informative: transforms, diagnostics,
@@ -95,21 +95,19 @@ impl<'a> FigureSource<'a> {
     }
 
     pub(crate) fn topic(&self, id: TopicId) -> &str {
-        let topic = self.mission.elements.topics.get(id as usize);
+        let topic = self.mission.elements.topics.get(id);
         topic.map_or("", |t| t.name.as_str())
     }
 
     /// The topics that are shown.
     pub(crate) fn shown_topics(&self) -> impl Iterator<Item = TopicId> + '_ {
-        (0..)
-            .zip(&self.topics)
-            .filter(|(_, is)| **is)
-            .map(|(id, _)| id)
+        let topics = self.topics.with_ids();
+        topics.filter(|(_, is)| **is).map(|(id, _)| id)
     }
 
     /// The publications of some nodes on shown topics.
     pub(crate) fn publications(&self, nodes: &[NodeId]) -> Vec<EdgeId> {
-        let own = nodes.iter().flat_map(|id| &self.published[*id as usize]);
+        let own = nodes.iter().flat_map(|id| &self.published[*id]);
         let mut own: Vec<EdgeId> = own.copied().collect();
         own.sort_unstable();
         own
@@ -120,11 +118,11 @@ impl<'a> FigureSource<'a> {
     pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
         let edges = edges
             .iter()
-            .filter_map(|id| Some((*id, self.mission.elements.publishes.get(*id as usize)?)));
+            .filter_map(|id| Some((*id, self.mission.elements.publishes.get(*id)?)));
         let sending = &self.mission.sending;
         let sender = |(id, edge): (EdgeId, &Edge)| {
             let own = sending.of_edge(edge.node, edge.topic);
-            let is_sole = self.sole.get(edge.topic as usize) == Some(&Some(id));
+            let is_sole = self.sole.get(edge.topic) == Some(&Some(id));
             let rest = || {
                 sending
                     .of_topic(edge.topic)
@@ -161,7 +159,7 @@ impl<'a> FigureSource<'a> {
         match self.mission.elements.ends(what) {
             (_, Some(topic)) => self.topic(topic),
             (Some(node), None) => {
-                let node = self.mission.elements.nodes.get(node as usize);
+                let node = self.mission.elements.nodes.get(node);
                 node.map_or("", |n| n.name.as_str())
             }
             (None, None) => "",

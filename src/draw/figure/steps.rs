@@ -24,6 +24,7 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::Scene;
+use crate::graph::TopicId;
 use crate::layout::{Outline, Plan, Vertex};
 use crate::mission::EventId;
 use crate::mission::phases::{Configuration, configurations};
@@ -343,7 +344,7 @@ impl<'s> StepSource<'s> {
         k: usize,
         vertex: &[Option<usize>],
         states: &[BoxState],
-        handed: &[(u32, Arc<str>, Arc<str>, EventId)],
+        handed: &[(TopicId, Arc<str>, Arc<str>, EventId)],
     ) -> Vec<(Talk, BoxState)> {
         let source = self.sheet.source;
         let mut all = Vec::new();

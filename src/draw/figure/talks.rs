@@ -9,7 +9,7 @@ use crate::base::name::last_part;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Confidence;
-use crate::graph::{Element, TopicId};
+use crate::graph::{ById, Element, TopicId};
 use crate::layout::Link;
 
 /// All topics from one box to another.
@@ -85,10 +85,10 @@ pub(crate) struct Talks<'a> {
 impl<'a> Talks<'a> {
     pub(crate) fn new(source: &'a FigureSource<'a>, tracks: &[Track]) -> Self {
         let elements = &source.mission.elements;
-        let mut track_of = vec![None; elements.nodes.len()];
+        let mut track_of = ById::like(&elements.nodes, None);
         for (at, track) in tracks.iter().enumerate() {
             for node in &track.nodes {
-                if let Some(of) = track_of.get_mut(*node as usize) {
+                if let Some(of) = track_of.get_mut(*node) {
                     *of = Some(at);
                 }
             }
@@ -97,7 +97,7 @@ impl<'a> Talks<'a> {
         let presence = |what: Element| {
             let (node, topic) = elements.ends(what);
             let (node, topic) = (node?, topic?);
-            let track = track_of.get(node as usize).copied().flatten()?;
+            let track = track_of.get(node).copied().flatten()?;
             let shown = source.shows(topic) && !source.is_hub(topic);
             let sender = match what {
                 Element::Publish(id) => source.senders(&[id]).into_iter().next(),

@@ -5,7 +5,7 @@ use super::*;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Confidence;
-use crate::graph::{Element, Elements, State};
+use crate::graph::{Element, Elements, NodeId, State};
 use crate::layout;
 use crate::view::{Headline, Item, ItemKind, Looks, Mark, Phrase, Shown};
 
@@ -32,7 +32,7 @@ fn two_nodes() -> (Mission, View) {
         kind: ItemKind::Node,
         name: Arc::from(name),
         label: Arc::from(name),
-        members: vec![Element::Node(id)],
+        members: vec![Element::Node(NodeId(id))],
         is_replica: false,
         is_service: false,
         cluster: None,

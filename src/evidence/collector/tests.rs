@@ -360,7 +360,7 @@ fn a_node_that_forwards_stamps_subscribes_to_their_source() {
         .iter()
         .filter(|e| e.evidence.words().any(|w| w == "equal_stamps"));
     let names = inferred.map(|e| {
-        let (topic, node) = (&all.topics[e.topic as usize], &all.nodes[e.node as usize]);
+        let (topic, node) = (&all.topics[e.topic], &all.nodes[e.node]);
         format!("{} {}", topic.name, node.name)
     });
     assert_eq!(names.collect::<Vec<_>>(), ["/image /detector"]);

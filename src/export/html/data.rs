@@ -450,7 +450,7 @@ fn types(elements: &Elements, members: &[Element]) -> Vec<String> {
 
 fn topic(elements: &Elements, element: Element) -> Option<&crate::graph::Topic> {
     match element {
-        Element::Topic(id) => elements.topics.get(id as usize),
+        Element::Topic(id) => elements.topics.get(id),
         _ => None,
     }
 }

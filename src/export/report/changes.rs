@@ -94,8 +94,8 @@ fn is_together(headline: &Headline) -> bool {
 /// The name of an element: the role of a node, the name of a topic, both ends of an edge.
 fn name(elements: &Elements, what: Element) -> String {
     let (node, topic) = elements.ends(what);
-    let node = node.map(|id| &*elements.nodes[id as usize].role);
-    let topic = topic.map(|id| elements.topics[id as usize].name.as_str());
+    let node = node.map(|id| &*elements.nodes[id].role);
+    let topic = topic.map(|id| elements.topics[id].name.as_str());
     match (node, topic, what) {
         (Some(node), Some(topic), Element::Subscribe(_)) => format!("{topic} → {node}"),
         (Some(node), Some(topic), _) => format!("{node} → {topic}"),

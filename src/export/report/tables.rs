@@ -8,7 +8,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::count;
 use crate::evidence::Evidence;
-use crate::graph::Element;
+use crate::graph::{ById, Element, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::info::{how_many, info};
 use crate::view::View;
@@ -98,17 +98,17 @@ fn shown(view: &View) -> BTreeSet<Element> {
 pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
     let shown = shown(view);
-    let is_shown = |id: u32| shown.contains(&Element::Node(id));
-    let mut presence = vec![WindowsOf::default(); elements.nodes.len()];
+    let is_shown = |id: NodeId| shown.contains(&Element::Node(id));
+    let mut presence = ById::like(&elements.nodes, WindowsOf::default());
     for state in mission.graphs.iter().flat_map(|graph| graph.nodes) {
-        if let Some(one) = presence.get_mut(state.id as usize) {
+        if let Some(one) = presence.get_mut(state.id) {
             one.add(state.hz);
         }
     }
-    let all = (0..).zip(elements.nodes.iter().zip(&presence));
-    let all = all.filter(|(id, _)| is_shown(*id));
+    let all = elements.nodes.with_ids().zip(&presence);
+    let all = all.filter(|((id, _), _)| is_shown(*id));
     let nodes = all.clone().count();
-    let rows = all.map(|(_, (node, there))| {
+    let rows = all.map(|((_, node), there)| {
         format!(
             "| {} | {} | {} | {} | {} |\n",
             code(node.name.as_str()),
@@ -127,18 +127,18 @@ pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
 pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
     let shown = shown(view);
-    let is_shown = |id: u32| shown.contains(&Element::Topic(id));
-    let mut presence = vec![(WindowsOf::default(), 0_u64); elements.topics.len()];
+    let is_shown = |id: TopicId| shown.contains(&Element::Topic(id));
+    let mut presence = ById::like(&elements.topics, (WindowsOf::default(), 0_u64));
     for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
-        if let Some((one, messages)) = presence.get_mut(state.id as usize) {
+        if let Some((one, messages)) = presence.get_mut(state.id) {
             one.add(state.hz);
             *messages += state.count;
         }
     }
-    let all = (0..).zip(elements.topics.iter().zip(&presence));
-    let all = all.filter(|(id, _)| is_shown(*id));
+    let all = elements.topics.with_ids().zip(&presence);
+    let all = all.filter(|((id, _), _)| is_shown(*id));
     let topics = all.clone().count();
-    let rows = all.map(|(_, (topic, (there, messages)))| {
+    let rows = all.map(|((_, topic), (there, messages))| {
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
         format!(
             "| {} | {} | {} | {} | {messages} | {} | {} |\n",

@@ -4,7 +4,7 @@ use super::seen::{Seen, edges, nodes, topics};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
-use crate::graph::{Element, NodeId, Topic};
+use crate::graph::{Element, Node, NodeId, Topic};
 use crate::mission::Mission;
 use crate::mission::event_log::{Detail, Event, described};
 
@@ -102,7 +102,7 @@ element_columns! {
     LENGTH "length_ns" I64 |_, one| length(one.span);
     WHAT "what" Text |_, one| what(one.what);
     NODE "node" Text |all, one| node(all, one.what);
-    ROLE "node_role" Text |all, one| text(all.elements.nodes.get(one.what.place().1).map(|node| &*node.role));
+    ROLE "node_role" Text |all, one| text(node_of(all, one).map(|node| &*node.role));
     TOPIC "topic" Text |all, one| topic(all, one.what);
     TYPES "types" Text |all, one| words(topic_of(all, one).iter().flat_map(|topic| &topic.types).map(|kind| &**kind));
     QOS "qos" Text |all, one| text(topic_of(all, one).and_then(|topic| topic.qos.as_deref()));
@@ -129,8 +129,18 @@ element_columns! {
     LAST "last_ns" Time |all, one| time(all.elements.life(one.what).1);
 }
 
+fn node_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Node> {
+    match one.what {
+        Element::Node(id) => mission.elements.nodes.get(id),
+        _ => None,
+    }
+}
+
 fn topic_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Topic> {
-    mission.elements.topics.get(one.what.place().1)
+    match one.what {
+        Element::Topic(id) => mission.elements.topics.get(id),
+        _ => None,
+    }
 }
 
 /// A change from one window to the next.
@@ -230,7 +240,7 @@ fn rates(detail: &Detail) -> (Option<f64>, Option<f64>) {
 
 fn values<'a>(mission: &Mission, detail: &'a Detail) -> (TableCell<'a>, TableCell<'a>) {
     let names = |nodes: &[NodeId]| {
-        let nodes = nodes.iter().map(|n| &mission.elements.nodes[*n as usize]);
+        let nodes = nodes.iter().map(|n| &mission.elements.nodes[*n]);
         words(nodes.map(|n| n.name.as_str()))
     };
     match detail {

@@ -99,7 +99,7 @@ pub(super) fn topics(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
                 median: state.median_period_s,
                 gap: state.max_gap_s,
                 measures: state.measures,
-                skew: skews.get(state.id as usize).copied().flatten(),
+                skew: skews.get(state.id).copied().flatten(),
                 ..Seen::new(
                     Element::Topic(state.id),
                     window,

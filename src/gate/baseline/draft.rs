@@ -385,7 +385,7 @@ impl TopicInRun<'_> {
     }
 
     fn types(&self) -> BTreeSet<String> {
-        let own = &self.facts.mission.elements.topics[self.id as usize];
+        let own = &self.facts.mission.elements.topics[self.id];
         own.types.iter().map(|t| (**t).to_owned()).collect()
     }
 

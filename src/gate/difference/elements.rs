@@ -139,7 +139,7 @@ fn topic(
     all: &mut Vec<Difference>,
 ) {
     let own = |facts: &Facts<'_>, id: TopicId| {
-        let topic = &facts.mission.elements.topics[id as usize];
+        let topic = &facts.mission.elements.topics[id];
         let types: Vec<&str> = topic.types.iter().map(|t| &**t).collect();
         (types.join(", "), topic.qos.clone())
     };

@@ -29,9 +29,9 @@ pub(crate) fn pairs(
     // An edge's name is that of both its ends.
     let names: BTreeSet<&str> = known.flat_map(|d| d.element.split(" → ")).collect();
     let all = NameFilter::default();
-    let nodes = (0..).zip(&drawn.elements.nodes);
+    let nodes = drawn.elements.nodes.with_ids();
     let nodes = nodes.map(|(id, n)| (n.name.as_str(), Element::Node(id)));
-    let topics = (0..).zip(&drawn.elements.topics);
+    let topics = drawn.elements.topics.with_ids();
     let topics = topics.map(|(id, t)| (t.name.as_str(), Element::Topic(id)));
     let tracks: [fn(&FigureSource<'_>) -> Vec<Track>; 2] = [of_nodes, of_topics];
     let places: [BTreeMap<&str, Element>; 2] = [nodes.collect(), topics.collect()];

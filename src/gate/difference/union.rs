@@ -9,7 +9,10 @@ use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
-use crate::graph::{Edge, EdgeState, Element, Elements, Graph, Node, NodeState, Topic, TopicState};
+use crate::graph::{
+    Edge, EdgeId, EdgeState, Element, Elements, Graph, Node, NodeId, NodeState, Topic, TopicId,
+    TopicState,
+};
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
 
@@ -51,7 +54,7 @@ impl MissionSide {
         let elements = &mission.elements;
         for (role, nodes) in facts.roles().filter(|(_, nodes)| !facts.is_tool(nodes)) {
             let evidence = nodes.iter().fold(Evidence::NONE, |all, id| {
-                all.and(elements.nodes[*id as usize].evidence)
+                all.and(elements.nodes[*id].evidence)
             });
             let confidence = if facts.is_sure(nodes) {
                 Confidence::Stated
@@ -61,7 +64,7 @@ impl MissionSide {
             seen.nodes.insert(role.to_owned(), (confidence, evidence));
         }
         for id in facts.topics(&Pattern::new("**")) {
-            let own = &elements.topics[id as usize];
+            let own = &elements.topics[id];
             let rates = facts.rates(id, true, mission.span);
             let count: u64 = rates.iter().map(|r| r.count).sum();
             let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
@@ -73,12 +76,12 @@ impl MissionSide {
             };
             let name = facts.topic(id).to_owned();
             for (node, edge, confidence) in facts.publishers(id) {
-                let evidence = elements.publishes[edge as usize].evidence;
+                let evidence = elements.publishes[edge].evidence;
                 let key = (facts.role(node).to_owned(), name.clone());
                 seen.publishes.insert(key, (confidence, evidence));
             }
             for (node, edge, confidence) in facts.subscribers(id) {
-                let evidence = elements.subscribes[edge as usize].evidence;
+                let evidence = elements.subscribes[edge].evidence;
                 let key = (name.clone(), facts.role(node).to_owned());
                 seen.subscribes.insert(key, (confidence, evidence));
             }
@@ -162,50 +165,44 @@ pub(crate) fn union(
 fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
     let nodes: BTreeMap<&String, Evidence> = both(&a.nodes, &b.nodes);
     let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
-    let node_places: BTreeMap<&String, u32> = nodes.keys().copied().zip(0..).collect();
-    let topic_places: BTreeMap<&String, u32> = topics.iter().copied().zip(0..).collect();
-    let place = |name: &String| node_places.get(name).copied();
-    let topic_place = |name: &String| topic_places.get(name).copied();
+    let nodes = nodes.into_iter().map(|(name, evidence)| Node {
+        name: name.as_str().into(),
+        role: name.as_str().into(),
+        evidence,
+        ..Node::default()
+    });
+    let topics = topics.into_iter().map(|name| {
+        let own = [a.topics.get(name), b.topics.get(name)];
+        let own = || own.into_iter().flatten();
+        let types: BTreeSet<&String> = own().flat_map(|t| &t.types).collect();
+        Topic {
+            name: name.as_str().into(),
+            types: types.into_iter().map(|t| t.as_str().into()).collect(),
+            evidence: own().fold(Evidence::NONE, |all, t| all.and(t.evidence)),
+            ..Topic::default()
+        }
+    });
+    let ends = Elements {
+        nodes: nodes.collect(),
+        topics: topics.collect(),
+        ..Elements::default()
+    };
     let edge = |node: &String, topic: &String, evidence: Evidence| {
         Some(Edge {
-            node: place(node)?,
-            topic: topic_place(topic)?,
+            node: ends.node(node)?,
+            topic: ends.topic(topic)?,
             evidence,
             ..Edge::default()
         })
     };
     let publishes = both(&a.publishes, &b.publishes).into_iter();
+    let publishes = publishes.filter_map(|((node, topic), e)| edge(node, topic, e));
     let subscribes = both(&a.subscribes, &b.subscribes).into_iter();
+    let subscribes = subscribes.filter_map(|((topic, node), e)| edge(node, topic, e));
     Elements {
-        publishes: publishes
-            .filter_map(|((node, topic), e)| edge(node, topic, e))
-            .collect(),
-        subscribes: subscribes
-            .filter_map(|((topic, node), e)| edge(node, topic, e))
-            .collect(),
-        nodes: nodes
-            .iter()
-            .map(|(name, evidence)| Node {
-                name: name.as_str().into(),
-                role: name.as_str().into(),
-                evidence: *evidence,
-                ..Node::default()
-            })
-            .collect(),
-        topics: topics
-            .iter()
-            .map(|name| {
-                let own = [a.topics.get(*name), b.topics.get(*name)];
-                let own = || own.into_iter().flatten();
-                let types: BTreeSet<&String> = own().flat_map(|t| &t.types).collect();
-                Topic {
-                    name: name.as_str().into(),
-                    types: types.into_iter().map(|t| t.as_str().into()).collect(),
-                    evidence: own().fold(Evidence::NONE, |all, t| all.and(t.evidence)),
-                    ..Topic::default()
-                }
-            })
-            .collect(),
+        publishes: publishes.collect(),
+        subscribes: subscribes.collect(),
+        ..ends
     }
 }
 
@@ -223,9 +220,9 @@ fn both<'a, K: Ord>(
 }
 
 fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
-    let node = |id: u32| elements.nodes[id as usize].name.to_string();
-    let topic = |id: u32| elements.topics[id as usize].name.to_string();
-    let edge = |id: u32, known: Option<&(Confidence, Evidence)>| {
+    let node = |id: NodeId| elements.nodes[id].name.to_string();
+    let topic = |id: TopicId| elements.topics[id].name.to_string();
+    let edge = |id: EdgeId, known: Option<&(Confidence, Evidence)>| {
         let confidence = known?.0;
         Some(EdgeState {
             id,
@@ -233,7 +230,7 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
             ..EdgeState::default()
         })
     };
-    let nodes = (0..).zip(&elements.nodes).filter_map(|(id, own)| {
+    let nodes = elements.nodes.with_ids().filter_map(|(id, own)| {
         let (confidence, _) = seen.nodes.get(own.name.as_str())?;
         Some(NodeState {
             id,
@@ -241,7 +238,7 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
             ..NodeState::default()
         })
     });
-    let topics = (0..).zip(&elements.topics).filter_map(|(id, own)| {
+    let topics = elements.topics.with_ids().filter_map(|(id, own)| {
         let topic = seen.topics.get(own.name.as_str())?;
         Some(TopicState {
             id,
@@ -250,10 +247,10 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
             ..TopicState::default()
         })
     });
-    let publishes = (0..).zip(&elements.publishes);
+    let publishes = elements.publishes.with_ids();
     let publishes = publishes
         .filter_map(|(id, e)| edge(id, seen.publishes.get(&(node(e.node), topic(e.topic)))));
-    let subscribes = (0..).zip(&elements.subscribes);
+    let subscribes = elements.subscribes.with_ids();
     let subscribes = subscribes
         .filter_map(|(id, e)| edge(id, seen.subscribes.get(&(topic(e.topic), node(e.node)))));
     Graph {
@@ -290,8 +287,8 @@ fn turned(differing: &[Difference]) -> Turned<'_> {
 
 impl UnionLog<'_> {
     fn all(mut self) -> Vec<Event> {
-        let mut wholes: BTreeMap<u32, EventId> = BTreeMap::new();
-        for (id, node) in (0..).zip(&self.elements.nodes) {
+        let mut wholes: BTreeMap<NodeId, EventId> = BTreeMap::new();
+        for (id, node) in self.elements.nodes.with_ids() {
             let turned = self.turned("node", node.name.as_str());
             if let Some(kind) = turned.map(|came| if came { Kind::Started } else { Kind::Stopped })
             {
@@ -299,7 +296,7 @@ impl UnionLog<'_> {
                 wholes.insert(id, place);
             }
         }
-        for (id, topic) in (0..).zip(&self.elements.topics) {
+        for (id, topic) in self.elements.topics.with_ids() {
             let turned = self.turned("topic", topic.name.as_str());
             if let Some(kind) = turned.map(appeared) {
                 let mut of = self.elements.publishes.iter().filter(|e| e.topic == id);
@@ -320,11 +317,11 @@ impl UnionLog<'_> {
     }
 
     /// Adds the events of edges, which appear and vanish with their nodes or alone.
-    fn edges(&mut self, wholes: &BTreeMap<u32, EventId>) {
+    fn edges(&mut self, wholes: &BTreeMap<NodeId, EventId>) {
         let elements = self.elements;
         for (what, edge) in elements.edges() {
-            let node = elements.nodes[edge.node as usize].name.as_str();
-            let topic = elements.topics[edge.topic as usize].name.as_str();
+            let node = elements.nodes[edge.node].name.as_str();
+            let topic = elements.topics[edge.topic].name.as_str();
             let (kind, label) = match what {
                 Element::Publish(_) => ("publishes", format!("{node} → {topic}")),
                 _ => ("subscribes", format!("{topic} → {node}")),

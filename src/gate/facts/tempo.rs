@@ -192,7 +192,7 @@ impl<'a> Facts<'a> {
 
     /// The longest times between two messages, if single messages are known.
     fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
-        let pauses = self.mission.sending.pauses.get(topic as usize);
+        let pauses = self.mission.sending.pauses.get(topic);
         pauses.into_iter().flatten().copied()
     }
 }

@@ -31,7 +31,7 @@ impl Judge<'_> {
             Element::Node(id) => self.facts.fits(&wanted.name, id),
             Element::Topic(id) => wanted.name.matches(self.facts.topic(id)),
             Element::Publish(id) if wanted.kind == EventKind::Rate => {
-                let topic = self.facts.mission.elements.publishes[id as usize].topic;
+                let topic = self.facts.mission.elements.publishes[id].topic;
                 wanted.name.matches(self.facts.topic(topic))
             }
             Element::Publish(_) | Element::Subscribe(_) => false,

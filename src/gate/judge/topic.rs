@@ -172,7 +172,7 @@ impl Judge<'_> {
     }
 
     fn kind(&self, topic: TopicId, kinds: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
-        let types = &self.facts.mission.elements.topics[topic as usize].types;
+        let types = &self.facts.mission.elements.topics[topic].types;
         let expected: Vec<&str> = kinds.value.iter().map(|k| k.value.as_str()).collect();
         let is_other = |t: &&str| {
             expected
@@ -335,7 +335,7 @@ impl Judge<'_> {
         let at = wanted.at;
         let name = self.facts.topic(topic);
         let expected = &wanted.value;
-        let Some(seen) = &self.facts.mission.elements.topics[topic as usize].qos else {
+        let Some(seen) = &self.facts.mission.elements.topics[topic].qos else {
             let says = format!(
                 "cannot tell whether {name} is {expected}: this bag has no quality of service"
             );

@@ -15,8 +15,8 @@ use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::Name;
 use crate::graph::{
-    Column, ColumnCursor, ColumnWriter, EdgeState, Element, Graphs, GraphsWriter, Measures,
-    NodeState, Number, Row, State, TopicState, per_second,
+    ById, Column, ColumnCursor, ColumnWriter, EdgeState, Element, Graphs, GraphsWriter, Measures,
+    NodeId, NodeState, Number, Row, State, TopicId, TopicState, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -79,7 +79,7 @@ struct GraphAssembly<'a> {
     /// The number of messages of each known publisher per window.
     sent: BTreeMap<Name, Vec<u64>>,
     /// The states of each topic in the windows in which it exists.
-    topics: BTreeMap<u32, Column>,
+    topics: BTreeMap<TopicId, Column>,
 }
 
 impl GraphAssembly<'_> {
@@ -129,7 +129,7 @@ impl GraphAssembly<'_> {
         }
     }
 
-    fn topic(&mut self, id: u32, sums: Option<&[Sums]>) {
+    fn topic(&mut self, id: TopicId, sums: Option<&[Sums]>) {
         let Some(record) = self.history.records.of(Element::Topic(id)) else {
             return;
         };
@@ -144,11 +144,7 @@ impl GraphAssembly<'_> {
             let state = TopicState {
                 id,
                 state: record.state(*window, sum.is_some()),
-                confidence: degree_in(
-                    record,
-                    self.history.elements.topics[id as usize].first,
-                    *window,
-                ),
+                confidence: degree_in(record, self.history.elements.topics[id].first, *window),
                 count,
                 bytes: bytes(sum, sums.is_some()),
                 hz: per_second(count, *window),
@@ -178,11 +174,7 @@ impl GraphAssembly<'_> {
                 let state = NodeState {
                     id: *id,
                     state: record.state(*window, false),
-                    confidence: degree_in(
-                        record,
-                        self.history.elements.nodes[*id as usize].first,
-                        *window,
-                    ),
+                    confidence: degree_in(record, self.history.elements.nodes[*id].first, *window),
                     hz: sent.and_then(|of| per_second(of[at], *window)),
                     lifecycle: self.findings.values.lifecycle(*name, *window),
                 };
@@ -192,17 +184,14 @@ impl GraphAssembly<'_> {
     }
 
     fn publishes(&mut self) {
-        let names = |ids: &BTreeMap<Name, u32>| -> BTreeMap<u32, Name> {
-            ids.iter().map(|(name, id)| (*id, *name)).collect()
-        };
-        let nodes = names(&self.history.node_ids);
-        let topics = names(&self.history.topic_ids);
-        let edges = self.history.elements.publishes.iter();
-        for (id, edge) in (0..).zip(edges) {
+        // In the order of their ids.
+        let nodes: ById<NodeId, Name> = self.history.node_ids.keys().copied().collect();
+        let topics: ById<TopicId, Name> = self.history.topic_ids.keys().copied().collect();
+        for (id, edge) in self.history.elements.publishes.with_ids() {
             let Some(record) = self.history.records.of(Element::Publish(id)) else {
                 continue;
             };
-            let ends = nodes.get(&edge.node).zip(topics.get(&edge.topic));
+            let ends = nodes.get(edge.node).zip(topics.get(edge.topic));
             let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
             let mut sent = sent.map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
@@ -235,8 +224,7 @@ impl GraphAssembly<'_> {
 
     /// Adds the subscriptions: each has the state of its topic.
     fn subscribes(&mut self) {
-        let edges = self.history.elements.subscribes.iter();
-        for (id, edge) in (0..).zip(edges) {
+        for (id, edge) in self.history.elements.subscribes.with_ids() {
             let Some(record) = self.history.records.of(Element::Subscribe(id)) else {
                 continue;
             };

@@ -298,10 +298,9 @@ impl Assembly<'_> {
     fn node(&mut self, name: Name, track: &Liveness) {
         let silent = self.node_silences(name, &spans(track));
         let all = &mut self.history;
-        all.node_ids.insert(name, next(all.elements.nodes.len()));
         let (first, last) = track.bounds();
         let text = self.findings.text(name);
-        all.elements.nodes.push(Node {
+        let id = all.elements.nodes.push(Node {
             role: role(&text).into(),
             name: text.into(),
             evidence: track.evidence,
@@ -309,13 +308,14 @@ impl Assembly<'_> {
             last,
             runs: spans(track),
         });
+        all.node_ids.insert(name, id);
         let mut record = Record::new(track, self.findings.mission, silent);
         // A node's lifetime depends on more than messages.
         record.needs_messages = false;
         if track.speaks && !record.is_declared() {
             record.fixed = None;
         }
-        all.records.push(Element::Node(0), record);
+        all.records.push(Element::Node(id), record);
     }
 
     fn topic(&mut self, name: Name, track: &Liveness) {
@@ -333,8 +333,7 @@ impl Assembly<'_> {
         types.dedup();
         let (first, last) = track.bounds();
         let all = &mut self.history;
-        all.topic_ids.insert(name, next(all.elements.topics.len()));
-        all.elements.topics.push(Topic {
+        let id = all.elements.topics.push(Topic {
             name: self.findings.text(name).into(),
             types,
             evidence: track.evidence,
@@ -344,10 +343,11 @@ impl Assembly<'_> {
             runs: spans(track),
             unknown_publishers,
         });
+        all.topic_ids.insert(name, id);
         let pauses = traffic.map(|of| of.pauses.clone());
         all.sending.pauses.push(pauses.unwrap_or_default());
         let record = Record::new(track, self.findings.mission, silent);
-        all.records.push(Element::Topic(0), record);
+        all.records.push(Element::Topic(id), record);
     }
 
     /// The number of publishers of a topic that the bag counts beyond the known ones.
@@ -363,25 +363,25 @@ impl Assembly<'_> {
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let silent = self.silences(sender.into_iter(), &spans(track));
         let all = &mut self.history;
-        all.elements.publishes.push(edge);
+        let id = all.elements.publishes.push(edge);
         let record = Record::new(track, self.findings.mission, silent);
-        all.records.push(Element::Publish(0), record);
+        all.records.push(Element::Publish(id), record);
     }
 
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
         let edge = self.edge(node, topic, track);
         let all = &mut self.history;
-        all.elements.subscribes.push(edge);
+        let id = all.elements.subscribes.push(edge);
         let record = Record::new(track, self.findings.mission, Vec::new());
-        all.records.push(Element::Subscribe(0), record);
+        all.records.push(Element::Subscribe(id), record);
     }
 
     fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
         let (first, last) = track.bounds();
         let (nodes, topics) = (&self.history.node_ids, &self.history.topic_ids);
         Edge {
-            node: nodes.get(&node).copied().unwrap_or(NodeId::MAX),
-            topic: topics.get(&topic).copied().unwrap_or(TopicId::MAX),
+            node: nodes.get(&node).copied().unwrap_or(NodeId(u32::MAX)),
+            topic: topics.get(&topic).copied().unwrap_or(TopicId(u32::MAX)),
             evidence: track.evidence,
             first,
             last,
@@ -435,8 +435,4 @@ fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
         ended: life.ended.map(within),
     };
     lives.map(life).collect()
-}
-
-fn next(len: usize) -> u32 {
-    u32::try_from(len).unwrap_or(u32::MAX)
 }

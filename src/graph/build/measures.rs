@@ -148,7 +148,7 @@ fn only_topics(findings: &Findings, history: &History) -> BTreeMap<NodeId, Optio
         return only;
     }
     let elements = &history.elements;
-    let is_quiet = |topic: TopicId| is_quiet(elements.topics[topic as usize].name.as_str());
+    let is_quiet = |topic: TopicId| is_quiet(elements.topics[topic].name.as_str());
     for edge in elements
         .subscribes
         .iter()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Change, Delta, Diff, ValueKind, diff};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
+use crate::graph::{ById, EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
 
 /// The default share by which a rate must change to count as changed.
 pub const RATE_CHANGE: f64 = 0.25;
@@ -18,7 +18,7 @@ pub struct Changes<'a> {
     threshold: f64,
     before: Option<(Span, Graph)>,
     /// The interval in which each topic had publishers: from their first sign to the last.
-    sent: Vec<(Option<Stamp>, Option<Stamp>)>,
+    sent: ById<TopicId, (Option<Stamp>, Option<Stamp>)>,
     /// The nodes that last sent messages on each topic.
     senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
 }
@@ -97,7 +97,7 @@ impl<'a> Changes<'a> {
         }
         let crowded = self.crowded(graph);
         for (old, new) in &diff.publishes.changed {
-            let topic = self.elements.publishes[new.id as usize].topic;
+            let topic = self.elements.publishes[new.id].topic;
             // With one publisher the topic's own change is sufficient.
             if crowded.contains(&topic) && steady.contains(&topic) {
                 changes.extend(self.rate(Element::Publish(new.id), (old.hz, new.hz), spans));
@@ -131,7 +131,7 @@ impl<'a> Changes<'a> {
     /// The number of seconds of a window between an element's first and last sign.
     fn present(&self, what: Element, span: Span) -> f64 {
         let (first, last) = match what {
-            Element::Topic(id) => self.sent[id as usize],
+            Element::Topic(id) => self.sent[id],
             other => self.elements.life(other),
         };
         let start = first.map_or(span.start, |at| at.max(span.start));
@@ -145,7 +145,7 @@ impl<'a> Changes<'a> {
         let topics = graph
             .publishes
             .iter()
-            .map(|s| self.elements.publishes[s.id as usize].topic);
+            .map(|s| self.elements.publishes[s.id].topic);
         topics.filter(|topic| !seen.insert(*topic)).collect()
     }
 
@@ -161,7 +161,7 @@ impl<'a> Changes<'a> {
         for (topic, to) in self.sending(after) {
             let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
             let other = !from.is_empty() && from.is_disjoint(&to);
-            if other && there(before, topic) && !self.elements.topics[topic as usize].is_shared() {
+            if other && there(before, topic) && !self.elements.topics[topic].is_shared() {
                 let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
                 changes.push(Change::HandedOver { topic, from, to });
             }
@@ -176,7 +176,7 @@ impl<'a> Changes<'a> {
             .iter()
             .filter(|s: &&EdgeState| s.count.unwrap_or(0) > 0)
         {
-            let edge = &self.elements.publishes[state.id as usize];
+            let edge = &self.elements.publishes[state.id];
             sending.entry(edge.topic).or_default().insert(edge.node);
         }
         sending
@@ -214,10 +214,10 @@ fn is_steady(topic: &TopicState, secs: f64) -> bool {
 
 /// The interval from the first to the last sign of each topic's publishers together; of the topic itself if
 /// none is known.
-fn sent(elements: &Elements) -> Vec<(Option<Stamp>, Option<Stamp>)> {
-    let mut sent = vec![(None, None); elements.topics.len()];
+fn sent(elements: &Elements) -> ById<TopicId, (Option<Stamp>, Option<Stamp>)> {
+    let mut sent = ById::like(&elements.topics, (None, None));
     for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {
-        let (first, last): &mut (Option<Stamp>, Option<Stamp>) = &mut sent[edge.topic as usize];
+        let (first, last): &mut (Option<Stamp>, Option<Stamp>) = &mut sent[edge.topic];
         *first = [*first, edge.first].into_iter().flatten().min();
         *last = (*last).max(edge.last);
     }

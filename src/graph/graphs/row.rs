@@ -5,7 +5,9 @@ use std::sync::Arc;
 use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::Confidence;
-use crate::graph::{EdgeState, Measures, NodeState, State, TopicState, per_second};
+use crate::graph::{
+    EdgeId, EdgeState, Measures, NodeId, NodeState, State, TopicId, TopicState, per_second,
+};
 
 /// A number, as an integer where possible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -141,7 +143,7 @@ impl Row {
         row.with_measures(&state.measures).with_rate(state.hz, span)
     }
 
-    pub(super) fn node(&self, id: u32, span: Span, lifecycles: &[Arc<str>]) -> NodeState {
+    pub(super) fn node(&self, id: NodeId, span: Span, lifecycles: &[Arc<str>]) -> NodeState {
         let lifecycle = (self.lifecycle as usize).checked_sub(1);
         NodeState {
             id,
@@ -152,7 +154,7 @@ impl Row {
         }
     }
 
-    pub(super) fn topic(&self, id: u32, span: Span) -> TopicState {
+    pub(super) fn topic(&self, id: TopicId, span: Span) -> TopicState {
         TopicState {
             id,
             state: self.state,
@@ -166,7 +168,7 @@ impl Row {
         }
     }
 
-    pub(super) fn edge(&self, id: u32, span: Span) -> EdgeState {
+    pub(super) fn edge(&self, id: EdgeId, span: Span) -> EdgeState {
         EdgeState {
             id,
             state: self.state,

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::base::time::Stamp;
 use crate::evidence::Confidence;
-use crate::graph::{Measures, State};
+use crate::graph::{EdgeId, Measures, NodeId, State, TopicId};
 
 fn number() -> impl Strategy<Value = Option<f64>> {
     prop_oneof![
@@ -53,7 +53,7 @@ fn topic() -> impl Strategy<Value = TopicState> {
         .prop_map(
             |((state, confidence), count, bytes, hz, median_period_s, max_gap_s, measures)| {
                 TopicState {
-                    id: 0,
+                    id: TopicId(0),
                     state,
                     confidence,
                     count: count.unwrap_or(0),
@@ -74,7 +74,7 @@ fn node() -> impl Strategy<Value = NodeState> {
         Just(Some(Arc::from("x")))
     ];
     (look(), number(), lifecycle).prop_map(|((state, confidence), hz, lifecycle)| NodeState {
-        id: 0,
+        id: NodeId(0),
         state,
         confidence,
         hz,
@@ -85,7 +85,7 @@ fn node() -> impl Strategy<Value = NodeState> {
 fn edge() -> impl Strategy<Value = EdgeState> {
     (look(), count(), number(), count(), measures()).prop_map(
         |((state, confidence), count, hz, bytes, measures)| EdgeState {
-            id: 0,
+            id: EdgeId(0),
             state,
             confidence,
             count,
@@ -112,9 +112,9 @@ fn some<T: std::fmt::Debug + Clone>(
 }
 
 pub(crate) fn graph() -> impl Strategy<Value = Graph> {
-    let nodes = some(node(), |state, id| state.id = id);
-    let topics = some(topic(), |state, id| state.id = id);
-    let edges = || some(edge(), |state: &mut EdgeState, id| state.id = id);
+    let nodes = some(node(), |state, id| state.id = NodeId(id));
+    let topics = some(topic(), |state, id| state.id = TopicId(id));
+    let edges = || some(edge(), |state: &mut EdgeState, id| state.id = EdgeId(id));
     (nodes, topics, edges(), edges()).prop_map(|(nodes, topics, publishes, subscribes)| Graph {
         nodes,
         topics,
@@ -154,8 +154,8 @@ proptest! {
             });
             prop_assert_eq!(topics.collect::<Vec<_>>(), put.topics.clone());
         }
-        let of_topic: Vec<_> = all.rows(Element::Topic(1)).map(|(at, row)| row.topic(1, graphs[at].0)).collect();
-        let put = graphs.iter().flat_map(|(_, g)| g.topics.iter().filter(|t| t.id == 1));
+        let of_topic: Vec<_> = all.rows(Element::Topic(TopicId(1))).map(|(at, row)| row.topic(TopicId(1), graphs[at].0)).collect();
+        let put = graphs.iter().flat_map(|(_, g)| g.topics.iter().filter(|t| t.id == TopicId(1)));
         prop_assert_eq!(of_topic, put.cloned().collect::<Vec<_>>());
     }
 }
@@ -164,7 +164,7 @@ proptest! {
 fn constant_states_take_no_memory() {
     let second = |n: i64| Span::new(Stamp(n * 1_000_000_000), Stamp((n + 1) * 1_000_000_000));
     let topic = TopicState {
-        id: 0,
+        id: TopicId(0),
         state: State::Active,
         confidence: Confidence::Measured,
         count: 10,
@@ -192,7 +192,7 @@ fn memory_is_proportional_to_the_states_of_elements() {
         lifecycle: None,
     };
     let graph = Graph {
-        nodes: (0..1000).map(node).collect(),
+        nodes: (0..1000).map(NodeId).map(node).collect(),
         ..Graph::default()
     };
     let span = Span::new(Stamp(0), Stamp(1));

@@ -34,7 +34,7 @@ impl<'a> ColumnWalk<'a> {
                 }
                 let (row, stays) = cursors[at].next_run();
                 *due = self.window.saturating_add(stays);
-                visit(kind(u32::try_from(at).unwrap_or(u32::MAX)), row);
+                visit(kind(at), row);
             }
         }
         self.window += 1;

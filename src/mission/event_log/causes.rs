@@ -66,7 +66,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
     // Whether a node is known only from the messages of a topic.
     let is_only_sender = |node: NodeId, topic| {
-        let mut words = context.elements.nodes[node as usize].evidence.words();
+        let mut words = context.elements.nodes[node].evidence.words();
         let mut sent = sent.get(&node).into_iter().flatten();
         words.all(|word| word == "connection") && sent.all(|other| *other == topic)
     };
@@ -308,11 +308,11 @@ mod tests {
 
     const SECOND: i64 = 1_000_000_000;
 
-    fn event(kind: Kind, topic: TopicId, from: i64, until: Option<i64>) -> Event {
+    fn event(kind: Kind, topic: u32, from: i64, until: Option<i64>) -> Event {
         let time = Stamp(from * SECOND);
         Event {
             kind,
-            what: Element::Topic(topic),
+            what: Element::Topic(TopicId(topic)),
             time,
             earliest: time,
             latest: time,
@@ -326,7 +326,7 @@ mod tests {
         }
     }
 
-    fn step(topic: TopicId, at: i64, from_hz: f64, to_hz: f64) -> Event {
+    fn step(topic: u32, at: i64, from_hz: f64, to_hz: f64) -> Event {
         Event {
             detail: Detail::Rates { from_hz, to_hz },
             ..event(Kind::Rate, topic, at, None)

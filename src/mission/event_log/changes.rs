@@ -96,7 +96,7 @@ impl EventTurns {
 /// The topics of unnamed publishers, and of their publications.
 fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
     let mut unnamed = BTreeMap::new();
-    for (id, edge) in (0..).zip(&elements.publishes) {
+    for (id, edge) in elements.publishes.with_ids() {
         for what in [Element::Publish(id), Element::Node(edge.node)] {
             if elements.evidence(what).is_timeless() {
                 unnamed.insert(what, Element::Topic(edge.topic));

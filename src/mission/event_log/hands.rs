@@ -78,7 +78,7 @@ fn sendings(context: &LogInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
                     last.period = stretch.period;
                 }
                 _ => own.push(RoleSending {
-                    role: Arc::clone(&context.elements.nodes[node as usize].role),
+                    role: Arc::clone(&context.elements.nodes[node].role),
                     node,
                     first: stretch.first,
                     last: stretch.last,
@@ -234,7 +234,10 @@ mod tests {
     }
 
     fn found(old: (i64, i64), new: (i64, i64)) -> usize {
-        let all = [sends("/a", 0, old.0, old.1), sends("/b", 1, new.0, new.1)];
+        let all = [
+            sends("/a", NodeId(0), old.0, old.1),
+            sends("/b", NodeId(1), new.0, new.1),
+        ];
         replaced(&all, Stamp(100 * SECOND)).len()
     }
 

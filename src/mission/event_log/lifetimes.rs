@@ -73,7 +73,7 @@ type RoleTurns = Vec<((Stamp, u8, NodeId), (Turn, Bound))>;
 /// before the next begins; a node known from a single moment begins before it ends.
 fn turns_by_role<'a>(context: &LogInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
-    let nodes = (0..).zip(&context.elements.nodes);
+    let nodes = context.elements.nodes.with_ids();
     for (id, node) in nodes.filter(|(id, _)| !context.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
         for life in context.lives(Element::Node(id)) {

@@ -5,7 +5,7 @@ use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life};
-use crate::graph::{Element, Elements, History};
+use crate::graph::{Element, Elements, History, NodeId, TopicId};
 
 /// The data from which events are made.
 #[derive(Clone, Copy)]
@@ -144,8 +144,8 @@ impl<'a> LogInput<'a> {
     }
 
     /// Whether a topic's rates and senders are irrelevant: housekeeping, and topics of actions.
-    pub(crate) fn is_by_the_way(&self, topic: u32) -> bool {
-        let topic = &self.elements.topics[topic as usize];
+    pub(crate) fn is_by_the_way(&self, topic: TopicId) -> bool {
+        let topic = &self.elements.topics[topic];
         let name = topic.name.as_str();
         is_quiet(name) || name.ends_with("/feedback") || topic.is_shared()
     }
@@ -154,13 +154,13 @@ impl<'a> LogInput<'a> {
 /// Whether an element is housekeeping or the recorder's.
 pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
     let (node, topic) = elements.ends(what);
-    node.is_some_and(|id| elements.nodes[id as usize].is_tool())
-        || topic.is_some_and(|id| is_quiet(elements.topics[id as usize].name.as_str()))
+    node.is_some_and(|id| elements.nodes[id].is_tool())
+        || topic.is_some_and(|id| is_quiet(elements.topics[id].name.as_str()))
 }
 
 /// Adds the changes of nodes' lifecycle states.
 fn lifecycles(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
+    let mut states: std::collections::BTreeMap<NodeId, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();
     for change in &context.history.transitions {
         let before = states.insert(change.node, change.state.clone());

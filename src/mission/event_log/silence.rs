@@ -7,7 +7,7 @@ use super::{EventId, Kind};
 use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
 use crate::graph::history::{Bound, Sender};
-use crate::graph::{Element, NodeId, Record, TopicId};
+use crate::graph::{Element, NodeId, Record};
 
 /// The beginning and end of a silence; `None` if to the end of the mission.
 type Silence = (Stamp, Option<Stamp>);
@@ -64,11 +64,11 @@ impl Gone {
 }
 
 /// The senders of each node, or of each topic.
-fn by<'a>(
+fn by<'a, I: Ord>(
     context: &LogInput<'a>,
-    key: impl Fn(&Sender) -> Option<u32>,
-) -> BTreeMap<TopicId, Vec<&'a Sender>> {
-    let mut of: BTreeMap<u32, Vec<&Sender>> = BTreeMap::new();
+    key: impl Fn(&Sender) -> Option<I>,
+) -> BTreeMap<I, Vec<&'a Sender>> {
+    let mut of: BTreeMap<I, Vec<&Sender>> = BTreeMap::new();
     for sender in &context.history.sending.senders {
         if let Some(key) = key(sender) {
             of.entry(key).or_default().push(sender);

@@ -39,9 +39,8 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
             format!("{change}{}", too(mission, parts, event))
         }
         (Detail::Senders { from, to }, _) => {
-            let names = |nodes: &[u32]| {
-                let name =
-                    |id: &u32| visible(elements.nodes[*id as usize].name.as_str()).into_owned();
+            let names = |nodes: &[NodeId]| {
+                let name = |id: &NodeId| visible(elements.nodes[*id].name.as_str()).into_owned();
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
             // A third node that publishes is the mux between them.
@@ -154,7 +153,7 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
         }
         let is_edge = node.is_some() && node == own.0;
         let name = match topic.filter(|_| is_edge) {
-            Some(topic) => visible(elements.topics[topic as usize].name.as_str()).into_owned(),
+            Some(topic) => visible(elements.topics[topic].name.as_str()).into_owned(),
             None => name(elements, part),
         };
         match part.kind {
@@ -204,7 +203,7 @@ fn name(elements: &Elements, event: &Event) -> String {
     let (node, topic) = elements.names(event.what);
     match (event.what, node.map(visible), topic.map(visible)) {
         (Element::Node(id), ..) if event.kind == Kind::Restarted => {
-            visible(&elements.nodes[id as usize].role).into_owned()
+            visible(&elements.nodes[id].role).into_owned()
         }
         (Element::Subscribe(_), Some(node), Some(topic)) => format!("{topic} → {node}"),
         (_, Some(node), Some(topic)) => format!("{node} → {topic}"),
@@ -222,13 +221,13 @@ fn with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     // Others may depend on it, such as its subscribers.
     for part in parts.filter(|part| elements.ends(part.what).0 == node) {
         match part.what {
-            Element::Publish(edge) => sends.insert(elements.publishes[edge as usize].topic),
-            Element::Subscribe(edge) => takes.insert(elements.subscribes[edge as usize].topic),
+            Element::Publish(edge) => sends.insert(elements.publishes[edge].topic),
+            Element::Subscribe(edge) => takes.insert(elements.subscribes[edge].topic),
             _ => false,
         };
     }
     let space = node.map_or("", |id| {
-        crate::base::name::namespace(elements.nodes[id as usize].name.as_str())
+        crate::base::name::namespace(elements.nodes[id].name.as_str())
     });
     let phrases = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
         let names = short_topics(elements, &topics, space);
@@ -247,7 +246,7 @@ const ACTION: [&str; 5] = ["goal", "cancel", "status", "feedback", "result"];
 
 /// The names of topics within a namespace, actions as one name, without housekeeping.
 fn short_topics(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) -> Vec<String> {
-    let full = |id: &TopicId| elements.topics[*id as usize].name.as_str();
+    let full = |id: &TopicId| elements.topics[*id].name.as_str();
     let action = |name: &str| {
         let (action, part) = name.rsplit_once('/')?;
         ACTION.contains(&part).then(|| action.to_owned())

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::base::name::is_quiet;
 use crate::base::words;
+use crate::graph::{NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::phases::knows_publishers;
 
@@ -52,14 +53,14 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
 
 fn map(mission: &Mission) -> Option<FigureInfo> {
     let elements = &mission.elements;
-    let is_shown = |node: u32| {
-        let node = elements.nodes.get(node as usize);
+    let is_shown = |node: NodeId| {
+        let node = elements.nodes.get(node);
         node.is_some_and(|n| !n.is_tool())
     };
-    let sent: BTreeSet<u32> = ends(&elements.publishes, &is_shown);
-    let subscribed: BTreeSet<u32> = ends(&elements.subscribes, &is_shown);
+    let sent: BTreeSet<TopicId> = ends(&elements.publishes, &is_shown);
+    let subscribed: BTreeSet<TopicId> = ends(&elements.subscribes, &is_shown);
     let both = sent.intersection(&subscribed).filter(|topic| {
-        let topic = elements.topics.get(**topic as usize);
+        let topic = elements.topics.get(**topic);
         topic.is_some_and(|t| !is_quiet(t.name.as_str()))
     });
     let both = both.count();
@@ -73,7 +74,7 @@ fn map(mission: &Mission) -> Option<FigureInfo> {
 }
 
 /// The topics of edges whose nodes are shown.
-fn ends(edges: &[crate::graph::Edge], is_shown: &dyn Fn(u32) -> bool) -> BTreeSet<u32> {
+fn ends(edges: &[crate::graph::Edge], is_shown: &dyn Fn(NodeId) -> bool) -> BTreeSet<TopicId> {
     let shown = edges.iter().filter(|e| is_shown(e.node));
     shown.map(|e| e.topic).collect()
 }

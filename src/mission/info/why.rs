@@ -80,16 +80,18 @@ fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
 /// The elements with these names, each with a description.
 fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
     let all = &mission.elements;
-    let node = |edge: &Edge| all.nodes[edge.node as usize].name.as_str();
-    let topic = |edge: &Edge| all.topics[edge.topic as usize].name.as_str();
+    let node = |edge: &Edge| all.nodes[edge.node].name.as_str();
+    let topic = |edge: &Edge| all.topics[edge.topic].name.as_str();
     let mut found = Vec::new();
     if let [name] = names {
-        let nodes = (0..)
-            .zip(&all.nodes)
+        let nodes = all
+            .nodes
+            .with_ids()
             .filter(|(_, n)| n.name.as_str() == name);
         found.extend(nodes.map(|(id, n)| (Element::Node(id), format!("node {}", n.name))));
-        let topics = (0..)
-            .zip(&all.topics)
+        let topics = all
+            .topics
+            .with_ids()
             .filter(|(_, t)| t.name.as_str() == name);
         found.extend(topics.map(|(id, t)| (Element::Topic(id), format!("topic {}", t.name))));
         return found;

@@ -11,7 +11,8 @@ use super::sending::SendingJson;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
-    Edge, EdgeState, Elements, Measures, Node, NodeState, State, Topic, TopicState,
+    Edge, EdgeId, EdgeState, Elements, Measures, Node, NodeId, NodeState, State, Topic, TopicId,
+    TopicState,
 };
 
 /// A text, borrowed when written.
@@ -163,7 +164,7 @@ impl<'a> NodeJson<'a> {
         }
     }
 
-    pub(crate) fn state(&self, id: u32) -> NodeState {
+    pub(crate) fn state(&self, id: NodeId) -> NodeState {
         let numbers = self.numbers.as_ref();
         let lifecycle = numbers.and_then(|n| n.lifecycle.as_deref());
         NodeState {
@@ -202,7 +203,7 @@ impl<'a> TopicJson<'a> {
         }
     }
 
-    pub(crate) fn state(&self, id: u32) -> TopicState {
+    pub(crate) fn state(&self, id: TopicId) -> TopicState {
         let none = TopicNumbers::default();
         let numbers = self.numbers.as_ref().unwrap_or(&none);
         TopicState {
@@ -223,8 +224,8 @@ impl<'a> PublishJson<'a> {
     /// A publication or subscription, as a node.
     pub(crate) fn new(edge: &'a Edge, elements: &'a Elements, seen: Option<&EdgeState>) -> Self {
         Self {
-            node: elements.nodes[edge.node as usize].name.as_str().into(),
-            topic: elements.topics[edge.topic as usize].name.as_str().into(),
+            node: elements.nodes[edge.node].name.as_str().into(),
+            topic: elements.topics[edge.topic].name.as_str().into(),
             edge: EdgeJson {
                 state: seen.map(|s| s.state.word().into()),
                 degree: seen.map(|s| s.confidence.word().into()),
@@ -250,7 +251,7 @@ impl<'a> From<PublishJson<'a>> for SubscribeJson<'a> {
 }
 
 impl EdgeJson<'_> {
-    pub(crate) fn state(&self, id: u32) -> EdgeState {
+    pub(crate) fn state(&self, id: EdgeId) -> EdgeState {
         let none = EdgeNumbers::default();
         let numbers = self.numbers.as_ref().unwrap_or(&none);
         EdgeState {

@@ -101,7 +101,7 @@ pub(crate) enum DetailJson<'a> {
 impl<'a> DetailJson<'a> {
     pub(crate) fn new(detail: &Detail, elements: &'a Elements) -> Self {
         let names = |nodes: &[NodeId]| {
-            let name = |id: &NodeId| elements.nodes[*id as usize].name.as_str().into();
+            let name = |id: &NodeId| elements.nodes[*id].name.as_str().into();
             nodes.iter().map(name).collect()
         };
         match detail {
@@ -188,7 +188,7 @@ pub(crate) fn text(text: &str) -> String {
 /// The role of the node that an event is about.
 fn role(what: Element, elements: &Elements) -> Option<&str> {
     let (node, _) = elements.ends(what);
-    node.map(|id| &*elements.nodes[id as usize].role)
+    node.map(|id| &*elements.nodes[id].role)
 }
 
 /// The log of rows that were read; `None` if one of them is about an element that is not in any window.

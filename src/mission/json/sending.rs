@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::elements::{PublishJson, Text, TopicJson, spans};
 use crate::base::time::Stamp;
 use crate::graph::history::{Sender, Sending, Stretch};
-use crate::graph::{Elements, NodeId, TopicId};
+use crate::graph::{ById, Elements, NodeId, TopicId};
 
 /// A stretch: first and last message, their number, the usual period, flags.
 type StretchJson = (i64, i64, u64, i64, u8);
@@ -115,13 +115,15 @@ pub(super) fn sending(
         };
         all.insert((topic, sender.node), sender);
     }
-    let mut pauses = Vec::new();
+    let mut pauses = ById::default();
     let own = topics.iter().filter(|one| !one.pauses.is_empty());
     let own = own.map(|one| (&one.name, &one.pauses));
     for (name, found) in own.chain(old.pauses.iter().map(|one| (&one.topic, &one.spans))) {
         if let Some(topic) = elements.topic(name) {
-            pauses.resize(elements.topics.len(), Vec::new());
-            pauses[topic as usize] = spans(found);
+            if pauses.is_empty() {
+                pauses = ById::like(&elements.topics, Vec::new());
+            }
+            pauses[topic] = spans(found);
         }
     }
     Ok(Sending {

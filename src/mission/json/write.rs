@@ -13,7 +13,7 @@ use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, Topi
 use super::runs::JsonColumns;
 use super::sending::{SendingJson, senders};
 use crate::bag::Report;
-use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
+use crate::graph::{ById, Edge, EdgeId, EdgeState, Element, Elements, Graph};
 use crate::mission::{Mission, Places, Window};
 
 /// The schema that is written and read.
@@ -190,13 +190,13 @@ impl<'a> Serialize for WindowOf<'a> {
         head(window, &mut map)?;
         if let Some(graph) = &self.graph {
             let nodes = graph.nodes.iter();
-            let nodes = nodes.map(|s| NodeJson::new(&all.nodes[s.id as usize], Some(s)));
+            let nodes = nodes.map(|s| NodeJson::new(&all.nodes[s.id], Some(s)));
             map.serialize_entry("nodes", &List(nodes))?;
             let topics = graph.topics.iter();
-            let topics = topics.map(|s| TopicJson::new(&all.topics[s.id as usize], Some(s)));
+            let topics = topics.map(|s| TopicJson::new(&all.topics[s.id], Some(s)));
             map.serialize_entry("topics", &List(topics))?;
-            let edge = |edges: &'a [Edge]| {
-                move |s: &EdgeState| PublishJson::new(&edges[s.id as usize], all, Some(s))
+            let edge = |edges: &'a ById<EdgeId, Edge>| {
+                move |s: &EdgeState| PublishJson::new(&edges[s.id], all, Some(s))
             };
             let publishes = graph.publishes.iter().map(edge(&all.publishes));
             map.serialize_entry("publishes", &List(publishes))?;
@@ -221,15 +221,15 @@ fn elements(mission: &Mission, is_runs: bool) -> impl Iterator<Item = ElementJso
         json.edge.sending = sending;
         json
     };
-    let nodes = (0..).zip(&all.nodes).map(move |(id, node)| {
+    let nodes = all.nodes.with_ids().map(move |(id, node)| {
         ElementJson::Node(NodeJson {
             columns: columns(Element::Node(id)),
             ..NodeJson::new(node, None)
         })
     });
     let unnamed = sent.clone();
-    let topics = (0..).zip(&all.topics).map(move |(id, topic)| {
-        let pauses = mission.sending.pauses.get(id as usize);
+    let topics = all.topics.with_ids().map(move |(id, topic)| {
+        let pauses = mission.sending.pauses.get(id);
         ElementJson::Topic(TopicJson {
             columns: columns(Element::Topic(id)),
             sending: unnamed(id, None),
@@ -237,11 +237,11 @@ fn elements(mission: &Mission, is_runs: bool) -> impl Iterator<Item = ElementJso
             ..TopicJson::new(topic, None)
         })
     });
-    let publishes = (0..).zip(&all.publishes).map(move |(id, one)| {
+    let publishes = all.publishes.with_ids().map(move |(id, one)| {
         let sending = sent(one.topic, Some(one.node));
         ElementJson::Publish(edge(Element::Publish(id), one, sending))
     });
-    let subscribes = (0..).zip(&all.subscribes).map(move |(id, one)| {
+    let subscribes = all.subscribes.with_ids().map(move |(id, one)| {
         ElementJson::Subscribe(edge(Element::Subscribe(id), one, SendingJson::default()))
     });
     nodes.chain(topics).chain(publishes).chain(subscribes)

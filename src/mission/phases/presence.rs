@@ -134,11 +134,11 @@ fn subjects(
     knows_publishers: bool,
 ) -> impl Iterator<Item = (Element, PresentThing)> {
     let role = |id: NodeId| {
-        let node = elements.nodes.get(id as usize)?;
+        let node = elements.nodes.get(id)?;
         (!node.is_tool()).then(|| Arc::clone(&node.role))
     };
     let name = |id: TopicId| {
-        let topic = elements.topics.get(id as usize)?;
+        let topic = elements.topics.get(id)?;
         Some(topic.name.shared()).filter(|name| !is_quiet(name))
     };
     let subject = move |what| match (what, elements.ends(what)) {
@@ -161,7 +161,7 @@ pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
     }
     let (mut all, mut known) = (0_u64, 0_u64);
     for sender in &sending.senders {
-        let topic = elements.topics.get(sender.topic as usize);
+        let topic = elements.topics.get(sender.topic);
         if topic.is_none_or(|topic| is_quiet(topic.name.as_str())) {
             continue;
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::StepSource;
 use crate::base::time::Span;
 use crate::draw::figure::marks::Sign;
-use crate::graph::Element;
+use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::EventId;
 use crate::mission::event_log::Detail;
 
@@ -49,14 +49,10 @@ impl StepSource<'_> {
     }
 
     /// The hand-overs of the log in the step into phase `k`: topic, before, after.
-    pub(super) fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EventId)> {
+    pub(super) fn handed(&self, k: usize) -> Vec<(TopicId, Arc<str>, Arc<str>, EventId)> {
         let source = self.sheet.source;
-        let role = |nodes: &[u32]| {
-            let node = source
-                .mission
-                .elements
-                .nodes
-                .get(*nodes.first()? as usize)?;
+        let role = |nodes: &[NodeId]| {
+            let node = source.mission.elements.nodes.get(*nodes.first()?)?;
             Some(Arc::clone(&node.role))
         };
         let headlines = source.mission.log.headlines(self.time(k));

@@ -187,7 +187,7 @@ impl RqtWriter<'_> {
         let (Some(_), Some(topic)) = all.ends(*members.first()?) else {
             return None;
         };
-        let qos = all.topics.get(topic as usize)?.qos.as_ref()?;
+        let qos = all.topics.get(topic)?.qos.as_ref()?;
         (!qos.is_empty()).then(|| qos.to_string())
     }
 

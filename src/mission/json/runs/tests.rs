@@ -6,7 +6,7 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
-use crate::graph::{Edge, Elements, Graph, Node, Topic};
+use crate::graph::{Edge, Elements, Graph, Node, NodeId, Topic, TopicId};
 use crate::mission::{EventLog, Json, JsonForm, Mission, Sending, Window, read_json};
 
 fn elements() -> Elements {
@@ -29,16 +29,16 @@ fn elements() -> Elements {
         unknown_publishers: Some(1),
     };
     let edge = |id| Edge {
-        node: id,
-        topic: id,
+        node: NodeId(id),
+        topic: TopicId(id),
         evidence: Evidence::NONE,
         first: None,
         last: None,
         runs: Vec::new(),
     };
     Elements {
-        nodes: ["/a", "/b", "/c"].map(node).to_vec(),
-        topics: ["/t", "/u", "/v"].map(topic).to_vec(),
+        nodes: ["/a", "/b", "/c"].map(node).to_vec().into(),
+        topics: ["/t", "/u", "/v"].map(topic).to_vec().into(),
         publishes: (0..3).map(edge).collect(),
         subscribes: (0..3).map(edge).collect(),
     }

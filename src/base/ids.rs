@@ -1,0 +1,158 @@
+//! Ids as types, and lists with a value per id.
+
+use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut, Index, IndexMut};
+
+/// The number of a thing in the list of all things of its kind, counted from 0.
+pub trait Id: Copy {
+    /// The id of the thing at an index.
+    fn of(at: usize) -> Self;
+    /// The index of the thing with this id.
+    fn at(self) -> usize;
+}
+
+impl Id for u32 {
+    fn of(at: usize) -> Self {
+        Self::try_from(at).unwrap_or(Self::MAX)
+    }
+
+    fn at(self) -> usize {
+        self as usize
+    }
+}
+
+/// Declares types of ids.
+macro_rules! ids {
+    ($($(#[$doc:meta])* $name:ident),* $(,)?) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u32);
+
+        impl $crate::base::ids::Id for $name {
+            fn of(at: usize) -> Self {
+                Self(Id::of(at))
+            }
+
+            fn at(self) -> usize {
+                self.0.at()
+            }
+        }
+    )*};
+}
+pub(crate) use ids;
+
+/// A list with a value per id: a slice that ids index.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ById<I, T> {
+    list: Vec<T>,
+    ids: PhantomData<I>,
+}
+
+impl<I: Id, T> ById<I, T> {
+    /// The value of an id; `None` beyond the end of the list.
+    pub fn get(&self, id: I) -> Option<&T> {
+        self.list.get(id.at())
+    }
+
+    /// As [`ById::get`], to change the value.
+    pub fn get_mut(&mut self, id: I) -> Option<&mut T> {
+        self.list.get_mut(id.at())
+    }
+
+    /// Every id.
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = I> + Clone + use<I, T> {
+        (0..self.list.len()).map(I::of)
+    }
+
+    /// Every value with its id.
+    pub fn with_ids(&self) -> impl ExactSizeIterator<Item = (I, &T)> + Clone {
+        self.list
+            .iter()
+            .enumerate()
+            .map(|(at, value)| (I::of(at), value))
+    }
+
+    /// Adds the value of the next id, and returns that id.
+    pub(crate) fn push(&mut self, value: T) -> I {
+        self.list.push(value);
+        I::of(self.list.len() - 1)
+    }
+
+    /// Reserves space for exactly this many more values.
+    pub(crate) fn reserve_exact(&mut self, many: usize) {
+        self.list.reserve_exact(many);
+    }
+
+    /// The same value for each id of another list.
+    pub(crate) fn like<U>(other: &ById<I, U>, value: T) -> Self
+    where
+        T: Clone,
+    {
+        vec![value; other.len()].into()
+    }
+}
+
+impl<I, T> Default for ById<I, T> {
+    fn default() -> Self {
+        Vec::new().into()
+    }
+}
+
+impl<I, T> From<Vec<T>> for ById<I, T> {
+    fn from(list: Vec<T>) -> Self {
+        let ids = PhantomData;
+        Self { list, ids }
+    }
+}
+
+impl<I, T> FromIterator<T> for ById<I, T> {
+    fn from_iter<L: IntoIterator<Item = T>>(list: L) -> Self {
+        Vec::from_iter(list).into()
+    }
+}
+
+impl<I, T> IntoIterator for ById<I, T> {
+    type Item = T;
+    type IntoIter = std::vec::IntoIter<T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.list.into_iter()
+    }
+}
+
+impl<'a, I, T> IntoIterator for &'a ById<I, T> {
+    type Item = &'a T;
+    type IntoIter = std::slice::Iter<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.list.iter()
+    }
+}
+
+impl<I, T> Deref for ById<I, T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.list
+    }
+}
+
+impl<I, T> DerefMut for ById<I, T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.list
+    }
+}
+
+impl<I: Id, T> Index<I> for ById<I, T> {
+    type Output = T;
+
+    fn index(&self, id: I) -> &T {
+        &self.list[id.at()]
+    }
+}
+
+impl<I: Id, T> IndexMut<I> for ById<I, T> {
+    fn index_mut(&mut self, id: I) -> &mut T {
+        &mut self.list[id.at()]
+    }
+}
