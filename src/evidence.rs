@@ -31,6 +31,7 @@ pub use observation::{Confidence, EvidenceLine};
 pub(crate) use source::Source;
 
 use message::{definition, parameters};
+use source::Read::{Log, Parameters, Payload};
 use source::{
     NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery, duplicate,
     dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, messages_lost, metrics,
@@ -50,22 +51,24 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "statistics",
         about: "`/statistics` of ROS 1 (`rosgraph_msgs/TopicStatistics`)",
-        reads: &[(statistics::SHAPE, statistics::read)],
+        reads: &[(&[statistics::SHAPE], Payload(statistics::read))],
         ..NOTHING
     },
     Source {
         word: "topic_statistics",
         about: "`/topic_statistics` of graph-monitor (`rosgraph_monitor_msgs/msg/TopicStatistics`)",
-        reads: &[(topic_statistics::SHAPE, topic_statistics::read)],
+        reads: &[(&[topic_statistics::SHAPE], Payload(topic_statistics::read))],
         ..NOTHING
     },
     Source {
         word: "rosgraph",
         about: "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`), and single nodes of nodl (`rosgraph_msgs/msg/Node`)",
         reads: &[
-            (rosgraph::SHAPE, rosgraph::read),
-            (rosgraph::OLD_SHAPE, rosgraph::read),
-            (rosgraph::NODE_SHAPE, rosgraph::read_node),
+            (
+                &[rosgraph::SHAPE, rosgraph::OLD_SHAPE],
+                Payload(rosgraph::read),
+            ),
+            (&[rosgraph::NODE_SHAPE], Payload(rosgraph::read_node)),
         ],
         holds: true,
         conclude: &[rosgraph::conclude],
@@ -74,20 +77,20 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "discovery",
         about: "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)",
-        reads: &[(discovery::SHAPE, discovery::read)],
+        reads: &[(&[discovery::SHAPE], Payload(discovery::read))],
         ..NOTHING
     },
     Source {
         word: "lifecycle",
         about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
-        reads: &[(lifecycle::SHAPE, lifecycle::read)],
+        reads: &[(&[lifecycle::SHAPE], Payload(lifecycle::read))],
         own: true,
         ..NOTHING
     },
     Source {
         word: "service_event",
         about: "`<service>/_service_event` of service introspection",
-        reads: &[(service_event::SHAPE, service_event::read)],
+        reads: &[(&[service_event::SHAPE], Payload(service_event::read))],
         ..NOTHING
     },
     Source {
@@ -100,38 +103,35 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
-        reads: &[(parameters::SHAPE, parameter_events::read)],
+        reads: &[(&[parameters::SHAPE], Parameters(parameter_events::read))],
         ..NOTHING
     },
     Source {
         word: "qos_overrides",
         about: "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end",
-        reads: &[(parameters::SHAPE, qos_overrides::read)],
+        reads: &[(&[parameters::SHAPE], Parameters(qos_overrides::read))],
         ..NOTHING
     },
     Source {
         word: "sim_time",
         about: "`use_sim_time` in parameter events: such a node subscribes to `/clock`",
-        reads: &[(parameters::SHAPE, sim_time::read)],
+        reads: &[(&[parameters::SHAPE], Parameters(sim_time::read))],
         own: true,
         ..NOTHING
     },
     Source {
         word: "links",
         about: "log records of roscpp about its connections",
-        reads: &[
-            (definition::LOG, links::read),
-            (definition::OLD_LOG, links::read),
-        ],
+        reads: &[(definition::ROS1_LOGS, Payload(links::read))],
         ..NOTHING
     },
     Source {
         word: "diagnostics",
         about: "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`",
-        reads: &[
-            (diagnostics::SHAPE, diagnostics::read),
-            (diagnostics::SHAPE2, diagnostics::read),
-        ],
+        reads: &[(
+            &[diagnostics::SHAPE, diagnostics::SHAPE2],
+            Payload(diagnostics::read),
+        )],
         conclude: &[diagnostics::conclude],
         ..NOTHING
     },
@@ -139,9 +139,8 @@ pub const SOURCES: &[Source] = &[
         word: "rosout",
         about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
         reads: &[
-            (definition::LOG, rosout::read),
-            (definition::OLD_LOG, rosout::read),
-            (definition::LOG2, rosout_ros2::read),
+            (definition::ROS1_LOGS, Payload(rosout::read)),
+            (&[definition::LOG2], Payload(rosout_ros2::read)),
         ],
         conclude: &[rosout::conclude, rosout_ros2::conclude],
         own: true,
@@ -150,36 +149,28 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "log_text",
         about: "log messages in which a node names one of its topics",
-        reads: &[
-            (definition::LOG, log_text::read),
-            (definition::OLD_LOG, log_text::read),
-            (definition::LOG2, log_text::read),
-        ],
+        reads: &[(definition::LOGS, Log(log_text::read))],
         conclude: &[log_text::conclude],
         ..NOTHING
     },
     Source {
         word: "duplicate",
         about: "log texts about two nodes of one name",
-        reads: &[
-            (definition::LOG, duplicate::read),
-            (definition::OLD_LOG, duplicate::read),
-            (definition::LOG2, duplicate::read),
-        ],
+        reads: &[(definition::LOGS, Log(duplicate::read))],
         conclude: &[duplicate::conclude],
         ..NOTHING
     },
     Source {
         word: "messages_lost",
         about: "`/events/rosbag2_messages_lost`: messages that the recorder lost (`rosbag2_interfaces/msg/MessagesLostEvent`)",
-        reads: &[(messages_lost::SHAPE, messages_lost::read)],
+        reads: &[(&[messages_lost::SHAPE], Payload(messages_lost::read))],
         conclude: &[messages_lost::conclude],
         ..NOTHING
     },
     Source {
         word: "metrics",
         about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
-        reads: &[(metrics::SHAPE, metrics::read)],
+        reads: &[(&[metrics::SHAPE], Payload(metrics::read))],
         conclude: &[metrics::conclude],
         own: true,
         ..NOTHING
@@ -199,7 +190,7 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "action",
         about: "an action's server publishes status, feedback and result and subscribes to goal and cancel; its client does the reverse",
-        reads: &[(action::SHAPE, action::read)],
+        reads: &[(&[action::SHAPE], Payload(action::read))],
         conclude: &[action::conclude],
         ..NOTHING
     },
@@ -212,22 +203,14 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "echo",
         about: "log messages that quote a recorded message",
-        reads: &[
-            (definition::LOG, echo::read),
-            (definition::OLD_LOG, echo::read),
-            (definition::LOG2, echo::read),
-        ],
+        reads: &[(definition::LOGS, Log(echo::read))],
         conclude: &[echo::conclude],
         ..NOTHING
     },
     Source {
         word: "contract",
         about: "well-known nodes, by name and source file: their topics of the right type",
-        reads: &[
-            (definition::LOG, contract::read),
-            (definition::OLD_LOG, contract::read),
-            (definition::LOG2, contract::read),
-        ],
+        reads: &[(definition::LOGS, Log(contract::read))],
         conclude: &[contract::conclude],
         ..NOTHING
     },
@@ -270,11 +253,7 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "recorder",
         about: "the recorder subscribes to everything it records; its log records name its source file",
-        reads: &[
-            (definition::LOG, recorder::read),
-            (definition::OLD_LOG, recorder::read),
-            (definition::LOG2, recorder::read),
-        ],
+        reads: &[(definition::LOGS, Log(recorder::read))],
         conclude: &[recorder::conclude],
         ..NOTHING
     },

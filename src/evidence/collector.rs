@@ -270,7 +270,7 @@ impl Collector {
                 time: Some(message.time),
             };
             let done = PayloadCursor::new(&stream.connection.encoding, message.data)
-                .and_then(|mut payload| read(&mut context, &mut payload));
+                .and_then(|mut payload| read.read(&mut context, &mut payload));
             if done.is_err() {
                 self.notices
                     .add(undecodable(stream, "some messages do not have its layout"));

@@ -20,6 +20,7 @@ use crate::evidence::inference::{
 };
 use crate::evidence::observation::{Measurement, Name, Observations};
 use crate::evidence::source::contract::Owners;
+use crate::evidence::source::row;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::substitution::ANONYMOUS;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
@@ -373,7 +374,7 @@ fn stated(
     } else {
         ("topology", Confidence::Stated)
     };
-    let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    let source = row(word);
     if known.facts.is_watched(what.ends()) {
         known.facts.pieces.push(EvidenceLine {
             time: None,
@@ -382,12 +383,7 @@ fn stated(
             text: entry.place.clone(),
         });
     }
-    let inference = |when| Inference {
-        what,
-        source,
-        confidence,
-        when,
-    };
+    let inference = |when| Inference::new(source, what, confidence, when);
     known.add(inference(when));
     // The time of its launch is unknown: assume that it exists while others in its namespace do.
     if entry.declared

@@ -11,11 +11,11 @@ use std::sync::Arc;
 use crate::bag::Connection;
 use crate::base::name::{OWN_NODE, plain_type};
 use crate::base::time::Stamp;
-use crate::evidence::SOURCES;
 use crate::evidence::inference::closed::Closed;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
 };
+use crate::evidence::source::word;
 use crate::evidence::times::SeriesId;
 
 pub(crate) use incident::{Incident, IncidentKind};
@@ -139,6 +139,20 @@ pub(crate) struct Inference {
 }
 
 impl Inference {
+    pub(crate) fn new(
+        source: SourceId,
+        what: ElementKey,
+        confidence: Confidence,
+        when: Validity,
+    ) -> Self {
+        Self {
+            what,
+            source,
+            confidence,
+            when,
+        }
+    }
+
     /// Renumbers the names.
     pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
         self.what = self.what.renamed(to);
@@ -237,7 +251,7 @@ impl<'a> Conclusions<'a> {
             self.worded.insert((inference.what, inference.source));
             self.facts.pieces.push(EvidenceLine {
                 time,
-                source: SOURCES.get(inference.source).map_or("", |s| s.word),
+                source: word(inference.source),
                 confidence: inference.confidence,
                 text,
             });
@@ -255,12 +269,8 @@ impl<'a> Conclusions<'a> {
         words: impl FnOnce(&Self) -> String,
     ) {
         if !self.knows(what) && !self.denies(what) {
-            let inference = Inference {
-                what,
-                source,
-                confidence: Confidence::Inferred,
-                when: Validity::Like(basis),
-            };
+            let when = Validity::Like(basis);
+            let inference = Inference::new(source, what, Confidence::Inferred, when);
             self.because(inference, None, words);
         }
     }
@@ -280,12 +290,8 @@ impl<'a> Conclusions<'a> {
         }
         for at in self.recorded.get(&topic).cloned().unwrap_or_default() {
             if self.streams[at].publisher.is_none() {
-                let inference = Inference {
-                    what,
-                    source,
-                    confidence: Confidence::Inferred,
-                    when: Validity::Messages(at),
-                };
+                let when = Validity::Messages(at);
+                let inference = Inference::new(source, what, Confidence::Inferred, when);
                 self.because(inference, None, &words);
             }
         }
@@ -401,12 +407,8 @@ impl<'a> Conclusions<'a> {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
         }
-        self.add(Inference {
-            what,
-            source,
-            confidence: Confidence::Inferred,
-            when: Validity::Like(basis),
-        });
+        let when = Validity::Like(basis);
+        self.add(Inference::new(source, what, Confidence::Inferred, when));
     }
 
     /// Adds, by a convention, a subscription to `topic` by a node that publishes `basis`.

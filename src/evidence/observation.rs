@@ -11,6 +11,7 @@ use std::sync::Arc;
 use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
+use crate::evidence::source::word;
 use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
@@ -271,11 +272,11 @@ impl Observations {
             .map_or_else(|| "".into(), Arc::clone)
     }
 
-    /// Keeps the text of an observation if `why` requests its names.
-    pub(crate) fn explain(
+    /// Adds an observation by `source`, at `time` if it has one; keeps its explanation if `why` requests its names.
+    pub(crate) fn state(
         &mut self,
+        source: SourceId,
         said: Statement,
-        source: &'static str,
         time: Option<Stamp>,
         words: impl FnOnce() -> String,
     ) {
@@ -284,12 +285,13 @@ impl Observations {
             if !text.is_empty() {
                 self.pieces.push(EvidenceLine {
                     time,
-                    source,
+                    source: word(source),
                     confidence: said.confidence,
                     text,
                 });
             }
         }
+        self.add(source, said, time);
     }
 
     /// Whether `why` requests an element with these names.
@@ -441,16 +443,23 @@ pub(crate) struct Statement {
     pub(crate) snapshot: Option<Name>,
 }
 
+impl Statement {
+    /// An observation outside of snapshots.
+    pub(crate) fn new(observation: Observation, confidence: Confidence) -> Self {
+        Self {
+            observation,
+            confidence,
+            snapshot: None,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn alive(node: Name) -> Statement {
-        Statement {
-            observation: Observation::Node(node),
-            confidence: Confidence::Stated,
-            snapshot: None,
-        }
+        Statement::new(Observation::Node(node), Confidence::Stated)
     }
 
     #[test]

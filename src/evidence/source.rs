@@ -40,9 +40,11 @@ use crate::base::name::{in_space, plain_type};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, Stream};
-use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::{LayoutFit, MessageLayout};
 use crate::evidence::message::dynamic::MessageSchema;
+use crate::evidence::message::log::LogRecord;
+use crate::evidence::message::parameters::ParameterEvent;
 use crate::evidence::observation::{
     Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
 };
@@ -54,7 +56,7 @@ pub struct Source {
     /// A description in one line.
     pub about: &'static str,
     /// The layouts of the messages that it reads.
-    pub(crate) reads: &'static [(MessageLayout, Read)],
+    pub(crate) reads: &'static [(&'static [MessageLayout], Read)],
     /// Whether nodes make these observations about themselves, so that the node was running at that time.
     pub(crate) own: bool,
     /// Whether each of its snapshots is valid until the next one: they are made whenever something changes.
@@ -114,6 +116,25 @@ impl SourceContext<'_> {
         });
     }
 
+    /// Adds an observation that the message states, made now, with its explanation.
+    pub(crate) fn states(&mut self, observation: Observation, words: impl FnOnce() -> String) {
+        self.observation(observation, Confidence::Stated, words);
+    }
+
+    /// Adds an observation that the message states as a part of a snapshot.
+    pub(crate) fn states_in(
+        &mut self,
+        snapshot: Name,
+        observation: Observation,
+        words: impl FnOnce() -> String,
+    ) {
+        let said = Statement {
+            snapshot: Some(snapshot),
+            ..Statement::new(observation, Confidence::Stated)
+        };
+        self.facts.state(self.source, said, self.time, words);
+    }
+
     /// Adds an observation, made now, with its explanation.
     pub(crate) fn observation(
         &mut self,
@@ -121,25 +142,47 @@ impl SourceContext<'_> {
         confidence: Confidence,
         words: impl FnOnce() -> String,
     ) {
-        let said = Statement {
-            observation,
-            confidence,
-            snapshot: None,
-        };
-        self.observe(said, words);
-    }
-
-    /// Adds an observation that may belong to a snapshot.
-    pub(crate) fn observe(&mut self, said: Statement, words: impl FnOnce() -> String) {
-        let word = SOURCES.get(self.source).map_or("", |s| s.word);
-        self.facts.explain(said, word, self.time, words);
-        self.facts.add(self.source, said, self.time);
+        let said = Statement::new(observation, confidence);
+        self.facts.state(self.source, said, self.time, words);
     }
 }
 
 /// A reader of one layout.
-pub(crate) type Read =
-    fn(&mut SourceContext<'_>, &mut PayloadCursor<'_>) -> cursor::PayloadResult<()>;
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Read {
+    Payload(fn(&mut SourceContext<'_>, &mut PayloadCursor<'_>) -> PayloadResult<()>),
+    Log(fn(&mut SourceContext<'_>, &LogRecord<'_>)),
+    Parameters(fn(&mut SourceContext<'_>, &ParameterEvent<'_>)),
+}
+
+impl Read {
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// If it has another layout.
+    pub(crate) fn read(
+        self,
+        context: &mut SourceContext<'_>,
+        payload: &mut PayloadCursor<'_>,
+    ) -> PayloadResult<()> {
+        match self {
+            Self::Payload(read) => read(context, payload)?,
+            Self::Log(read) => read(context, &LogRecord::read(payload)?),
+            Self::Parameters(read) => read(context, &ParameterEvent::read(payload)?),
+        }
+        Ok(())
+    }
+}
+
+/// The row of the source with this word.
+pub(crate) fn row(word: &str) -> SourceId {
+    SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
+}
+
+/// The word of the source in this row.
+pub(crate) fn word(row: SourceId) -> &'static str {
+    SOURCES.get(row).map_or("", |s| s.word)
+}
 
 /// The sources that read a connection's messages, with their readers; and whether some source knows its type by another
 /// layout.
@@ -148,8 +191,10 @@ pub(crate) fn readers(stream: &Stream, schema: &MessageSchema) -> (Vec<(SourceId
     let mut readers = Vec::new();
     let mut foreign = false;
     for (id, source) in SOURCES.iter().enumerate() {
-        let fits = source.reads.iter().map(|(shape, read)| {
-            let fit = shape.fit(&stream.connection, &type_name, schema.outline());
+        let layouts = source.reads.iter();
+        let layouts = layouts.flat_map(|(layouts, read)| layouts.iter().map(move |l| (l, read)));
+        let fits = layouts.map(|(layout, read)| {
+            let fit = layout.fit(&stream.connection, &type_name, schema.outline());
             (read, fit)
         });
         let known: Vec<_> = fits

@@ -9,10 +9,10 @@ use std::collections::BTreeMap;
 
 use crate::base::name::{is_quiet, plain_type};
 use crate::base::words::count;
-use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::contract::Owners;
+use crate::evidence::source::row;
 
 /// Adds a box for every topic that lacks publishers, according to its recording or to a recorded graph.
 pub(crate) fn conclude(known: &mut Conclusions<'_>) {
@@ -135,7 +135,7 @@ fn add(
     edge: ElementKey,
     words: &dyn Fn() -> String,
 ) {
-    let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    let source = row(word);
     let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
         return;
     };
@@ -147,12 +147,7 @@ fn add(
         Validity::Whole
     };
     for (what, when) in [(ElementKey::Node(node), life), (edge, topics())] {
-        let inference = Inference {
-            what,
-            source,
-            confidence: Confidence::Declared,
-            when,
-        };
+        let inference = Inference::new(source, what, Confidence::Declared, when);
         known.because(inference, None, |_| words());
     }
 }

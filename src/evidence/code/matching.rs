@@ -14,9 +14,9 @@ use super::workspace::{FileDeclaration, Instance};
 use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
-use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::observation::{Confidence, Name, SourceId};
+use crate::evidence::observation::{Confidence, Name};
+use crate::evidence::source::{row, word};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
@@ -281,7 +281,7 @@ fn named(known: &Conclusions<'_>) -> NamedNodes {
             let (_, words) = named
                 .entry(text.to_string())
                 .or_insert((node, BTreeSet::new()));
-            words.extend(SOURCES.get(inference.source).map(|s| s.word));
+            words.extend([word(inference.source)]);
         }
     }
     named
@@ -378,12 +378,8 @@ fn draw(
     if recorded.proved.contains(&what) || !has_room || known.denies(what) {
         return false;
     }
-    let inference = Inference {
-        what,
-        source: row("source"),
-        confidence: Confidence::Declared,
-        when: Validity::Like(ElementKey::Node(node)),
-    };
+    let when = Validity::Like(ElementKey::Node(node));
+    let inference = Inference::new(row("source"), what, Confidence::Declared, when);
     known.because(inference, None, |_| sentence(code, found, words));
     true
 }
@@ -417,9 +413,4 @@ fn sentence(code: &Code, found: &Match<'_>, words: &BTreeSet<&str>) -> String {
         text.extend(["; ", version]);
     }
     text
-}
-
-/// The index of a source in the table.
-pub(super) fn row(word: &str) -> SourceId {
-    SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
 }

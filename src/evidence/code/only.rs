@@ -9,13 +9,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Code;
 use super::declaration::Role;
-use super::matching::{Match, RecordedTopics, matches, resolved, row};
+use super::matching::{Match, RecordedTopics, matches, resolved};
 use super::workspace::{FileDeclaration, Instance};
 use crate::bag::Encoding;
 use crate::base::name::last_part;
 use crate::base::words::{count, worded};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name};
+use crate::evidence::source::row;
 use crate::evidence::topology::launch::join;
 
 worded! {
@@ -347,12 +348,7 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     );
     let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
-        let inference = Inference {
-            what,
-            source: row("source_only"),
-            confidence: Confidence::Declared,
-            when,
-        };
+        let inference = Inference::new(row("source_only"), what, Confidence::Declared, when);
         known.because(inference, None, |_| text.clone());
     }
 }

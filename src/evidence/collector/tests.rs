@@ -177,11 +177,7 @@ fn one_python_record_makes_a_node_one_of_rospy() {
     let mut facts = Observations::default();
     let [script, driver, topic] = ["/a", "/b", "/scan"].map(|name| facts.name(name));
     for node in [script, driver] {
-        let said = Statement {
-            observation: Observation::Lists(node, topic),
-            confidence: Confidence::Stated,
-            snapshot: None,
-        };
+        let said = Statement::new(Observation::Lists(node, topic), Confidence::Stated);
         facts.add(0, said, Some(Stamp(5)));
     }
     facts.rospy.insert(script);

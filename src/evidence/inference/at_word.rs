@@ -61,18 +61,12 @@ impl Conclusions<'_> {
             {
                 continue;
             }
-            self.add(Inference {
-                what,
-                source: fact.source,
-                confidence: fact.confidence,
-                when: match fact.observation {
-                    Observation::Joins(..) | Observation::Begins(_) => {
-                        Validity::Begins { signs, ends }
-                    }
-                    Observation::Refused(..) => Validity::Moments(signs),
-                    _ => Validity::Signs { signs, ends },
-                },
-            });
+            let when = match fact.observation {
+                Observation::Joins(..) | Observation::Begins(_) => Validity::Begins { signs, ends },
+                Observation::Refused(..) => Validity::Moments(signs),
+                _ => Validity::Signs { signs, ends },
+            };
+            self.add(Inference::new(fact.source, what, fact.confidence, when));
         }
     }
 

@@ -55,20 +55,37 @@ pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
 };
 
 /// `rcl_interfaces/msg/Log`.
-pub(crate) const LOG2: MessageLayout = MessageLayout {
-    type_name: "rcl_interfaces/Log",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const LOG2: MessageLayout = MessageLayout::ros2(
+    "rcl_interfaces/Log",
+    &[
         (
             "",
             "Time stamp;byte level;string name;string msg;string file;string function;uint32 line",
         ),
         TIME2,
     ],
-};
+);
+
+/// Log records of ROS 1.
+pub(crate) const ROS1_LOGS: &[MessageLayout] = &[LOG, OLD_LOG];
+
+/// All log records.
+pub(crate) const LOGS: &[MessageLayout] = &[LOG, OLD_LOG, LOG2];
 
 impl MessageLayout {
+    /// The layout of a type of ROS 2, which has no checksum.
+    pub(crate) const fn ros2(
+        type_name: &'static str,
+        fields: &'static [(&'static str, &'static str)],
+    ) -> Self {
+        Self {
+            type_name,
+            md5: "",
+            encoding: Encoding::Cdr,
+            fields,
+        }
+    }
+
     /// Whether the messages of a connection, whose type is this one without `/msg`, can be read; `outline` is that of its
     /// definition.
     pub(crate) fn fit(

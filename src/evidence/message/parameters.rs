@@ -1,15 +1,12 @@
 //! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): parameters of a node that were declared or set.
 
-use crate::bag::Encoding;
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
 
 /// `rcl_interfaces/msg/ParameterEvent`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "rcl_interfaces/ParameterEvent",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "rcl_interfaces/ParameterEvent",
+    &[
         (
             "",
             "Time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
@@ -22,7 +19,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
         ),
         TIME2,
     ],
-};
+);
 
 /// A parameter that was declared or set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

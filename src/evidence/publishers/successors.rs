@@ -11,9 +11,9 @@ use std::io;
 use super::{NamedTopics, SOON_NS};
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
-use crate::evidence::SOURCES;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, Statement};
+use crate::evidence::source::row;
 use crate::evidence::times::{SeriesId, Stamps};
 
 /// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` contains the indices of
@@ -55,17 +55,11 @@ pub(super) fn part(
             streams.push(rest);
         }
     }
-    let source = SOURCES.iter().position(|s| s.word == "connection");
     for (node, time) in gone {
         for observation in [Observation::Node(node), Observation::NodeGone(node)] {
-            let said = Statement {
-                observation,
-                confidence: Confidence::Stated,
-                snapshot: None,
-            };
+            let said = Statement::new(observation, Confidence::Stated);
             let words = || "there is no sign of it after a topic of its own fell silent".to_owned();
-            facts.explain(said, "connection", Some(time), words);
-            facts.add(source.unwrap_or(0), said, Some(time));
+            facts.state(row("connection"), said, Some(time), words);
         }
     }
     facts.finish()

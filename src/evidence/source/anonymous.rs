@@ -18,15 +18,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if known.gone.contains(&Some(node)) || start > last || first.since(start) > LONGEST_NS {
             continue;
         }
-        let inference = Inference {
-            what: ElementKey::Node(node),
-            source,
-            confidence: Confidence::Stated,
-            when: Validity::Begins {
-                signs: vec![start.max(first)],
-                ends: Vec::new(),
-            },
+        let what = ElementKey::Node(node);
+        let when = Validity::Begins {
+            signs: vec![start.max(first)],
+            ends: Vec::new(),
         };
+        let inference = Inference::new(source, what, Confidence::Stated, when);
         known.because(inference, Some(start), |known| {
             format!("the name {} contains this start time", known.text(node))
         });

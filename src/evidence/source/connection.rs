@@ -10,12 +10,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if stream.is_about() {
             continue;
         }
-        let inference = |what, when| Inference {
-            what,
-            source,
-            confidence: Confidence::Measured,
-            when,
-        };
+        let inference = |what, when| Inference::new(source, what, Confidence::Measured, when);
         known.add(inference(
             ElementKey::Topic(stream.topic),
             Validity::Messages(at),
@@ -29,15 +24,15 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             Reliability::Whole | Reliability::Player => {
                 known.add(inference(edge, Validity::Messages(at)));
             }
-            Reliability::Likely => known.add(Inference {
-                confidence: Confidence::Inferred,
-                ..inference(edge, Validity::Messages(at))
-            }),
-            Reliability::First => known.add(Inference {
-                // The tool that wrote this header does not know the publishers of the other messages.
-                confidence: Confidence::Stated,
-                ..inference(edge, Validity::First(at))
-            }),
+            Reliability::Likely => {
+                let when = Validity::Messages(at);
+                known.add(Inference::new(source, edge, Confidence::Inferred, when));
+            }
+            // The tool that wrote this header does not know the publishers of the other messages.
+            Reliability::First => {
+                let when = Validity::First(at);
+                known.add(Inference::new(source, edge, Confidence::Stated, when));
+            }
             Reliability::Gone => {}
         }
     }

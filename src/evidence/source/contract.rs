@@ -15,9 +15,8 @@ use crate::bag::Encoding;
 use crate::base::csv;
 use crate::base::name::{last_part, namespace};
 use crate::evidence::inference::{Conclusions, ElementKey};
-use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation, SourceId};
 
 const TABLE: &str = include_str!("contracts.csv");
 
@@ -37,21 +36,12 @@ fn is_shared(path: &str) -> bool {
 }
 
 /// Keeps the source file that a node logs from.
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let record = LogRecord::read(payload)?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let file = record.file_name();
     if !record.logger.is_empty() && !file.is_empty() && !is_shared(record.file) {
         let (logger, file) = (context.name(&record.logger), context.name(file));
-        context.observation(
-            Observation::LogsFrom(logger, file),
-            Confidence::Stated,
-            String::new,
-        );
+        context.states(Observation::LogsFrom(logger, file), String::new);
     }
-    Ok(())
 }
 
 /// A row of the table.

@@ -105,12 +105,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         if unnamed.contains(&fact.observation) {
             let node = known.meant(node);
-            known.add(Inference {
-                what: ElementKey::Publish(node, topic),
-                source,
-                confidence: Confidence::Inferred,
-                when: Validity::Signs { signs, ends },
-            });
+            let what = ElementKey::Publish(node, topic);
+            let when = Validity::Signs { signs, ends };
+            known.add(Inference::new(source, what, Confidence::Inferred, when));
         }
     }
     let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));

@@ -1,18 +1,13 @@
 //! `ros_discovery_info`: the nodes of each participant of DDS (`rmw_dds_common/msg/ParticipantEntitiesInfo`).
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
-use crate::evidence::observation::{Confidence, Observation, Statement};
+use crate::evidence::observation::Observation;
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "rmw_dds_common/ParticipantEntitiesInfo",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[],
-};
+pub(crate) const SHAPE: MessageLayout =
+    MessageLayout::ros2("rmw_dds_common/ParticipantEntitiesInfo", &[]);
 
 /// The nodes of a participant: namespace and name.
 type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
@@ -28,18 +23,10 @@ pub(crate) fn read(
     for (space, name) in nodes {
         let full = format!("{}/{name}", space.trim_end_matches('/'));
         let node = context.name(&full);
-        let said = Statement {
-            observation: Observation::Node(node),
-            confidence: Confidence::Stated,
-            snapshot: Some(group),
-        };
-        context.observe(said, || format!("{full} is a node of participant {id}"));
+        let words = || format!("{full} is a node of participant {id}");
+        context.states_in(group, Observation::Node(node), words);
     }
-    context.observation(
-        Observation::Snapshot(group),
-        Confidence::Stated,
-        String::new,
-    );
+    context.states(Observation::Snapshot(group), String::new);
     Ok(())
 }
 

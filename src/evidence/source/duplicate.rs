@@ -3,22 +3,16 @@
 
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
-use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::observation::{Confidence, Observation, SourceId};
+use crate::evidence::observation::{Observation, SourceId};
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let record = LogRecord::read(payload)?;
-    if let Some(node) = doubled(&record) {
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    if let Some(node) = doubled(record) {
         let node = context.name(&node);
-        context.observation(Observation::Duplicate(node), Confidence::Stated, || {
+        context.states(Observation::Duplicate(node), || {
             format!("{} logs: {}", record.logger, record.text)
         });
     }
-    Ok(())
 }
 
 /// The duplicated node according to a text.

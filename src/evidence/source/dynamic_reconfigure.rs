@@ -46,12 +46,9 @@ fn is_nodelet(caller: &str, node: &str) -> bool {
 fn own(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.topic == topic {
-            known.add(Inference {
-                what: ElementKey::Publish(node, topic),
-                source,
-                confidence: Confidence::Inferred,
-                when: Validity::Messages(at),
-            });
+            let what = ElementKey::Publish(node, topic);
+            let when = Validity::Messages(at);
+            known.add(Inference::new(source, what, Confidence::Inferred, when));
         }
     }
 }

@@ -9,7 +9,7 @@ use super::SourceContext;
 use crate::base::name::{in_space, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, SourceId};
@@ -37,11 +37,7 @@ const MOST_KEPT: usize = 1 << 14;
 const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let record = LogRecord::read(payload)?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     if let Some(time) = context.time
         && record.text.len() <= LONGEST
         && !record.file.ends_with("recorder.cpp")
@@ -49,7 +45,6 @@ pub(crate) fn read(
         let logger = in_space(context.space, &record.logger);
         context.facts.logged.add(time, &logger, record.text);
     }
-    Ok(())
 }
 
 /// Keeps the words and numbers in a message.
@@ -287,15 +282,11 @@ fn observe(
     if known.knows(what) || known.denies(what) {
         return;
     }
-    let inference = Inference {
-        what,
-        source,
-        confidence: Confidence::Stated,
-        when: Validity::Signs {
-            signs: echo.texts.iter().map(|(time, _)| *time).collect(),
-            ends: Vec::new(),
-        },
+    let when = Validity::Signs {
+        signs: echo.texts.iter().map(|(time, _)| *time).collect(),
+        ends: Vec::new(),
     };
+    let inference = Inference::new(source, what, Confidence::Stated, when);
     let first = echo.texts.first().map(|(time, _)| *time);
     known.because(inference, first, |_| {
         let (texts, values) = (echo.texts.len(), echo.values.len());

@@ -1,17 +1,14 @@
 //! `<node>/transition_event` of ROS 2: a node is running, with its lifecycle state.
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
-use crate::evidence::observation::{Confidence, Observation};
+use crate::evidence::observation::Observation;
 
 /// `lifecycle_msgs/msg/TransitionEvent`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "lifecycle_msgs/TransitionEvent",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "lifecycle_msgs/TransitionEvent",
+    &[
         (
             "",
             "uint64 timestamp;Transition transition;State start_state;State goal_state",
@@ -19,7 +16,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
         ("Transition", "byte id;string label"),
         ("State", "byte id;string label"),
     ],
-};
+);
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
@@ -40,15 +37,7 @@ pub(crate) fn read(
     let node = context.name(name);
     let state = context.name(to);
     let words = || format!("{name} goes from {from} to {to} ({transition})");
-    context.observation(
-        Observation::Publish(node, context.stream.topic),
-        Confidence::Stated,
-        words,
-    );
-    context.observation(
-        Observation::Lifecycle(node, state),
-        Confidence::Stated,
-        words,
-    );
+    context.states(Observation::Publish(node, context.stream.topic), words);
+    context.states(Observation::Lifecycle(node, state), words);
     Ok(())
 }

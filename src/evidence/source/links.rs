@@ -4,7 +4,7 @@
 
 use super::SourceContext;
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::observation::{Confidence, Observation};
+use crate::evidence::observation::Observation;
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
@@ -19,9 +19,7 @@ pub(crate) fn read(
         && let Some(topic) = text.strip_prefix("Subscribing to ")
     {
         let topic = context.name(topic.trim());
-        context.observation(Observation::Appears(topic), Confidence::Stated, || {
-            format!("{name}: {text}")
-        });
+        context.states(Observation::Appears(topic), || format!("{name}: {text}"));
     }
     let roscpp = file.rsplit('.').next() == Some("cpp");
     if let Some(link) = link(text).filter(|_| roscpp) {
@@ -34,11 +32,11 @@ pub(crate) fn read(
             How::Refused => Observation::Refused(node, topic),
             How::Ends => {
                 // It existed until now.
-                context.observation(Observation::Node(node), Confidence::Stated, words);
+                context.states(Observation::Node(node), words);
                 Observation::Unsubscribe(node, topic)
             }
         };
-        context.observation(observation, Confidence::Stated, words);
+        context.states(observation, words);
     }
     Ok(())
 }

@@ -3,18 +3,13 @@
 
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind, Inference, Validity};
-use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let record = LogRecord::read(payload)?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     // Topics in the logs of a recorder or player belong to other nodes.
     if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
-        return Ok(());
+        return;
     }
     if let Some((begins, topic)) = bridged(record.text) {
         let (node, of) = (context.name(&record.logger), context.name(topic));
@@ -23,7 +18,7 @@ pub(crate) fn read(
         } else {
             Observation::Unsubscribe(node, of)
         };
-        context.observation(observation, Confidence::Stated, String::new);
+        context.states(observation, String::new);
     } else if let Some((publishes, topic)) = named(record.text) {
         let (node, of) = (context.name(&record.logger), context.name(topic));
         let observation = if publishes {
@@ -31,7 +26,7 @@ pub(crate) fn read(
         } else {
             Observation::SaysSubscribe(node, of)
         };
-        context.observation(observation, Confidence::Stated, String::new);
+        context.states(observation, String::new);
         if record.text.contains("incompatible QoS") {
             let policy = record.text.split_once("incompatible policy: ");
             let policy = policy.map_or("", |(_, rest)| rest.trim_end_matches(['.', ' ']));
@@ -42,12 +37,11 @@ pub(crate) fn read(
             } else {
                 Observation::Starved(node, of, policy)
             };
-            context.observation(observation, Confidence::Stated, || {
+            context.states(observation, || {
                 format!("{} logs: {}", record.logger, record.text)
             });
         }
     }
-    Ok(())
 }
 
 /// The text before a topic, the text after it, and whether the logging node publishes it.
@@ -146,12 +140,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         let first = signs.first().copied();
-        let inference = Inference {
-            what,
-            source,
-            confidence: Confidence::Stated,
-            when: Validity::Signs { signs, ends },
-        };
+        let when = Validity::Signs { signs, ends };
+        let inference = Inference::new(source, what, Confidence::Stated, when);
         let verb = if publishes {
             "publishes"
         } else {

@@ -4,19 +4,16 @@
 use std::collections::BTreeMap;
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation, SourceId};
 
 /// `rosbag2_interfaces/msg/MessagesLostEvent`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "rosbag2_interfaces/MessagesLostEvent",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "rosbag2_interfaces/MessagesLostEvent",
+    &[
         (
             "",
             "string node_name;MessagesLostEventTopicStat[] messages_lost_statistics",
@@ -26,7 +23,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
             "string topic_name;uint64 messages_lost_in_transport;uint64 messages_lost_in_recorder",
         ),
     ],
-};
+);
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
@@ -41,7 +38,7 @@ pub(crate) fn read(
     for (topic, in_transport, in_recorder) in all {
         let lost = in_transport.saturating_add(in_recorder);
         let (of, many) = (context.name(topic), context.name(&lost.to_string()));
-        context.observation(Observation::Lost(of, many), Confidence::Stated, || {
+        context.states(Observation::Lost(of, many), || {
             format!("{recorder} lost {in_transport} messages of {topic} in transport and {in_recorder} itself")
         });
     }

@@ -2,20 +2,17 @@
 //! publishes them.
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
-use crate::evidence::observation::{Confidence, Measurement, Observation, SourceId};
+use crate::evidence::observation::{Measurement, Observation, SourceId};
 
 /// `statistics_msgs/msg/MetricsMessage`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "statistics_msgs/MetricsMessage",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "statistics_msgs/MetricsMessage",
+    &[
         (
             "",
             "string measurement_source_name;string metrics_source;string unit;Time window_start;Time window_stop;\
@@ -24,7 +21,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
         ("StatisticDataPoint", "byte data_type;float64 data"),
         TIME2,
     ],
-};
+);
 
 /// Kinds of numbers in `statistics_msgs/msg/StatisticDataType`.
 const AVERAGE: usize = 1;
@@ -50,9 +47,7 @@ pub(crate) fn read(
     if !node.is_empty() {
         let name = context.name(&format!("/{}", node.trim_start_matches('/')));
         let observation = Observation::Reports(name, context.stream.topic);
-        context.observation(observation, Confidence::Stated, || {
-            format!("{node} reports its {metric}")
-        });
+        context.states(observation, || format!("{node} reports its {metric}"));
         let nanos = |number: f64| {
             let nanos = libm::round(number * 1e6);
             (unit == "ms" && nanos.abs() < 9e15).then(|| cast::to_i64(nanos))
@@ -85,12 +80,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.observations(source) {
         if let Observation::Reports(node, topic) = fact.observation {
             let node = known.meant(node);
-            known.add(Inference {
-                what: ElementKey::Publish(node, topic),
-                source,
-                confidence: fact.confidence,
-                when: Validity::Signs { signs, ends },
-            });
+            let what = ElementKey::Publish(node, topic);
+            let when = Validity::Signs { signs, ends };
+            known.add(Inference::new(source, what, fact.confidence, when));
         }
     }
 }

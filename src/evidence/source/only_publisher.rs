@@ -24,12 +24,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let mut publishers = known.publishers(stream.topic);
         if let (Some(only), None) = (publishers.next(), publishers.next()) {
             drop(publishers);
-            known.add(Inference {
-                what: ElementKey::Publish(only, stream.topic),
-                source,
-                confidence: Confidence::Inferred,
-                when: Validity::Messages(at),
-            });
+            let what = ElementKey::Publish(only, stream.topic);
+            let when = Validity::Messages(at);
+            known.add(Inference::new(source, what, Confidence::Inferred, when));
         }
     }
 }

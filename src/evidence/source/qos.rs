@@ -75,12 +75,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if let Observation::Quality(topic, _) = fact.observation
             && fact.source == source
         {
-            known.add(Inference {
-                what: ElementKey::Topic(topic),
+            let what = ElementKey::Topic(topic);
+            known.add(Inference::new(
                 source,
-                confidence: Confidence::Declared,
-                when: Validity::Whole,
-            });
+                what,
+                Confidence::Declared,
+                Validity::Whole,
+            ));
         }
     }
 }

@@ -4,15 +4,10 @@
 use std::collections::BTreeSet;
 
 use super::SourceContext;
-use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::parameters::ParameterEvent;
-use crate::evidence::observation::{Confidence, Observation};
+use crate::evidence::observation::Observation;
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let event = ParameterEvent::read(payload)?;
+pub(crate) fn read(context: &mut SourceContext<'_>, event: &ParameterEvent<'_>) {
     let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end(p.name)).collect();
     for (topic, publishes) in ends {
         let (node, of) = (context.name(event.node), context.name(topic));
@@ -21,11 +16,10 @@ pub(crate) fn read(
         } else {
             ("subscription", Observation::Subscribe(node, of))
         };
-        context.observation(observation, Confidence::Stated, || {
+        context.states(observation, || {
             format!("{} declares qos_overrides.{topic}.{word}", event.node)
         });
     }
-    Ok(())
 }
 
 /// The topic in the name of a parameter, and whether a publisher is meant. An entity may have its own id

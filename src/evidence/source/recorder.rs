@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use super::SourceContext;
 use crate::base::name::is_recorder;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
@@ -13,19 +12,14 @@ use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
 
 /// Recognises a recorder by the source file in its log records, regardless of its name.
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let record = LogRecord::read(payload)?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     let file = record.file.replace('\\', "/");
     if FILES.iter().any(|end| file.ends_with(end)) {
         let node = context.name(&record.logger);
-        context.observation(Observation::Node(node), Confidence::Stated, || {
+        context.states(Observation::Node(node), || {
             format!("{} records: {}", record.logger, record.text)
         });
     }
-    Ok(())
 }
 
 /// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be distinguished.
@@ -39,12 +33,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let named = nodes.filter(|node| is_recorder(&known.text(*node)));
     let recorders: BTreeSet<Name> = stated.chain(named).collect();
     for recorder in &recorders {
-        known.add(Inference {
-            what: ElementKey::Node(*recorder),
+        let what = ElementKey::Node(*recorder);
+        known.add(Inference::new(
             source,
-            confidence: Confidence::Stated,
-            when: Validity::Unending,
-        });
+            what,
+            Confidence::Stated,
+            Validity::Unending,
+        ));
     }
     if recorders.len() != 1 {
         return;
@@ -53,12 +48,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let topics: BTreeSet<Name> = robots.map(|s| s.topic).collect();
     for recorder in recorders {
         for topic in &topics {
-            known.add(Inference {
-                what: ElementKey::Subscribe(*topic, recorder),
-                source,
-                confidence: Confidence::Stated,
-                when: Validity::Like(ElementKey::Topic(*topic)),
-            });
+            let what = ElementKey::Subscribe(*topic, recorder);
+            let when = Validity::Like(ElementKey::Topic(*topic));
+            known.add(Inference::new(source, what, Confidence::Stated, when));
         }
     }
 }

@@ -8,33 +8,21 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::name::UNKNOWN_NODE;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId, Statement};
+use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 
 /// `rosgraph_msgs/msg/Graph`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "rosgraph_msgs/Graph",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[],
-};
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", &[]);
 
 /// `rosgraph_monitor_msgs/msg/Graph`.
-pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout {
-    type_name: "rosgraph_monitor_msgs/Graph",
-    ..SHAPE
-};
+pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_monitor_msgs/Graph", &[]);
 
 /// `rosgraph_msgs/msg/Node`.
-pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout {
-    type_name: "rosgraph_msgs/Node",
-    ..SHAPE
-};
+pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Node", &[]);
 
 /// The types that are equal in all forms, and those of the two forms of 2026, in the order of nodl and of the
 /// core interfaces: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
@@ -197,11 +185,6 @@ struct SnapshotEnd<'a> {
 fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
     let topic = context.stream.connection.topic.shared();
     let group = context.name(format!("snapshot {topic} {of}").trim_end());
-    let now = |observation| Statement {
-        observation,
-        confidence: Confidence::Stated,
-        snapshot: Some(group),
-    };
     let (mut offered, mut asked, mut seen) = (Vec::new(), Vec::new(), BTreeSet::new());
     for node in nodes {
         let name = node.text("name");
@@ -217,10 +200,10 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
                     *unnamed.entry(of).or_default() += 1;
                     offer(context, of, &quality);
                 }
-                context.observe(now(Observation::Topic(of)), || {
+                context.states_in(group, Observation::Topic(of), || {
                     format!("{topic} is in the graph")
                 });
-                context.observe(now(Observation::Type(of, kind)), String::new);
+                context.states_in(group, Observation::Type(of, kind), String::new);
             }
             for (topic, many) in unnamed {
                 let observation = Observation::Unnamed(topic, context.name(&many.to_string()));
@@ -229,12 +212,12 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
             continue;
         }
         let id = context.name(name);
-        context.observe(now(Observation::Node(id)), || {
+        context.states_in(group, Observation::Node(id), || {
             format!("{name} is in the graph{}", parameters(node))
         });
         if !seen.insert(name) {
             let twice = || format!("{name} occurs twice in the graph");
-            context.observation(Observation::Duplicate(id), Confidence::Stated, twice);
+            context.states(Observation::Duplicate(id), twice);
         }
         for (is_sent, topic, kind, qos) in ends(node) {
             let (of, kind) = (context.name(&topic), context.name(kind));
@@ -244,7 +227,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
                 (Observation::Subscribe(id, of), "subscribes to")
             };
             let quality = qos.and_then(quality);
-            context.observe(now(observation), || {
+            context.states_in(group, observation, || {
                 let quality = quality
                     .as_ref()
                     .map_or_else(String::new, |q| format!(" ({q})"));
@@ -254,7 +237,7 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
                 offer(context, of, &quality);
             }
             if !context.facts.text(kind).is_empty() {
-                context.observe(now(Observation::Type(of, kind)), String::new);
+                context.states_in(group, Observation::Type(of, kind), String::new);
             }
             let all = if is_sent { &mut offered } else { &mut asked };
             all.push(SnapshotEnd {
@@ -272,24 +255,18 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         {
             let (topic, policy) = (context.name(&end.topic), context.name(policy));
             let observation = Observation::Starved(end.node, topic, policy);
-            context.observation(observation, Confidence::Stated, || {
+            context.states(observation, || {
                 "no publisher offers the requested quality of service".to_owned()
             });
         }
     }
-    context.observation(
-        Observation::Snapshot(group),
-        Confidence::Stated,
-        String::new,
-    );
+    context.states(Observation::Snapshot(group), String::new);
 }
 
 /// Adds the quality of service that a topic is offered with.
 fn offer(context: &mut SourceContext<'_>, topic: Name, quality: &str) {
     let observation = Observation::Quality(topic, context.name(quality));
-    context.observation(observation, Confidence::Stated, || {
-        format!("offered as {quality}")
-    });
+    context.states(observation, || format!("offered as {quality}"));
 }
 
 /// An endpoint in a message: whether it publishes, the topic, its type and its quality of service.

@@ -11,9 +11,7 @@ use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::observation::{
-    Confidence, Name, Observation, Observations, SourceId, Statement,
-};
+use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
@@ -37,25 +35,17 @@ pub(crate) fn read(
         return Ok(());
     }
     let node = context.name(name);
-    context.observation(Observation::Node(node), Confidence::Stated, || {
-        format!("{name} logs: {message}")
-    });
+    let logs = || format!("{name} logs: {message}");
+    context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if context.stream.connection.topic.as_str() == "/rosout" {
         if number <= FIRST_RECORD {
-            context.observation(Observation::Begins(node), Confidence::Stated, || {
-                format!("{name} logs its first record: {message}")
-            });
+            let begins = || format!("{name} logs its first record: {message}");
+            context.states(Observation::Begins(node), begins);
         }
-        context.observation(Observation::Publish(node, log), Confidence::Stated, || {
-            format!("{name} logs: {message}")
-        });
+        context.states(Observation::Publish(node, log), logs);
         if let Some(publisher) = context.stream.publisher.filter(|p| *p != node) {
-            context.observation(
-                Observation::Carries(publisher, node),
-                Confidence::Stated,
-                String::new,
-            );
+            context.states(Observation::Carries(publisher, node), String::new);
         }
     }
     if is_rospy(file) {
@@ -96,16 +86,9 @@ fn list(context: &mut SourceContext<'_>, (name, message): (&str, &str), topics: 
     for topic in topics {
         let words = || format!("{name} logs with {topic} in its list of topics: {message}");
         let topic = context.name(topic);
-        context.observe(
-            Statement {
-                observation: Observation::Lists(node, topic),
-                confidence: Confidence::Stated,
-                snapshot: Some(list),
-            },
-            words,
-        );
+        context.states_in(list, Observation::Lists(node, topic), words);
     }
-    context.observation(Observation::Snapshot(list), Confidence::Stated, String::new);
+    context.states(Observation::Snapshot(list), String::new);
 }
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
@@ -131,17 +114,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             (false, true) => ElementKey::Subscribe(topic, node),
             (false, false) => continue,
         };
-        known.add(Inference {
-            what,
-            source,
-            // If headers do not name all publishers, a node that names a topic may be one of them.
-            confidence: if stated {
-                Confidence::Stated
-            } else {
-                Confidence::Inferred
-            },
-            when: Validity::Signs { signs, ends },
-        });
+        // If headers do not name all publishers, a node that names a topic may be one of them.
+        let confidence = if stated {
+            Confidence::Stated
+        } else {
+            Confidence::Inferred
+        };
+        let when = Validity::Signs { signs, ends };
+        known.add(Inference::new(source, what, confidence, when));
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn read(
     let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
     let node = context.name(&text);
     let topic = context.stream.topic;
-    context.observation(Observation::Logger(node, topic), Confidence::Stated, || {
+    context.states(Observation::Logger(node, topic), || {
         format!("logger {name}: {message}")
     });
     Ok(())
@@ -58,15 +58,11 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
         let what = ElementKey::Publish(known.facts.name(node), topic);
-        known.add(Inference {
-            what,
-            source,
-            confidence: Confidence::Stated,
-            when: Validity::Signs {
-                signs,
-                ends: Vec::new(),
-            },
-        });
+        let when = Validity::Signs {
+            signs,
+            ends: Vec::new(),
+        };
+        known.add(Inference::new(source, what, Confidence::Stated, when));
     }
 }
 

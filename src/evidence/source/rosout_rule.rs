@@ -31,12 +31,7 @@ fn add(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
     let [log, all] =
         ["/rosout", "/rosout_agg"].map(|name| known.facts.name(&in_space(space, name)));
-    let rule = |what, when| Inference {
-        what,
-        source,
-        confidence: Confidence::Inferred,
-        when,
-    };
+    let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
     for node in nodes {
         if node != log {
             known.add(rule(

@@ -2,19 +2,13 @@
 //! its server if the recorder names publishers.
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::name::SERVICE;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation};
 
 /// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "*_Event",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[],
-};
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("*_Event", &[]);
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,

@@ -4,18 +4,15 @@
 use std::collections::BTreeMap;
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::{MessageLayout, TIME2};
 use crate::evidence::observation::{Confidence, Measurement, Name, Observation};
 
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
-pub(crate) const SHAPE: MessageLayout = MessageLayout {
-    type_name: "rosgraph_monitor_msgs/TopicStatistics",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
+pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
+    "rosgraph_monitor_msgs/TopicStatistics",
+    &[
         ("", "Time timestamp;TopicStatistic[] statistics"),
         (
             "TopicStatistic",
@@ -25,7 +22,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
         ("Duration", "int32 sec;uint32 nanosec"),
         TIME2,
     ],
-};
+);
 
 /// The kinds of statistics: the period of a publisher, that of a subscriber, and the time from publishing to taking.
 const PUBLISHED_PERIOD: u8 = 0;
