@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, Message, Sink};
 use crate::base::notice::Notice;
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
@@ -30,10 +30,6 @@ impl<'a> Clip<'a> {
 impl Sink for Clip<'_> {
     fn behind(&mut self) -> Option<&mut dyn Sink> {
         Some(&mut *self.sink)
-    }
-
-    fn connection(&mut self, connection: &Connection) -> Want {
-        self.sink.connection(connection)
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -274,10 +270,6 @@ impl BatchSender {
 }
 
 impl Sink for BatchSender {
-    fn connection(&mut self, _: &Connection) -> Want {
-        Want::Stamps
-    }
-
     fn part(&mut self) {
         self.batch.runs.push((None, 0, false));
     }

@@ -6,39 +6,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::base::budget::{UNPACKED, UNPACKED_FOLD};
+use crate::base::words::worded;
 
-/// A compression that a bag may name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Compression {
-    /// Bytes as they are.
-    None,
-    /// bzip2 (ROS 1).
-    Bz2,
-    /// LZ4 frames (ROS 1, MCAP).
-    Lz4,
-    /// Zstandard frames (MCAP, rosbag2).
-    Zstd,
+worded! {
+    /// A compression that a bag may name; its word is its name in JSON.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub(crate) enum Compression {
+        /// Bytes as they are.
+        None = "none",
+        /// bzip2 (ROS 1).
+        Bz2 = "bz2",
+        /// LZ4 frames (ROS 1, MCAP).
+        Lz4 = "lz4",
+        /// Zstandard frames (MCAP, rosbag2).
+        Zstd = "zstd",
+    }
 }
 
 impl Compression {
     /// The compression that a bag calls `name`; `None` for an unknown one.
     pub(crate) fn named(name: &[u8]) -> Option<Self> {
-        Some(match name {
-            b"" | b"none" => Self::None,
-            b"bz2" => Self::Bz2,
-            b"lz4" => Self::Lz4,
-            b"zstd" => Self::Zstd,
-            _ => return None,
-        })
-    }
-
-    /// The compression's name in JSON.
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Bz2 => "bz2",
-            Self::Lz4 => "lz4",
-            Self::Zstd => "zstd",
+        match name {
+            b"" => Some(Self::None),
+            name => Self::from_word(std::str::from_utf8(name).ok()?),
         }
     }
 

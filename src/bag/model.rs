@@ -99,8 +99,11 @@ impl Want {
 /// Every message of the bag (inside the requested range) is stamped exactly once through [`Sink::stamps`]; a wanted
 /// one is also passed to [`Sink::message`], before or after.
 pub trait Sink {
-    /// Takes a new connection; returns the wanted part of its payloads.
-    fn connection(&mut self, connection: &Connection) -> Want;
+    /// Takes a new connection; returns the wanted part of its payloads: none of them by default.
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let behind = self.behind();
+        behind.map_or(Want::Stamps, |sink| sink.connection(connection))
+    }
 
     /// The next sink, which receives everything that this one does not handle.
     fn behind(&mut self) -> Option<&mut dyn Sink> {

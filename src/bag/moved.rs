@@ -1,6 +1,6 @@
 //! A bag whose recorder's clock was wrong by a known time: a reader that moves all its times.
 
-use crate::bag::model::{Connection, ConnectionId, Message, Reader, Report, Sink, Want};
+use crate::bag::model::{ConnectionId, Message, Reader, Report, Sink};
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 
@@ -49,10 +49,6 @@ impl Sink for MovedSink<'_> {
         Some(&mut *self.sink)
     }
 
-    fn connection(&mut self, connection: &Connection) -> Want {
-        self.sink.connection(connection)
-    }
-
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         let stamps: Vec<Stamp> = stamps.iter().map(|time| time.plus(self.by)).collect();
         self.sink.stamps(connection, &stamps, sizes);
@@ -78,10 +74,6 @@ mod tests {
     struct Ends(Option<(Stamp, Stamp)>);
 
     impl Sink for Ends {
-        fn connection(&mut self, _: &Connection) -> Want {
-            Want::Stamps
-        }
-
         fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
             for time in stamps {
                 let ends = self.0.get_or_insert((*time, *time));

@@ -263,10 +263,6 @@ mod tests {
     struct Kept(Vec<Vec<i64>>);
 
     impl Sink for Kept {
-        fn connection(&mut self, _: &Connection) -> Want {
-            Want::Stamps
-        }
-
         fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
             let at = connection.0 as usize;
             self.0.resize(self.0.len().max(at + 1), Vec::new());

@@ -10,6 +10,13 @@ pub(crate) fn policy(text: &str) -> String {
     out
 }
 
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex_of(bytes: &[u8]) -> String {
+    let digit = |n: u8| char::from_digit(n.into(), 16).unwrap_or('0');
+    let digits = bytes.iter().flat_map(|b| [digit(b >> 4), digit(b & 15)]);
+    digits.collect()
+}
+
 /// The first `digits` hex digits of a text's digest, 64 at most.
 #[cfg(any(feature = "cli", feature = "parquet"))]
 pub(crate) fn hex(text: &str, digits: usize) -> String {
@@ -31,11 +38,9 @@ impl Sum {
 
     /// The first `digits` hex digits, 64 at most.
     pub(crate) fn hex(self, digits: usize) -> String {
-        const DIGITS: &[u8; 16] = b"0123456789abcdef";
-        let digest = self.0.finalize();
-        let nibbles = digest.iter().flat_map(|byte| [byte >> 4, byte & 15]);
-        let all = nibbles.map(|nibble| char::from(DIGITS[usize::from(nibble)]));
-        all.take(digits).collect()
+        let mut all = hex_of(&self.0.finalize());
+        all.truncate(digits);
+        all
     }
 }
 

@@ -70,18 +70,7 @@ pub enum Error {
         path: PathBuf,
         /// The line, ≥ 1; 0 if unknown.
         line: usize,
-        /// The mistake.
-        reason: String,
-        /// Advice for the user.
-        hint: String,
-    },
-    /// An expectation with a mistake in it.
-    BadExpectation {
-        /// The file.
-        path: PathBuf,
-        /// The line, ≥ 1; 0 if unknown.
-        line: usize,
-        /// The character in the line, ≥ 1.
+        /// The character in the line, ≥ 1; 0 if unknown.
         column: usize,
         /// The mistake.
         reason: String,
@@ -130,6 +119,22 @@ impl Error {
         }
     }
 
+    /// The error for a mistake in a line of a file of the user's; 0 if the line is unknown.
+    pub fn bad_file(
+        path: &Path,
+        line: usize,
+        reason: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Self {
+        Self::BadFile {
+            path: path.to_owned(),
+            line,
+            column: 0,
+            reason: reason.into(),
+            hint: hint.into(),
+        }
+    }
+
     /// Advice for the user; empty if there is none.
     pub fn hint(&self) -> String {
         match self {
@@ -141,7 +146,6 @@ impl Error {
             | Self::Unsupported { hint, .. }
             | Self::NoMessages { hint, .. }
             | Self::BadFile { hint, .. }
-            | Self::BadExpectation { hint, .. }
             | Self::Usage { hint, .. }
             | Self::Output { hint, .. } => hint.clone(),
         }
@@ -189,25 +193,20 @@ impl fmt::Display for Error {
             }
             Self::NoMessages { path, .. } => write!(f, "`{}` contains no messages", path.display()),
             Self::BadFile {
-                path, line, reason, ..
-            } => match line {
-                0 => write!(f, "`{}`: {reason}", path.display()),
-                _ => write!(f, "`{}` line {line}: {reason}", path.display()),
-            },
-            Self::BadExpectation {
                 path,
                 line,
                 column,
                 reason,
                 ..
-            } => match line {
-                0 => write!(f, "`{}`: {reason}", path.display()),
-                _ => write!(
-                    f,
-                    "`{}` line {line}, column {column}: {reason}",
-                    path.display()
-                ),
-            },
+            } => {
+                write!(f, "`{}`", path.display())?;
+                match (line, column) {
+                    (0, _) => {}
+                    (_, 0) => write!(f, " line {line}")?,
+                    _ => write!(f, " line {line}, column {column}")?,
+                }
+                write!(f, ": {reason}")
+            }
             Self::Usage { what, .. } => f.write_str(what),
             Self::Interrupted => f.write_str("interrupted; unfinished outputs were removed"),
             Self::Output { path, reason, .. } => {

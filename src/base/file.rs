@@ -45,12 +45,8 @@ fn bounded(
     let read = read.and_then(|()| file.read_to_end(&mut bytes));
     read.map_err(Error::io("read", path))?;
     if bytes.len() as u64 > limit {
-        return Err(Error::BadFile {
-            path: path.to_owned(),
-            line: 0,
-            reason: format!("more than {limit} bytes are not supported"),
-            hint: "give a smaller file".to_owned(),
-        });
+        let reason = format!("more than {limit} bytes are not supported");
+        return Err(Error::bad_file(path, 0, reason, "give a smaller file"));
     }
     Ok(bytes)
 }

@@ -61,9 +61,14 @@ pub struct Notice {
 impl Notice {
     /// A notice that happened once.
     pub fn new(kind: NoticeKind, text: impl Into<String>) -> Self {
+        Self::counted(kind, 1, text)
+    }
+
+    /// A notice that happened so many times.
+    pub fn counted(kind: NoticeKind, count: u64, text: impl Into<String>) -> Self {
         Self {
             kind,
-            count: 1,
+            count,
             text: text.into(),
         }
     }

@@ -15,10 +15,7 @@ pub(crate) use serde_json::Value;
 /// A mistake in a YAML document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct BadYaml {
-    /// The line, ≥ 1; 0 if unknown.
-    pub(crate) line: usize,
-    /// The character in the line, ≥ 1; 0 if unknown.
-    pub(crate) column: usize,
+    pub(crate) at: YamlPlace,
     /// The mistake, as reported by the parser, on one line.
     pub(crate) reason: String,
 }
@@ -35,8 +32,7 @@ pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
 fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
     if text.len() > YAML {
         return Err(BadYaml {
-            line: 0,
-            column: 0,
+            at: YamlPlace::default(),
             reason: "longer than 8 MiB".to_owned(),
         });
     }
@@ -48,13 +44,9 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
             max_alias_expansions_per_anchor: 10_000,
         },
     };
-    serde_saphyr::from_str_with_options(text, options).map_err(|e| {
-        let at = e.location().map_or(YamlPlace::default(), YamlPlace::from);
-        BadYaml {
-            line: at.line,
-            column: at.column,
-            reason: reason(&e),
-        }
+    serde_saphyr::from_str_with_options(text, options).map_err(|e| BadYaml {
+        at: e.location().map_or(YamlPlace::default(), YamlPlace::from),
+        reason: reason(&e),
     })
 }
 
@@ -199,7 +191,7 @@ mod tests {
     #[test]
     fn syntax_errors_have_a_line() {
         let bad = parse("a: 1\nb: [1, 2\nc: 3\n").unwrap_err();
-        assert!(bad.line >= 2 && !bad.reason.is_empty(), "{bad:?}");
+        assert!(bad.at.line >= 2 && !bad.reason.is_empty(), "{bad:?}");
     }
 
     #[test]

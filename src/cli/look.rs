@@ -250,10 +250,8 @@ pub(super) fn kept(file: Option<&Path>) -> Result<Option<Places>> {
     let Some(path) = file else { return Ok(None) };
     let text = file::read_text(path, budget::MISSION_JSON)?;
     let places = read_json(&text, path)?.layout;
-    places.map(Some).ok_or_else(|| Error::BadFile {
-        path: path.to_owned(),
-        line: 0,
-        reason: "it contains no layout".to_owned(),
-        hint: "write it beside a picture: `bagreel render BAG -o x.gif -o x.json`".to_owned(),
+    places.map(Some).ok_or_else(|| {
+        let hint = "write it beside a picture: `bagreel render BAG -o x.gif -o x.json`";
+        Error::bad_file(path, 0, "it contains no layout", hint)
     })
 }

@@ -231,12 +231,7 @@ impl Style {
         }
         let mut style: Self = keys
             .try_into()
-            .map_err(|e: toml::de::Error| Error::BadFile {
-                path: path.to_owned(),
-                line: 0,
-                reason: e.message().to_owned(),
-                hint: HINT.to_owned(),
-            })?;
+            .map_err(|e: toml::de::Error| Error::bad_file(path, 0, e.message(), HINT))?;
         style.palette = palette.into_iter().collect();
         Ok(style)
     }
@@ -287,11 +282,9 @@ struct StyleFile<'a> {
 
 impl<'a> StyleFile<'a> {
     fn read(text: &'a str, path: &'a Path) -> Result<Self> {
-        let no_toml = |e: toml::de::Error| Error::BadFile {
-            path: path.to_owned(),
-            line: e.span().map_or(0, |span| line_at(text, span.start)),
-            reason: e.message().replace('\n', " "),
-            hint: HINT.to_owned(),
+        let no_toml = |e: toml::de::Error| {
+            let line = e.span().map_or(0, |span| line_at(text, span.start));
+            Error::bad_file(path, line, e.message().replace('\n', " "), HINT)
         };
         Ok(Self {
             text,
@@ -310,12 +303,7 @@ impl<'a> StyleFile<'a> {
             line = found.map_or(line, |(k, _)| line_at(self.text, k.span().start));
             table = found.and_then(|(_, value)| value.get_ref().as_table());
         }
-        Error::BadFile {
-            path: self.path.to_owned(),
-            line,
-            reason,
-            hint: HINT.to_owned(),
-        }
+        Error::bad_file(self.path, line, reason, HINT)
     }
 
     /// Overrides `keys`, which contains all sections, keys and their kinds, with this file's values.

@@ -104,11 +104,9 @@ impl Fonts {
     /// [`Error::BadFile`] if `data`, read from `path`, is not a TrueType or OpenType font.
     pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
         let face = Face::read(Cow::Owned(data));
-        let face = face.ok_or_else(|| Error::BadFile {
-            path: path.to_owned(),
-            line: 0,
-            reason: "no TrueType or OpenType font with characters".to_owned(),
-            hint: "give `--font` a .ttf, .otf or .ttc file".to_owned(),
+        let face = face.ok_or_else(|| {
+            let reason = "no TrueType or OpenType font with characters";
+            Error::bad_file(path, 0, reason, "give `--font` a .ttf, .otf or .ttc file")
         })?;
         self.extra.push(Arc::new(face));
         Ok(self)

@@ -98,11 +98,7 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
         (files.too_deep, "folders nested too deep were left out"),
     ];
     for (count, text) in left_out.into_iter().filter(|(count, _)| *count > 0) {
-        let count = count as u64;
-        notices.push(Notice {
-            count,
-            ..Notice::new(NoticeKind::Note, text)
-        });
+        notices.push(Notice::counted(NoticeKind::Note, count as u64, text));
     }
     let workspace = workspace(&files);
     Ok(Code {

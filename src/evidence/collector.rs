@@ -355,12 +355,12 @@ impl Collector {
         let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers);
         self.notices.extend(judged.map_err(spool_error)?);
         if self.facts.dropped > 0 {
-            self.notices.add(Notice {
-                kind: NoticeKind::Damaged,
-                count: self.facts.dropped,
-                text: "there are implausibly many or long names: an observation was left out"
-                    .to_owned(),
-            });
+            let text = "there are implausibly many or long names: an observation was left out";
+            self.notices.add(Notice::counted(
+                NoticeKind::Damaged,
+                self.facts.dropped,
+                text,
+            ));
         }
         self.facts.seal();
         self.texts.sort();

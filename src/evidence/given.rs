@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::bag::{self, Input, OpenOptions};
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::evidence::SOURCES;
 use crate::evidence::collector::{CollectOptions, Collector};
 use crate::evidence::observation::Observation;
@@ -56,23 +56,18 @@ fn recorded(path: &Path) -> Result<Topology> {
             .get(fact.source)
             .is_some_and(|s| s.word == "rosgraph")
     });
-    let entry = |element| TopologyEntry {
-        element,
-        from_ns: None,
-        to_ns: None,
-        declared: false,
-        place: bag::file_name(path),
-    };
+    let entry = |element| TopologyEntry::new(element, bag::file_name(path));
     let mut entries: Vec<_> = observations
         .filter_map(|fact| element(&fact.observation))
         .map(entry)
         .collect();
     if entries.is_empty() {
-        return Err(topology::bad(
+        let hint = "give a recording of `/rosgraph` or of `/nodl/observed_node`";
+        return Err(Error::bad_file(
             path,
             0,
-            "it contains no recorded graph".to_owned(),
-            "give a recording of `/rosgraph` or of `/nodl/observed_node`",
+            "it contains no recorded graph",
+            hint,
         ));
     }
     entries.sort();

@@ -49,6 +49,19 @@ pub struct TopologyEntry {
     pub place: String,
 }
 
+impl TopologyEntry {
+    /// An entry for the whole mission, stated to have run.
+    pub(super) fn new(element: NamedElement, place: String) -> Self {
+        Self {
+            element,
+            from_ns: None,
+            to_ns: None,
+            declared: false,
+            place,
+        }
+    }
+}
+
 /// All entries of a file, sorted, and the parts of it that could not be used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
@@ -78,12 +91,8 @@ pub fn read(path: &Path) -> Result<Topology> {
         "py" => launch::read(path, &python::of_python(path, &text)?)?,
         _ => {
             let reason = "unknown topology format".to_owned();
-            return Err(bad(
-                path,
-                0,
-                reason,
-                "rename it to .csv, .yaml, .mcap, .dot, .launch, .xml or .launch.py",
-            ));
+            let hint = "rename it to .csv, .yaml, .mcap, .dot, .launch, .xml or .launch.py";
+            return Err(Error::bad_file(path, 0, reason, hint));
         }
     };
     topology.files.push(path.to_owned());
@@ -96,16 +105,6 @@ pub fn read(path: &Path) -> Result<Topology> {
 fn text(path: &Path) -> Result<String> {
     let bytes = file::read(path, TOPOLOGY)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-/// The error for a mistake in a file of the user's.
-pub(crate) fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
-    Error::BadFile {
-        path: path.to_owned(),
-        line,
-        reason,
-        hint: hint.to_owned(),
-    }
 }
 
 /// The location of an entry; without a line if there is none.
@@ -140,12 +139,8 @@ mod python {
 
     pub(super) fn of_python(path: &Path, _text: &str) -> Result<Tree> {
         let reason = "launch files in Python need the feature `source`".to_owned();
-        Err(super::bad(
-            path,
-            0,
-            reason,
-            "build with `--features source`",
-        ))
+        let hint = "build with `--features source`";
+        Err(Error::bad_file(path, 0, reason, hint))
     }
 
     pub(super) fn evaluate(_expression: &str, _names: &BTreeMap<String, String>) -> Option<String> {

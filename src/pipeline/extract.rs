@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use super::inputs::{each_once, known_span};
 use super::read::files;
 use super::{Stage, Watch};
-use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Report, Sink, Want};
+use crate::bag::{self, ConnectionId, Input, OpenOptions, Reader, Report, Sink};
 use crate::base::error::{Error, Result};
 use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -159,10 +159,6 @@ fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
 pub(super) struct Bounds(pub(super) Option<Span>);
 
 impl Sink for Bounds {
-    fn connection(&mut self, _: &Connection) -> Want {
-        Want::Stamps
-    }
-
     fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
         for at in stamps {
             let end = at.plus(1);

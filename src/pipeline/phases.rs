@@ -119,13 +119,8 @@ impl Basis<'_> {
 type CaptionLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
-    let bad = |line: usize, reason: String| Error::BadFile {
-        path: path.to_owned(),
-        line,
-        reason,
-        hint: "write a phase per line: `0:38 navigation`, or only names for the detected phases"
-            .to_owned(),
-    };
+    let hint = "write a phase per line: `0:38 navigation`, or only names for the detected phases";
+    let bad = |line: usize, reason: String| Error::bad_file(path, line, reason, hint);
     let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
     let all = all.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
     let lines: Vec<(usize, CaptionLine)> = all.map(|(n, l)| (n, line(l))).collect();
@@ -207,11 +202,10 @@ fn captions_of_file(text: &str, path: &Path) -> Result<Vec<(i64, String)>> {
         let caption = line
             .split_once('|')
             .and_then(|(at, text)| Some((parse_nanos(at)?, text.trim().to_owned())));
-        captions.push(caption.ok_or_else(|| Error::BadFile {
-            path: path.to_owned(),
-            line: number + 1,
-            reason: format!("`{line}` is not a caption"),
-            hint: "write `seconds|text`, such as `90|picking`".to_owned(),
+        captions.push(caption.ok_or_else(|| {
+            let reason = format!("`{line}` is not a caption");
+            let hint = "write `seconds|text`, such as `90|picking`";
+            Error::bad_file(path, number + 1, reason, hint)
         })?);
     }
     captions.sort_by_key(|(at, _)| *at);

@@ -243,12 +243,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let mut mission = read_json(&text, path)?;
     drop(text);
     if let Err((reason, hint)) = bounded(&mission) {
-        return Err(Error::BadFile {
-            path: path.to_owned(),
-            line: 0,
-            reason,
-            hint: hint.to_owned(),
-        });
+        return Err(Error::bad_file(path, 0, reason, hint));
     }
     if !mission.knows_lives() {
         mission.find_changes(reading.rate_change, &[]);

@@ -49,11 +49,7 @@ pub(crate) fn notes(elements: &Elements, viewed: &Viewed, options: &ViewOptions)
 }
 
 fn add(notices: &mut Notices, count: usize, text: String) {
-    notices.add(Notice {
-        kind: NoticeKind::Hidden,
-        count: count as u64,
-        text,
-    });
+    notices.add(Notice::counted(NoticeKind::Hidden, count as u64, text));
 }
 
 /// The words for the elements left out for a reason, and the option that shows them.

@@ -232,11 +232,9 @@ impl<G: Grammar> Forward<'_, G> {
         }
         if surplus > 0 {
             self.found.complete = false;
-            self.sink.notice(Notice {
-                kind: NoticeKind::Damaged,
-                count: surplus,
-                text: "messages are in a chunk but not in its index".to_owned(),
-            });
+            let text = "messages are in a chunk but not in its index";
+            self.sink
+                .notice(Notice::counted(NoticeKind::Damaged, surplus, text));
         }
     }
 

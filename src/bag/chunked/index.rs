@@ -324,20 +324,14 @@ fn step(wanted: &[Wanted]) -> usize {
 
 /// Reports messages of a connection that the bag does not describe.
 pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
-    sink.notice(Notice {
-        kind: NoticeKind::Damaged,
-        count,
-        text: "messages belong to a connection that the bag does not describe".to_owned(),
-    });
+    let text = "messages belong to a connection that the bag does not describe";
+    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
 }
 
 /// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
-    sink.notice(Notice {
-        kind: NoticeKind::Damaged,
-        count,
-        text: "messages are in the index but not in their chunk".to_owned(),
-    });
+    let text = "messages are in the index but not in their chunk";
+    sink.notice(Notice::counted(NoticeKind::Damaged, count, text));
 }
 
 /// Passes on the wanted part of the message at the position of `stream`, and skips it.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::index::IndexSum;
 use super::record::Connections;
-use crate::bag::model::{ConnectionId, Sink, Want};
+use crate::bag::model::{ConnectionId, Sink};
 use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 
@@ -190,10 +190,6 @@ impl Extremes {
 }
 
 impl Sink for Extremes {
-    fn connection(&mut self, _: &crate::bag::Connection) -> Want {
-        Want::Stamps
-    }
-
     fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
         for at in stamps {
             let (first, last) = self.0.unwrap_or((*at, *at));

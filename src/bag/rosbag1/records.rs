@@ -114,103 +114,61 @@ pub(super) const ENTRY: u32 = 12;
 
 /// The parsed header; `None` if it is broken: a field without a name, or longer than the header.
 pub(super) fn parse(header: &[u8]) -> Option<Header> {
-    let mut fields = HeaderFields::default();
     let mut rest = header;
     while !rest.is_empty() {
-        let (name, value, after) = field(rest)?;
-        rest = after;
-        if let Some(known) = fields.known(name) {
-            known.get_or_insert(value);
+        rest = field(rest)?.2;
+    }
+    Some(record(header).unwrap_or(Header::Unknown))
+}
+
+/// The value of a header's field; the first of duplicates counts.
+fn value<'a>(mut header: &'a [u8], wanted: &str) -> Option<&'a [u8]> {
+    loop {
+        let (name, value, rest) = field(header)?;
+        if name == wanted.as_bytes() {
+            return Some(value);
         }
-    }
-    Some(fields.record().unwrap_or(Header::Unknown))
-}
-
-/// The values of a header's fields; the first of duplicates counts. There is a header before every message.
-#[derive(Default)]
-struct HeaderFields<'a> {
-    chunk_count: Option<&'a [u8]>,
-    chunk_pos: Option<&'a [u8]>,
-    compression: Option<&'a [u8]>,
-    conn: Option<&'a [u8]>,
-    conn_count: Option<&'a [u8]>,
-    count: Option<&'a [u8]>,
-    encryptor: Option<&'a [u8]>,
-    end_time: Option<&'a [u8]>,
-    index_pos: Option<&'a [u8]>,
-    op: Option<&'a [u8]>,
-    size: Option<&'a [u8]>,
-    start_time: Option<&'a [u8]>,
-    time: Option<&'a [u8]>,
-    topic: Option<&'a [u8]>,
-    ver: Option<&'a [u8]>,
-}
-
-impl<'a> HeaderFields<'a> {
-    /// The slot for the value of this field; `None` for an ignored one.
-    fn known(&mut self, name: &[u8]) -> Option<&mut Option<&'a [u8]>> {
-        Some(match name {
-            b"chunk_count" => &mut self.chunk_count,
-            b"chunk_pos" => &mut self.chunk_pos,
-            b"compression" => &mut self.compression,
-            b"conn" => &mut self.conn,
-            b"conn_count" => &mut self.conn_count,
-            b"count" => &mut self.count,
-            b"encryptor" => &mut self.encryptor,
-            b"end_time" => &mut self.end_time,
-            b"index_pos" => &mut self.index_pos,
-            b"op" => &mut self.op,
-            b"size" => &mut self.size,
-            b"start_time" => &mut self.start_time,
-            b"time" => &mut self.time,
-            b"topic" => &mut self.topic,
-            b"ver" => &mut self.ver,
-            _ => return None,
-        })
-    }
-
-    fn record(&self) -> Option<Header> {
-        let is_version_1 = || u32_of(self.ver) == Some(1);
-        Some(match self.op?.first()? {
-            2 => Header::Message {
-                raw: u32_of(self.conn)?,
-                time: time_at(self.time?, 0)?,
-            },
-            3 => Header::Bag {
-                index_pos: u64_of(self.index_pos)?,
-                connections: u32_of(self.conn_count)?,
-                chunks: u32_of(self.chunk_count)?,
-                encryptor: text(self.encryptor.unwrap_or_default()),
-            },
-            4 if is_version_1() => Header::Index {
-                raw: u32_of(self.conn)?,
-                count: u32_of(self.count)?,
-            },
-            5 => Header::Chunk {
-                compression: self.compression?.to_vec(),
-                size: u32_of(self.size)?,
-            },
-            6 if is_version_1() => Header::ChunkInfo {
-                pos: u64_of(self.chunk_pos)?,
-                start: time_at(self.start_time?, 0)?,
-                end: time_at(self.end_time?, 0)?,
-                count: u32_of(self.count)?,
-            },
-            7 => Header::Connection {
-                raw: u32_of(self.conn)?,
-                topic: self.topic?.to_vec(),
-            },
-            _ => return None,
-        })
+        header = rest;
     }
 }
 
-fn u32_of(value: Option<&[u8]>) -> Option<u32> {
-    value?.try_into().ok().map(u32::from_le_bytes)
-}
-
-fn u64_of(value: Option<&[u8]>) -> Option<u64> {
-    value?.try_into().ok().map(u64::from_le_bytes)
+fn record(header: &[u8]) -> Option<Header> {
+    let value = |name| value(header, name);
+    let number = |name| value(name)?.try_into().ok().map(u32::from_le_bytes);
+    let place = |name| value(name)?.try_into().ok().map(u64::from_le_bytes);
+    let time = |name| time_at(value(name)?, 0);
+    let is_version_1 = || number("ver") == Some(1);
+    Some(match value("op")?.first()? {
+        2 => Header::Message {
+            raw: number("conn")?,
+            time: time("time")?,
+        },
+        3 => Header::Bag {
+            index_pos: place("index_pos")?,
+            connections: number("conn_count")?,
+            chunks: number("chunk_count")?,
+            encryptor: text(value("encryptor").unwrap_or_default()),
+        },
+        4 if is_version_1() => Header::Index {
+            raw: number("conn")?,
+            count: number("count")?,
+        },
+        5 => Header::Chunk {
+            compression: value("compression")?.to_vec(),
+            size: number("size")?,
+        },
+        6 if is_version_1() => Header::ChunkInfo {
+            pos: place("chunk_pos")?,
+            start: time("start_time")?,
+            end: time("end_time")?,
+            count: number("count")?,
+        },
+        7 => Header::Connection {
+            raw: number("conn")?,
+            topic: value("topic")?.to_vec(),
+        },
+        _ => return None,
+    })
 }
 
 /// The first field of a header and the rest.

@@ -11,6 +11,7 @@ use crate::bag::chunked::{ChunkBody, ChunkPlan, NoRecord, SecondFinds, SecondRea
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::Sink;
 use crate::bag::source::{ByteStream, FAR, FileSource};
+use crate::base::digest::hex_of;
 use crate::base::time::Stamp;
 
 /// The largest chunk that the crate may unpack into memory, in bytes.
@@ -121,12 +122,7 @@ fn records_of(bag: &RosBag, to: &mut SecondFinds<'_, Rosbag1>) -> Result<(), Str
 
 fn announce(found: &rosbag::record_types::Connection<'_>, to: &mut SecondFinds<'_, Rosbag1>) {
     let mut data = Vec::new();
-    let md5: String = found
-        .md5sum
-        .iter()
-        .flat_map(|b| [b >> 4, b & 15])
-        .filter_map(|d| char::from_digit(d.into(), 16))
-        .collect();
+    let md5 = hex_of(&found.md5sum);
     let fields = [
         ("type", found.tp),
         ("md5sum", md5.as_str()),

@@ -37,7 +37,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<Metadata>, String> {
     let read = file.take(YAML as u64).read_to_end(&mut bytes);
     read.map_err(|e| e.to_string())?;
     let data = yaml::parse(&String::from_utf8_lossy(&bytes))
-        .map_err(|e| format!("line {}: {}", e.line, e.reason))?;
+        .map_err(|e| format!("line {}: {}", e.at.line, e.reason))?;
     let root = data.get("rosbag2_bagfile_information");
     let root = root.ok_or("it has no `rosbag2_bagfile_information`")?;
     Ok(Some(understand(root)))

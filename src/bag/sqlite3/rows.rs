@@ -291,8 +291,7 @@ impl LostRows {
             (Note, self.unused, unused),
         ];
         for (kind, count, text) in kinds.into_iter().filter(|(_, count, _)| *count > 0) {
-            let text = text.to_owned();
-            sink.notice(Notice { kind, count, text });
+            sink.notice(Notice::counted(kind, count, text));
         }
     }
 }

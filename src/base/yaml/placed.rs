@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(inner[0].2.data, YamlData::Scalar("1.5".to_owned()));
         assert_eq!(inner[1].2.data, YamlData::Scalar(String::new()));
         let twice = parse_placed("a: 1\na: 2\n").unwrap_err();
-        assert_eq!(twice.line, 2, "{twice:?}");
+        assert_eq!(twice.at.line, 2, "{twice:?}");
     }
 
     #[test]

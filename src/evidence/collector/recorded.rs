@@ -72,11 +72,9 @@ impl Recorded {
             })?;
         }
         if aside > 0 {
-            self.notices.add(Notice {
-                kind: NoticeKind::ImpossibleTime,
-                count: aside,
-                text: "message at an impossible time, set aside".to_owned(),
-            });
+            let text = "message at an impossible time, set aside";
+            self.notices
+                .add(Notice::counted(NoticeKind::ImpossibleTime, aside, text));
         }
         Ok(span)
     }

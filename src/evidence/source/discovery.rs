@@ -1,6 +1,7 @@
 //! `ros_discovery_info`: the nodes of each participant of DDS (`rmw_dds_common/msg/ParticipantEntitiesInfo`).
 
 use super::SourceContext;
+use crate::base::digest::hex_of;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::Observation;
@@ -18,7 +19,7 @@ pub(crate) fn read(
 ) -> cursor::PayloadResult<()> {
     let mut long = payload.clone();
     let (id, nodes) = nodes(payload, 16).or_else(|_| nodes(&mut long, 24))?;
-    let id = cursor::hex(id);
+    let id = hex_of(id);
     let group = context.name(&format!("participant {id}"));
     for (space, name) in nodes {
         let full = format!("{}/{name}", space.trim_end_matches('/'));

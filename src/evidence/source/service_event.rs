@@ -2,6 +2,7 @@
 //! its server if the recorder names publishers.
 
 use super::SourceContext;
+use crate::base::digest::hex_of;
 use crate::base::name::SERVICE;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
@@ -29,7 +30,7 @@ pub(crate) fn read(
         3 => "reply received",
         _ => return Err(payload.wrong("a kind of event")),
     };
-    let client = cursor::hex(client);
+    let client = hex_of(client);
     let of = context.stream.topic;
     if let Some(node) = context.stream.publisher
         && !service.contains("/_action/")

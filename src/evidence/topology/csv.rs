@@ -3,18 +3,18 @@
 
 use std::path::Path;
 
-use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, place, resolved};
 use crate::base::budget::TOPOLOGY_ENTRIES;
 use crate::base::cast;
 use crate::base::csv;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 
 const COLUMNS: [&str; 5] = ["Name", "Publish", "Subscribe", "Node-start", "Node-end"];
 const HINT: &str =
     "columns are Name,Publish,Subscribe,Node-start,Node-end; lists look like \"['/a', '/b']\"";
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
-    let wrong = |line, reason| bad(path, line, reason, HINT);
+    let wrong = |line, reason| Error::bad_file(path, line, reason, HINT);
     let mut rows = csv::each_record(text).map(|row| row.map_err(|(line, why)| wrong(line, why)));
     let (_, head) = rows.next().transpose()?.unwrap_or_default();
     let column = |name: &str| {
@@ -30,12 +30,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         let (line, row) = row?;
         if topology.entries.len() > TOPOLOGY_ENTRIES {
             let reason = format!("more than {TOPOLOGY_ENTRIES} nodes and edges");
-            return Err(bad(
-                path,
-                line,
-                reason,
-                "leave out elements that are not in the bag",
-            ));
+            let hint = "leave out elements that are not in the bag";
+            return Err(Error::bad_file(path, line, reason, hint));
         }
         let [name, publish, subscribe, start, end] =
             columns.map(|at| at.and_then(|at| row.get(at)).map_or("", |cell| cell.trim()));
@@ -58,11 +54,9 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         }
         let mut add = |element| {
             topology.entries.push(TopologyEntry {
-                element,
                 from_ns,
                 to_ns,
-                declared: false,
-                place: place(path, line),
+                ..TopologyEntry::new(element, place(path, line))
             });
         };
         let node = resolved(name);

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
-use crate::base::error::Result;
+use super::{NamedElement, Topology, TopologyEntry, place, resolved};
+use crate::base::error::{Error, Result};
 
 const HINT: &str = "save it from rqt_graph with `Save as DOT`";
 
@@ -31,20 +31,15 @@ type Attributes = BTreeMap<String, String>;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     let tokens = tokens(text)
-        .map_err(|line| bad(path, line, "a string is not terminated".to_owned(), HINT))?;
+        .map_err(|line| Error::bad_file(path, line, "a string is not terminated", HINT))?;
     if !tokens.iter().any(|t| t.text == "{") {
-        return Err(bad(path, 1, "it contains no graph".to_owned(), HINT));
+        return Err(Error::bad_file(path, 1, "it contains no graph", HINT));
     }
     let (things, edges) = statements(&tokens);
     let mut topology = Topology::default();
     let mut add = |element, line| {
-        topology.entries.push(TopologyEntry {
-            element,
-            from_ns: None,
-            to_ns: None,
-            declared: false,
-            place: place(path, line),
-        });
+        let entry = TopologyEntry::new(element, place(path, line));
+        topology.entries.push(entry);
     };
     for (line, thing) in things.values() {
         match thing {

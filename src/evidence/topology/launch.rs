@@ -321,11 +321,8 @@ impl Launch {
 
     fn add(&mut self, path: &Path, tree: &Tree, element: NamedElement) {
         self.topology.entries.push(TopologyEntry {
-            element,
-            from_ns: None,
-            to_ns: None,
             declared: true,
-            place: place(path, tree.line),
+            ..TopologyEntry::new(element, place(path, tree.line))
         });
     }
 

@@ -10,9 +10,8 @@ mod value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::bad;
 use super::tree::Tree;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::evidence::syntax::{Language, Parsed};
 use evaluator::Evaluator;
 use value::PythonValue;
@@ -25,12 +24,8 @@ const HINT: &str = "a launch file in Python defines `generate_launch_description
 /// The tree of a launch file in Python.
 pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
     let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
-        return Err(bad(
-            path,
-            0,
-            "it is too complex to be read".to_owned(),
-            HINT,
-        ));
+        let reason = "it is too complex to be read";
+        return Err(Error::bad_file(path, 0, reason, HINT));
     };
     let mut evaluator = Evaluator::new(&parsed, BTreeMap::new());
     match evaluator.launch_description() {
@@ -39,12 +34,10 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
             children: action::trees(&actions),
             ..Tree::default()
         }),
-        None => Err(bad(
-            path,
-            0,
-            "there is no `generate_launch_description`".to_owned(),
-            HINT,
-        )),
+        None => {
+            let reason = "there is no `generate_launch_description`";
+            Err(Error::bad_file(path, 0, reason, HINT))
+        }
     }
 }
 

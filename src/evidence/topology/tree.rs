@@ -5,7 +5,6 @@ use std::path::Path;
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
 
-use super::bad;
 use crate::base::error::{Error, Result};
 use crate::base::yaml;
 
@@ -42,7 +41,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
         let is_element = tag.starts_with(char::is_alphabetic);
         if is_element && tag.matches('=').nth(MOST_ATTRIBUTES).is_some() {
             let what = format!("an element has more than {MOST_ATTRIBUTES} attributes");
-            return Err(bad(path, line, what, XML_HINT));
+            return Err(Error::bad_file(path, line, what, XML_HINT));
         }
         line += tag.matches('\n').count();
     }
@@ -52,7 +51,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
     };
     let document = Document::parse_with_options(text, options).map_err(|error| {
         let line = usize::try_from(error.pos().row).unwrap_or(0);
-        bad(path, line, error.to_string(), XML_HINT)
+        Error::bad_file(path, line, error.to_string(), XML_HINT)
     })?;
     let file = XmlLaunch {
         path,
@@ -78,7 +77,7 @@ impl XmlLaunch<'_> {
     }
 
     fn wrong(&self, node: Node<'_, '_>, reason: String) -> Error {
-        bad(self.path, self.line(node), reason, XML_HINT)
+        Error::bad_file(self.path, self.line(node), reason, XML_HINT)
     }
 
     fn element(&self, node: Node<'_, '_>, depth: usize) -> Result<Tree> {
@@ -102,12 +101,18 @@ impl XmlLaunch<'_> {
 
 /// The tree of a launch file in YAML; `None` if the document has no key `launch`.
 pub(super) fn of_yaml(path: &Path, text: &str) -> Result<Option<Tree>> {
-    let data = yaml::parse(text).map_err(|e| bad(path, e.line, e.reason, YAML_HINT))?;
+    let data =
+        yaml::parse(text).map_err(|e| Error::bad_file(path, e.at.line, e.reason, YAML_HINT))?;
     let Some(launch) = data.get("launch") else {
         return Ok(None);
     };
     let Value::Array(list) = launch else {
-        return Err(bad(path, 1, "`launch` is not a list".to_owned(), YAML_HINT));
+        return Err(Error::bad_file(
+            path,
+            1,
+            "`launch` is not a list",
+            YAML_HINT,
+        ));
     };
     Ok(Some(Tree {
         tag: "launch".to_owned(),

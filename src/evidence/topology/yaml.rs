@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, place, resolved};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::name::SERVICE;
@@ -45,7 +45,7 @@ const ENDS: [(&str, EndKind); 11] = [
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     let file = TopologyYaml::new(path, text);
-    let data = yaml::parse(text).map_err(|e| bad(path, e.line, e.reason, HINT))?;
+    let data = yaml::parse(text).map_err(|e| Error::bad_file(path, e.at.line, e.reason, HINT))?;
     let mut topology = Topology::default();
     match data.get("nodes") {
         Some(Value::Object(nodes)) => {
@@ -99,7 +99,7 @@ impl<'a> TopologyYaml<'a> {
 
     /// The error for a key, at the first line that contains it.
     fn wrong(&self, key: &str, reason: &str) -> Error {
-        bad(self.path, self.line(key), reason.to_owned(), HINT)
+        Error::bad_file(self.path, self.line(key), reason, HINT)
     }
 
     /// The first line that begins with a key, or contains it; 0 if none does.
@@ -149,13 +149,7 @@ impl<'a> TopologyYaml<'a> {
     /// A node with its endpoints; other keys are ignored.
     fn node_of_others(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
         let node = resolved(name);
-        let entry = |element| TopologyEntry {
-            element,
-            from_ns: None,
-            to_ns: None,
-            declared: false,
-            place: place(self.path, self.line(name)),
-        };
+        let entry = |element| TopologyEntry::new(element, place(self.path, self.line(name)));
         let mut entries = vec![entry(NamedElement::Node(node.clone()))];
         for (key, kind) in ENDS {
             for (topic, own) in self.names(value.get(key), &node)? {

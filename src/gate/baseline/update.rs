@@ -108,10 +108,10 @@ fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
 }
 
 fn unchanged(path: &Path, bad: &BadYaml) -> Error {
-    Error::BadExpectation {
+    Error::BadFile {
         path: path.to_owned(),
-        line: bad.line,
-        column: bad.column,
+        line: bad.at.line,
+        column: bad.at.column,
         reason: format!("this cannot be changed in place: {}", bad.reason),
         hint: "write the element as `/name: {key: value}` on one line".to_owned(),
     }

@@ -24,7 +24,7 @@ impl<'a> Document<'a> {
         reason: impl Into<String>,
         hint: impl Into<String>,
     ) -> Error {
-        Error::BadExpectation {
+        Error::BadFile {
             path: self.path.to_owned(),
             line: at.line,
             column: at.column,

@@ -39,19 +39,12 @@ const RULE: &str = "id node nodes topic appear_in_order when changes expect with
 /// Reads an expectation.
 ///
 /// # Errors
-/// [`crate::Error::BadExpectation`] for a text that is not YAML, expands too far, or contains an unknown key or word.
+/// [`crate::Error::BadFile`] for a text that is not YAML, expands too far, or contains an unknown key or word.
 pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
     let document = Document { path };
     let whole = parse_placed(text).map_err(|bad| {
-        let at = YamlPlace {
-            line: bad.line,
-            column: bad.column,
-        };
-        document.bad(
-            at,
-            bad.reason,
-            "the file must be YAML: `name: {key: value}`",
-        )
+        let hint = "the file must be YAML: `name: {key: value}`";
+        document.bad(bad.at, bad.reason, hint)
     })?;
     let fields = document.fields(&whole, "the file", FILE)?;
     let hint = format!("the first line must be `schema: {SCHEMA}`");

@@ -23,12 +23,8 @@ use crate::mission::{Mission, Window};
 /// [`Error::BadFile`] with the line for text that is not JSON or lacks these keys, for another schema, and for windows
 /// that are not in order of time.
 pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
-    let bad = |line: usize, reason: String| Error::BadFile {
-        path: path.to_owned(),
-        line,
-        reason,
-        hint: "`bagreel render BAG -o x.json` writes a mission".to_owned(),
-    };
+    let hint = "`bagreel render BAG -o x.json` writes a mission";
+    let bad = |line: usize, reason: String| Error::bad_file(path, line, reason, hint);
     let mut raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
     if raw.schema != SCHEMA && !OLD_SCHEMAS.contains(&&*raw.schema) {
         return Err(bad(0, format!("schema `{}` is not `{SCHEMA}`", raw.schema)));

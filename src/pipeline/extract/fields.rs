@@ -125,11 +125,9 @@ impl Lost {
         self.messages += count;
         let types = self.types.entry(type_name.to_owned());
         types.or_insert_with(|| why.to_owned());
-        self.notices.add(Notice {
-            kind: NoticeKind::Undecodable,
-            count,
-            text: format!("messages of `{topic}` ({type_name}) were left out: {why}"),
-        });
+        let text = format!("messages of `{topic}` ({type_name}) were left out: {why}");
+        self.notices
+            .add(Notice::counted(NoticeKind::Undecodable, count, text));
     }
 }
 
