@@ -40,6 +40,16 @@ use source::{
     statistics, tf_pair, topic_statistics,
 };
 
+/// The row of the source with this word.
+pub(crate) fn source_id(word: &str) -> observation::SourceId {
+    SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
+}
+
+/// The word of the source in this row.
+pub(crate) fn source_word(row: observation::SourceId) -> &'static str {
+    SOURCES.get(row).map_or("", |s| s.word)
+}
+
 /// All kinds of evidence; a set of them ([`Evidence`]) has at most 64 members.
 pub const SOURCES: &[Source] = &[
     Source {

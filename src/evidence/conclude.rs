@@ -20,7 +20,7 @@ use crate::evidence::inference::{
 };
 use crate::evidence::observation::{Measurement, Name, Observations};
 use crate::evidence::source::contract::Owners;
-use crate::evidence::source::row;
+use crate::evidence::source_id;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::substitution::ANONYMOUS;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
@@ -374,7 +374,7 @@ fn stated(
     } else {
         ("topology", Confidence::Stated)
     };
-    let source = row(word);
+    let source = source_id(word);
     if known.facts.is_watched(what.ends()) {
         known.facts.pieces.push(EvidenceLine {
             time: None,

@@ -15,7 +15,7 @@ use crate::evidence::inference::closed::Closed;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
 };
-use crate::evidence::source::word;
+use crate::evidence::source_word;
 use crate::evidence::times::SeriesId;
 
 pub(crate) use incident::{Incident, IncidentKind};
@@ -251,7 +251,7 @@ impl<'a> Conclusions<'a> {
             self.worded.insert((inference.what, inference.source));
             self.facts.pieces.push(EvidenceLine {
                 time,
-                source: word(inference.source),
+                source: source_word(inference.source),
                 confidence: inference.confidence,
                 text,
             });

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
-use crate::evidence::source::word;
+use crate::evidence::source_word;
 use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
@@ -285,7 +285,7 @@ impl Observations {
             if !text.is_empty() {
                 self.pieces.push(EvidenceLine {
                     time,
-                    source: word(source),
+                    source: source_word(source),
                     confidence: said.confidence,
                     text,
                 });

@@ -174,16 +174,6 @@ impl Read {
     }
 }
 
-/// The row of the source with this word.
-pub(crate) fn row(word: &str) -> SourceId {
-    SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
-}
-
-/// The word of the source in this row.
-pub(crate) fn word(row: SourceId) -> &'static str {
-    SOURCES.get(row).map_or("", |s| s.word)
-}
-
 /// The sources that read a connection's messages, with their readers; and whether some source knows its type by another
 /// layout.
 pub(crate) fn readers(stream: &Stream, schema: &MessageSchema) -> (Vec<(SourceId, Read)>, bool) {

@@ -12,7 +12,7 @@ use crate::base::words::count;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, Observation};
 use crate::evidence::source::contract::Owners;
-use crate::evidence::source::row;
+use crate::evidence::source_id;
 
 /// Adds a box for every topic that lacks publishers, according to its recording or to a recorded graph.
 pub(crate) fn conclude(known: &mut Conclusions<'_>) {
@@ -135,7 +135,7 @@ fn add(
     edge: ElementKey,
     words: &dyn Fn() -> String,
 ) {
-    let source = row(word);
+    let source = source_id(word);
     let (ElementKey::Publish(_, topic) | ElementKey::Subscribe(topic, _)) = edge else {
         return;
     };

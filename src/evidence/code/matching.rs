@@ -16,7 +16,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name};
-use crate::evidence::source::{row, word};
+use crate::evidence::{source_id, source_word};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
@@ -267,7 +267,7 @@ type NamedNodes = BTreeMap<String, (Name, BTreeSet<&'static str>)>;
 /// The nodes that the bag names by more than a declaration, and those of launch files that the user gives.
 fn named(known: &Conclusions<'_>) -> NamedNodes {
     let mut named = NamedNodes::new();
-    let launch = row("launch");
+    let launch = source_id("launch");
     let is_named = |p: &&Inference| p.confidence != Confidence::Declared || p.source == launch;
     for inference in known.inferences.iter().filter(is_named) {
         let node = match inference.what {
@@ -281,7 +281,7 @@ fn named(known: &Conclusions<'_>) -> NamedNodes {
             let (_, words) = named
                 .entry(text.to_string())
                 .or_insert((node, BTreeSet::new()));
-            words.extend([word(inference.source)]);
+            words.extend([source_word(inference.source)]);
         }
     }
     named
@@ -379,7 +379,7 @@ fn draw(
         return false;
     }
     let when = Validity::Like(ElementKey::Node(node));
-    let inference = Inference::new(row("source"), what, Confidence::Declared, when);
+    let inference = Inference::new(source_id("source"), what, Confidence::Declared, when);
     known.because(inference, None, |_| sentence(code, found, words));
     true
 }

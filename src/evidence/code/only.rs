@@ -16,7 +16,7 @@ use crate::base::name::last_part;
 use crate::base::words::{count, worded};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name};
-use crate::evidence::source::row;
+use crate::evidence::source_id;
 use crate::evidence::topology::launch::join;
 
 worded! {
@@ -348,7 +348,7 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     );
     let basis = Validity::Like(ElementKey::Topic(candidate.found.topic));
     for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
-        let inference = Inference::new(row("source_only"), what, Confidence::Declared, when);
+        let inference = Inference::new(source_id("source_only"), what, Confidence::Declared, when);
         known.because(inference, None, |_| text.clone());
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Conclusions, ElementKey, Reliability};
 use crate::base::time::Span;
 use crate::evidence::observation::{Name, Observation};
-use crate::evidence::source::word;
+use crate::evidence::source_word;
 
 /// Complete lists of the topics that nodes publish and subscribe to, if there are any.
 #[derive(Debug, Default)]
@@ -27,7 +27,7 @@ impl Closed {
         let mut context: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
-            let word = word(fact.source);
+            let word = source_word(fact.source);
             if let (
                 Observation::Lists(node, _) | Observation::Publish(node, _),
                 Some((first, last)),

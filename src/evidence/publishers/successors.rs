@@ -13,7 +13,7 @@ use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, Statement};
-use crate::evidence::source::row;
+use crate::evidence::source_id;
 use crate::evidence::times::{SeriesId, Stamps};
 
 /// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` contains the indices of
@@ -59,7 +59,7 @@ pub(super) fn part(
         for observation in [Observation::Node(node), Observation::NodeGone(node)] {
             let said = Statement::new(observation, Confidence::Stated);
             let words = || "there is no sign of it after a topic of its own fell silent".to_owned();
-            facts.state(row("connection"), said, Some(time), words);
+            facts.state(source_id("connection"), said, Some(time), words);
         }
     }
     facts.finish()
