@@ -61,6 +61,20 @@ impl MessageSchema {
         Self(outline(definition))
     }
 
+    /// The message of this name in a definition of several; empty for the first one.
+    pub(crate) fn of_part(definition: &str, name: &str) -> Option<Self> {
+        let mut all = outline(definition);
+        let at = all.iter().position(|(own, _)| own == name)?;
+        all[..=at].rotate_right(1);
+        Some(Self(all))
+    }
+
+    /// The schema with the messages of another one, which it prefers less than its own.
+    pub(crate) fn with(mut self, others: Self) -> Self {
+        self.0.extend(others.0);
+        self
+    }
+
     /// The messages in it, as [`outline`] lists them.
     pub(crate) fn outline(&self) -> &[(String, String)] {
         &self.0
@@ -85,12 +99,6 @@ impl MessageSchema {
             let kind = field.split(' ').next().unwrap_or_default();
             KINDS.contains(&kind)
         })
-    }
-
-    /// A built-in schema: the message's fields under the empty name, then those of the messages inside it.
-    pub(crate) fn of_fields(fields: &[(&str, &str)]) -> Self {
-        let own = |(name, fields): &(&str, &str)| ((*name).to_owned(), (*fields).to_owned());
-        Self(fields.iter().map(own).collect())
     }
 
     /// Parses a whole payload.

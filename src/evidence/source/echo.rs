@@ -90,7 +90,7 @@ pub(crate) fn schema(type_name: &str, defined: &Arc<MessageSchema>) -> Option<Ar
         "std_msgs/UInt32" => "uint32 data",
         _ => return defined.has_words().then(|| Arc::clone(defined)),
     };
-    Some(Arc::new(MessageSchema::of_fields(&[("", known)])))
+    Some(Arc::new(MessageSchema::of_text(known)))
 }
 
 /// The words and whole numbers directly in a message.

@@ -24,88 +24,16 @@ pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_monito
 /// `rosgraph_msgs/msg/Node`.
 pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Node", &[]);
 
-/// The types that are equal in all forms, and those of the two forms of 2026, in the order of nodl and of the
-/// core interfaces: <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
-const COMMON: &[(&str, &str)] = &[
-    ("InterfaceType", "string name;TypeHash hash"),
-    ("TypeHash", "byte version;byte[32] value"),
-    ("QoSProfile", QOS),
-    ("QosProfile", QOS),
-    (
-        "ParameterDescriptor",
-        "string name;byte type;string description;string additional_constraints;byte read_only;byte dynamic_typing;\
-         FloatingPointRange[] floating_point_range;IntegerRange[] integer_range",
-    ),
-    (
-        "FloatingPointRange",
-        "float64 from_value;float64 to_value;float64 step",
-    ),
-    (
-        "IntegerRange",
-        "int64 from_value;int64 to_value;uint64 step",
-    ),
-    (
-        "ParameterValue",
-        "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;\
-         byte[] byte_array_value;byte[] bool_array_value;int64[] integer_array_value;\
-         float64[] double_array_value;string[] string_array_value",
-    ),
-];
-const QOS: &str = "uint32 depth;Duration deadline;Duration lifespan;byte history;byte reliability;byte durability;\
-                   byte liveliness;Duration liveliness_lease_duration";
-const OLD_NODE: &str = "string name;Topic[] publishers;Topic[] subscriptions;ParameterDescriptor[] parameters;\
-                        ParameterValue[] parameter_values";
-const TOPIC: (&str, &str) = ("Topic", "string name;InterfaceType type;QoSProfile qos");
+/// The definition of a graph in the core interfaces, whose types are those of the other forms unless they differ:
+/// <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
+pub(crate) const DEFINITION: &str = include_str!("rosgraph.msg");
 
-/// The types of each form besides [`COMMON`], the newest first.
-const FORMS: [&[(&str, &str)]; 4] = [
-    &[
-        ("Graph", "Node[] nodes"),
-        (
-            "Node",
-            "string name;ParameterDescriptor[] parameters;ParameterValue[] parameter_values;Topic[] publishers;\
-             Topic[] subscriptions;Service[] service_clients;Service[] service_servers;Action[] action_clients;\
-             Action[] action_servers",
-        ),
-        TOPIC,
-        (
-            "Service",
-            "string name;InterfaceType request_type;QoSProfile request_qos;InterfaceType response_type;\
-             QoSProfile response_qos",
-        ),
-        (
-            "Action",
-            "string name;Service send_goal;Service get_result;Service cancel_goal;Topic feedback;Topic status",
-        ),
-    ],
-    &[
-        ("Graph", "Node[] nodes"),
-        (
-            "Node",
-            "ParameterDescriptor[] parameters;Topic[] publishers;Topic[] subscriptions;Service[] service_clients;\
-             Service[] service_servers;Action[] action_clients;Action[] action_servers;string name;\
-             ParameterValue[] parameter_values",
-        ),
-        TOPIC,
-        (
-            "Service",
-            "string name;InterfaceType request_type;InterfaceType response_type",
-        ),
-        (
-            "Action",
-            "string name;InterfaceType request_type;InterfaceType response_type;InterfaceType feedback_type",
-        ),
-    ],
-    &[
-        ("Graph", "Time timestamp;NodeInfo[] nodes"),
-        ("NodeInfo", OLD_NODE),
-        ("Topic", "string name;string type;QosProfile qos"),
-    ],
-    &[
-        ("Graph", "Time timestamp;NodeInfo[] nodes"),
-        ("NodeInfo", OLD_NODE),
-        ("Topic", "string name;QosProfile qos;string type"),
-    ],
+/// The types of each form, the newest first: of the core interfaces, of nodl, and two of graph-monitor.
+const FORMS: [&str; 4] = [
+    DEFINITION,
+    include_str!("rosgraph_2026.msg"),
+    include_str!("rosgraph_monitor.msg"),
+    include_str!("rosgraph_monitor_first.msg"),
 ];
 
 /// Reads a snapshot of the whole graph.
@@ -113,7 +41,7 @@ pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let graph = parsed(context, payload, "Graph", "nodes")?;
+    let graph = parsed(context, payload, "", "nodes")?;
     snapshot(context, graph.list("nodes"), "");
     Ok(())
 }
@@ -129,7 +57,7 @@ pub(crate) fn read_node(
     Ok(())
 }
 
-/// A message of this type, by the definition in the bag or the first form that consumes the payload,
+/// A graph, or the message of a graph with this name, by the definition in the bag or the first form that consumes the payload,
 /// preferably exactly.
 fn parsed(
     context: &SourceContext<'_>,
@@ -142,11 +70,8 @@ fn parsed(
     let own = text.filter(|text| text.contains(field) && !text.contains("struct "));
     let own = own.map(MessageSchema::of_text);
     let forms = FORMS.iter().filter_map(|form| {
-        let (_, fields) = form.iter().find(|(own, _)| *own == name)?;
-        let all = [("", *fields)]
-            .into_iter()
-            .chain(form.iter().chain(COMMON).copied());
-        Some(MessageSchema::of_fields(&all.collect::<Vec<_>>()))
+        let form = MessageSchema::of_part(form, name)?;
+        Some(form.with(MessageSchema::of_text(DEFINITION)))
     });
     let all: Vec<MessageSchema> = own.into_iter().chain(forms).collect();
     let whole = all

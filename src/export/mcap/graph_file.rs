@@ -40,7 +40,7 @@ impl<W: Write + Seek> GraphFile<W> {
             sequence: 0,
         };
         for (topic, kind, definition) in CHANNELS {
-            file.own_channel(topic, kind, definition())?;
+            file.own_channel(topic, kind, definition.to_owned())?;
         }
         Ok(file)
     }
