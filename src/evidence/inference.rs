@@ -366,6 +366,12 @@ impl<'a> Conclusions<'a> {
     }
 
     /// The nodes known so far to subscribe to `topic`.
+    /// The publisher of a topic, if it is known to be a single one.
+    pub(crate) fn only_publisher(&self, topic: Name) -> Option<Name> {
+        let mut all = self.publishers(topic);
+        all.next().filter(|_| all.next().is_none())
+    }
+
     pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.subscribers.get(&topic).into_iter().flatten().copied()
     }
@@ -449,6 +455,12 @@ impl<'a> Conclusions<'a> {
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
         self.facts.text(name)
+    }
+
+    /// The observations of a source.
+    pub(crate) fn observed(&self, source: SourceId) -> Vec<ObservationRecord> {
+        let all = self.facts.list.iter().filter(|fact| fact.source == source);
+        all.copied().collect()
     }
 
     /// The times at which a fact was observed, sorted; empty if they cannot be read, and the error is stored.

@@ -8,10 +8,9 @@ mod names;
 mod take;
 mod text;
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 
-use super::declaration::{Class, FileCode};
+use super::declaration::{Class, Classes, FileCode};
 use super::texts::TextValues;
 use crate::evidence::syntax::{Language, Node, Parsed, line, walk};
 use names::Aliases;
@@ -39,28 +38,24 @@ pub(super) fn read(text: &str) -> FileCode {
     };
     let mut reader = CppReader {
         parsed: &parsed,
-        work: Cell::new(0),
         names: Aliases::default(),
-        texts: TextValues::default(),
+        texts: TextValues::new(text.len()),
         handles: BTreeMap::new(),
         members: BTreeMap::new(),
         callbacks: BTreeMap::new(),
-        classes: vec![Class::default()],
+        classes: Classes::default(),
         places: BTreeMap::new(),
-        open: Vec::new(),
     };
     reader.visit_all(CppReader::look);
     reader.visit_all(CppReader::take);
     FileCode {
-        classes: reader.classes,
+        classes: reader.classes.all,
         imports: BTreeMap::new(),
     }
 }
 
 struct CppReader<'a> {
     parsed: &'a Parsed,
-    /// The number of expressions whose texts were looked up.
-    work: Cell<usize>,
     names: Aliases,
     texts: TextValues<'a>,
     /// Node handles with their namespaces.
@@ -69,29 +64,20 @@ struct CppReader<'a> {
     members: BTreeMap<String, Node<'a>>,
     /// Functions with the type of their first parameter.
     callbacks: BTreeMap<String, Node<'a>>,
-    classes: Vec<Class>,
+    classes: Classes,
     /// The index of each class.
     places: BTreeMap<String, usize>,
-    /// The ends of the enclosing classes, with the indices of the classes.
-    open: Vec<(usize, usize)>,
 }
 
 impl<'a> CppReader<'a> {
-    /// Visits every element, with the enclosing classes in `open`.
+    /// Visits every element inside its classes.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
-        self.open.clear();
-        let root = self.parsed.root();
-        walk(root, &mut |node| {
-            while self
-                .open
-                .last()
-                .is_some_and(|(end, _)| *end <= node.start_byte())
-            {
-                self.open.pop();
-            }
+        self.classes.open.clear();
+        walk(self.parsed.root(), &mut |node| {
+            self.classes.leave(node);
             if let Some(name) = self.class_of(node) {
                 let at = self.place(name, node);
-                self.open.push((node.end_byte(), at));
+                self.classes.enter(node, at);
             }
             visit(self, node);
             true
@@ -104,11 +90,6 @@ impl<'a> CppReader<'a> {
 
     fn field(&self, node: Node<'a>, name: &str) -> &'a str {
         self.parsed.field(node, name)
-    }
-
-    fn class(&mut self) -> &mut Class {
-        let at = self.open.last().map_or(0, |(_, at)| *at);
-        &mut self.classes[at]
     }
 
     /// The class that an element defines, or whose function it defines: `void Foo::run() {…}`.
@@ -144,13 +125,14 @@ impl<'a> CppReader<'a> {
         if let Some(at) = self.places.get(name) {
             return *at;
         }
-        self.classes.push(Class {
+        self.classes.all.push(Class {
             name: name.to_owned(),
             line: line(node),
             ..Class::default()
         });
-        self.places.insert(name.to_owned(), self.classes.len() - 1);
-        self.classes.len() - 1
+        let at = self.classes.all.len() - 1;
+        self.places.insert(name.to_owned(), at);
+        at
     }
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::base::words::{self, worded};
 use crate::evidence::inference::ElementKey;
 use crate::evidence::observation::Name;
+use crate::evidence::syntax::Node;
 
 worded! {
     /// The role of a node on a topic.
@@ -82,6 +83,42 @@ pub(crate) struct Class {
     pub(crate) logs: bool,
     /// The line, ≥ 1.
     pub(crate) line: usize,
+}
+
+/// The classes of a file, the first one for what is outside of all, and those around the visited element.
+#[derive(Debug)]
+pub(super) struct Classes {
+    pub(super) all: Vec<Class>,
+    /// The ends of the enclosing classes, with their indices.
+    pub(super) open: Vec<(usize, usize)>,
+}
+
+impl Default for Classes {
+    fn default() -> Self {
+        Self {
+            all: vec![Class::default()],
+            open: Vec::new(),
+        }
+    }
+}
+
+impl Classes {
+    /// Leaves the classes that do not contain an element.
+    pub(super) fn leave(&mut self, node: Node<'_>) {
+        let contains = |(end, _): &(usize, usize)| *end > node.start_byte();
+        self.open.retain(contains);
+    }
+
+    pub(super) fn enter(&mut self, node: Node<'_>, class: usize) {
+        self.open.push((node.end_byte(), class));
+    }
+
+    /// The innermost class around the element.
+    pub(super) fn current(&mut self) -> &mut Class {
+        let at = self.open.last().map_or(0, |(_, at)| *at);
+        let last = self.all.len() - 1;
+        &mut self.all[at.min(last)]
+    }
 }
 
 /// The content of a source file.

@@ -1,11 +1,10 @@
 //! Declarations in Python code: rclpy and rospy, actions, message filters, transforms, of Python 2 and 3.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::declaration::{Call, Class, Declaration, FileCode, Made, short, type_of};
-use super::texts::{DEEPEST, LONGEST, TextValues, most_work};
+use super::declaration::{Call, Class, Classes, Declaration, FileCode, Made, short, type_of};
+use super::texts::{DEEPEST, LONGEST, TextValues};
 use crate::evidence::syntax::{Language, Node, Parsed, arguments, children, line, walk};
 
 /// Reads a file; empty if it is too deeply nested.
@@ -15,35 +14,29 @@ pub(super) fn read(text: &str) -> FileCode {
     };
     let mut reader = PythonReader {
         parsed: &parsed,
-        work: Cell::new(0),
         imports: BTreeMap::new(),
         wildcards: Vec::new(),
-        texts: TextValues::default(),
-        classes: vec![Class::default()],
-        open: Vec::new(),
+        texts: TextValues::new(text.len()),
+        classes: Classes::default(),
         loops: Vec::new(),
         bound: BTreeMap::new(),
     };
     reader.visit_all(PythonReader::look);
     reader.visit_all(PythonReader::take);
     FileCode {
-        classes: reader.classes,
+        classes: reader.classes.all,
         imports: reader.imports,
     }
 }
 
 struct PythonReader<'a> {
     parsed: &'a Parsed,
-    /// The number of expressions whose texts were looked up.
-    work: Cell<usize>,
     /// Imported names and their full names: `std_msgs.msg.String` for `String`.
     imports: BTreeMap<String, String>,
     /// Modules whose names are all imported.
     wildcards: Vec<String>,
     texts: TextValues<'a>,
-    classes: Vec<Class>,
-    /// The ends of the enclosing classes, with the indices of the classes.
-    open: Vec<(usize, usize)>,
+    classes: Classes,
     /// Loops: the text that is repeated, the variables and the items.
     loops: Vec<(Range<usize>, Node<'a>, Node<'a>)>,
     /// The values of the variables in the current iteration of the enclosing loops.
@@ -54,21 +47,14 @@ struct PythonReader<'a> {
 const MOST_TURNS: usize = 64;
 
 impl<'a> PythonReader<'a> {
-    /// Visits every element, with the enclosing classes in `open`.
+    /// Visits every element inside its classes.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
-        self.open.clear();
         let mut next = 1;
-        let root = self.parsed.root();
-        walk(root, &mut |node| {
-            while self
-                .open
-                .last()
-                .is_some_and(|(end, _)| *end <= node.start_byte())
-            {
-                self.open.pop();
-            }
+        self.classes.open.clear();
+        walk(self.parsed.root(), &mut |node| {
+            self.classes.leave(node);
             if node.kind() == "class_definition" {
-                self.open.push((node.end_byte(), next));
+                self.classes.enter(node, next);
                 next += 1;
             }
             visit(self, node);
@@ -78,15 +64,6 @@ impl<'a> PythonReader<'a> {
 
     fn text(&self, node: Node<'_>) -> &'a str {
         self.parsed.text(node)
-    }
-
-    fn class(&mut self) -> &mut Class {
-        let at = self
-            .open
-            .last()
-            .map_or(0, |(_, at)| *at)
-            .min(self.classes.len() - 1);
-        &mut self.classes[at]
     }
 
     /// First pass: classes, imports, and values of names.
@@ -144,7 +121,7 @@ impl<'a> PythonReader<'a> {
                 .unwrap_or_default()
                 .to_owned()
         };
-        self.classes.push(Class {
+        self.classes.all.push(Class {
             name: self.parsed.field(node, "name").to_owned(),
             bases: bases
                 .into_iter()
@@ -204,7 +181,10 @@ impl<'a> PythonReader<'a> {
         let given = self.arguments(node);
         let first = given.positional.iter().find_map(|n| self.string(*n));
         if name.chars().next().is_some_and(char::is_uppercase) {
-            self.class().mentions.insert(name.to_owned(), first.clone());
+            self.classes
+                .current()
+                .mentions
+                .insert(name.to_owned(), first.clone());
         }
         self.remark(name, object, &full, &given);
         if let Some(made) = made(name, &full) {
@@ -225,7 +205,7 @@ impl<'a> PythonReader<'a> {
                 );
             }
             self.bound.clear();
-            self.class().declarations.extend(declared);
+            self.classes.current().declarations.extend(declared);
         }
     }
 
@@ -289,12 +269,12 @@ impl<'a> PythonReader<'a> {
                 .find_map(|name| given.named(name));
             let named = named.into_iter().chain(given.positional.iter().copied());
             let node_name = named.into_iter().find_map(|n| self.string(n));
-            self.class().node_names.extend(node_name);
+            self.classes.current().node_names.extend(node_name);
         }
         let is_writer =
             name == "SequentialWriter" || full == "rosbag.Bag" && given.positional.len() > 1;
-        self.class().is_recorder |= is_writer;
-        self.class().logs |= name == "get_logger" || full.starts_with("rospy.log");
+        self.classes.current().is_recorder |= is_writer;
+        self.classes.current().logs |= name == "get_logger" || full.starts_with("rospy.log");
     }
 
     /// The called name, and the object before its dot.
@@ -390,10 +370,7 @@ impl<'a> PythonReader<'a> {
 
     /// The text of an expression, if known.
     fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
-        self.work.set(self.work.get() + 1);
-        if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
-            return None;
-        }
+        self.texts.evaluate(depth)?;
         let field = |name| node.child_by_field_name(name);
         let again = |node| {
             self.string_at(node, depth + 1)

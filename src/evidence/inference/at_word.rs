@@ -14,13 +14,12 @@ impl Conclusions<'_> {
         source: SourceId,
     ) -> Vec<(ObservationRecord, Vec<Stamp>, Vec<Stamp>)> {
         let endings = self.endings();
-        let facts = self.facts.list.iter().filter(|f| f.source == source);
-        let facts: Vec<ObservationRecord> = facts.copied().collect();
+        let facts = self.observed(source).into_iter();
         let times = |fact: ObservationRecord| {
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
             (fact, signs, ends)
         };
-        facts.into_iter().map(times).collect()
+        facts.map(times).collect()
     }
 
     /// Adds the inferences that follow from single observations without a rule: nodes, topics, publications

@@ -37,14 +37,10 @@ fn doubled(record: &LogRecord<'_>) -> Option<String> {
 
 /// Adds the names that are used twice.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let all = known.facts.list.clone();
-    for fact in all {
+    for fact in known.observed(source) {
         let Observation::Duplicate(name) = fact.observation else {
             continue;
         };
-        if fact.source != source {
-            continue;
-        }
         let Some(node) = known.owner(&known.text(name)) else {
             continue;
         };

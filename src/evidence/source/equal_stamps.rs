@@ -307,7 +307,10 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
     let mut keys = Vec::new();
     for (at, id) in streams.iter().zip(&series) {
         let topic = known.streams[*at].topic;
-        let node = publisher(known, *at);
+        let stream = &known.streams[*at];
+        let node = stream
+            .publisher
+            .or_else(|| known.only_publisher(stream.topic));
         let role = node.map_or_else(String::new, |n| role(&known.text(n)));
         let key = (known.text(topic).to_string(), role.clone());
         let flow = pooled.entry(key.clone()).or_insert_with(|| StampFlow {
@@ -346,15 +349,6 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
     }
     compare(&group, &all, &mut pairs);
     Flows { all, pairs }
-}
-
-/// The node that publishes a stream, if it is known to be a single one.
-fn publisher(known: &Conclusions<'_>, at: usize) -> Option<Name> {
-    let stream = &known.streams[at];
-    stream.publisher.or_else(|| {
-        let mut all = known.publishers(stream.topic);
-        all.next().filter(|_| all.next().is_none())
-    })
 }
 
 /// A node's name without the numbers that differ from run to run.

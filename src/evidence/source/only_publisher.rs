@@ -21,9 +21,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
             continue;
         }
-        let mut publishers = known.publishers(stream.topic);
-        if let (Some(only), None) = (publishers.next(), publishers.next()) {
-            drop(publishers);
+        if let Some(only) = known.only_publisher(stream.topic) {
             let what = ElementKey::Publish(only, stream.topic);
             let when = Validity::Messages(at);
             known.add(Inference::new(source, what, Confidence::Inferred, when));

@@ -86,8 +86,8 @@ struct Matches {
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
     for (output, total) in &matches.distinct {
-        let (basis, _) = flows[*output];
-        let Some(node) = publisher(known, flows[*output]) else {
+        let (basis, sender) = flows[*output];
+        let Some(node) = sender.or_else(|| known.only_publisher(basis)) else {
             continue;
         };
         let inputs = inputs(known, &flows, &matches, *output, node);
@@ -135,14 +135,6 @@ fn turns(
         );
         known.incident(source, what, kind, pair[1].first);
     }
-}
-
-/// The node that publishes a flow, if it is known to be a single one.
-fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option<Name> {
-    publisher.or_else(|| {
-        let mut all = known.publishers(topic);
-        all.next().filter(|_| all.next().is_none())
-    })
 }
 
 /// Processes all messages in order of time.

@@ -71,10 +71,8 @@ pub(crate) fn announced(context: &mut SourceContext<'_>) {
 
 /// Declares every topic with an offer, even without messages.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.facts.list.clone() {
-        if let Observation::Quality(topic, _) = fact.observation
-            && fact.source == source
-        {
+    for fact in known.observed(source) {
+        if let Observation::Quality(topic, _) = fact.observation {
             let what = ElementKey::Topic(topic);
             known.add(Inference::new(
                 source,

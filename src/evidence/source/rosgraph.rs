@@ -333,9 +333,8 @@ fn incompatible(offered: &MessageValue, asked: &MessageValue) -> Option<&'static
 
 /// Adds the subscribers that receive nothing, and duplicate names.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    for fact in known.facts.list.clone() {
+    for fact in known.observed(source) {
         let (what, kind) = match fact.observation {
-            _ if fact.source != source => continue,
             Observation::Starved(node, topic, policy) => (
                 ElementKey::Subscribe(topic, node),
                 IncidentKind::Starved(known.text(policy)),

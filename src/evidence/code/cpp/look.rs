@@ -61,7 +61,7 @@ impl<'a> CppReader<'a> {
             unscoped(name).trim().to_owned()
         };
         let bases: Vec<String> = bases.map(last).collect();
-        let class = self.class();
+        let class = self.classes.current();
         class.bases.extend(bases);
         class.is_defined = true;
         class.line = line(node);

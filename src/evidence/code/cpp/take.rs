@@ -32,16 +32,20 @@ impl<'a> CppReader<'a> {
             }
             "type_identifier" => {
                 let name = self.text(node);
-                self.class().is_recorder |=
+                self.classes.current().is_recorder |=
                     is_recorder(name, node.parent().map_or("", |p| self.text(p)));
                 self.transform(node, name);
-                self.class().mentions.entry(name.to_owned()).or_insert(None);
+                self.classes
+                    .current()
+                    .mentions
+                    .entry(name.to_owned())
+                    .or_insert(None);
             }
             "identifier"
                 if self.text(node).starts_with("RCLCPP_")
                     || self.text(node).starts_with("ROS_") =>
             {
-                self.class().logs = true;
+                self.classes.current().logs = true;
             }
             _ => {}
         }
@@ -52,17 +56,17 @@ impl<'a> CppReader<'a> {
         let given = arguments(node);
         if let ("init", "ros", [_, _, name, ..]) = (callee.name, callee.scope, &given[..]) {
             let name = self.string(*name);
-            self.class().node_names.extend(name);
+            self.classes.current().node_names.extend(name);
         }
         let first = given.first().and_then(|n| self.string(*n));
         let is_node = callee.name == "make_shared"
             && (callee.scope.ends_with("Node") || callee.template.ends_with("Node"));
         if is_node && (callee.scope.starts_with("rclcpp") || callee.template.starts_with("rclcpp"))
         {
-            self.class().node_names.extend(first);
+            self.classes.current().node_names.extend(first);
         } else if let ("make_shared" | "make_unique", Some(name)) = (callee.name, first) {
             let class = unscoped(callee.template).to_owned();
-            self.class().mentions.insert(class, Some(name));
+            self.classes.current().mentions.insert(class, Some(name));
         }
         // A filter is constructed without a topic and subscribes later.
         if let ("subscribe", Some(kind)) = (callee.name, self.members.get(callee.object))
@@ -101,7 +105,7 @@ impl<'a> CppReader<'a> {
         }
         let last = unscoped(self.text(name)).to_owned();
         let first = given.named_child(0).and_then(|n| self.string(n));
-        let class = self.class();
+        let class = self.classes.current();
         let is_base = class.bases.contains(&last) || class.name == last || last.ends_with("Node");
         if let (true, Some(name)) = (is_base, first) {
             class.node_names.push(name);
@@ -114,7 +118,7 @@ impl<'a> CppReader<'a> {
         let kind = self.text(kind);
         if kind.ends_with("rclcpp::Node") {
             let name = given.first().and_then(|n| self.string(*n));
-            self.class().node_names.extend(name);
+            self.classes.current().node_names.extend(name);
         }
         if let Some((made, inner)) = by_constructor(kind) {
             let types = self.names.types(inner);
@@ -140,7 +144,7 @@ impl<'a> CppReader<'a> {
             line: line(node),
             text: format!("{scope}::{name}"),
         };
-        let class = self.class();
+        let class = self.classes.current();
         for declaration in call.declarations() {
             if !class
                 .declarations
@@ -175,7 +179,10 @@ impl<'a> CppReader<'a> {
             line: line(node),
             text: short(self.text(node)),
         };
-        self.class().declarations.extend(call.declarations());
+        self.classes
+            .current()
+            .declarations
+            .extend(call.declarations());
     }
 
     /// The message type of a callback among the arguments.

@@ -1,6 +1,6 @@
 //! The texts of C++ expressions: literals, constants, members, defaults of parameters.
 
-use super::super::texts::{DEEPEST, LONGEST, most_work};
+use super::super::texts::LONGEST;
 use super::CppReader;
 use super::made::Callee;
 use crate::evidence::syntax::{Node, arguments, children};
@@ -19,10 +19,7 @@ impl<'a> CppReader<'a> {
 
     /// The text of an expression, if known.
     pub(super) fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
-        self.work.set(self.work.get() + 1);
-        if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
-            return None;
-        }
+        self.texts.evaluate(depth)?;
         let again = |node| {
             self.string_at(node, depth + 1)
                 .filter(|text| text.len() <= LONGEST)
