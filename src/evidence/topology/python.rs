@@ -28,17 +28,15 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
         return Err(Error::bad_file(path, 0, reason, HINT));
     };
     let mut evaluator = Evaluator::new(&parsed, BTreeMap::new());
-    match evaluator.launch_description() {
-        Some(actions) => Ok(Tree {
-            tag: "launch".to_owned(),
-            children: action::trees(&actions),
-            ..Tree::default()
-        }),
-        None => {
-            let reason = "there is no `generate_launch_description`";
-            Err(Error::bad_file(path, 0, reason, HINT))
-        }
-    }
+    let Some(actions) = evaluator.launch_description() else {
+        let reason = "there is no `generate_launch_description`";
+        return Err(Error::bad_file(path, 0, reason, HINT));
+    };
+    Ok(Tree {
+        tag: "launch".to_owned(),
+        children: action::trees(&actions),
+        ..Tree::default()
+    })
 }
 
 /// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` have these texts;
