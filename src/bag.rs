@@ -140,10 +140,7 @@ pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
 }
 
 fn fixed(input: &Input) -> Error {
-    Error::Unsupported {
-        path: input.name().into(),
-        what: "it cannot be followed while it grows".to_owned(),
-        hint: "give a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder"
-            .to_owned(),
-    }
+    let what = "it cannot be followed while it grows";
+    let hint = "give a `.bag.active`, `.bag`, `.mcap` or `.db3` file, or a rosbag2 folder";
+    Error::unsupported(input.name(), what, hint)
 }

@@ -58,13 +58,10 @@ impl Grammar for Rosbag1 {
         }
         let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
         let line = String::from_utf8_lossy(&line[..line.len().min(32)]);
-        Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: format!("it is of an old format, `{line}`"),
-            hint:
-                "convert it to version 2 with `rosbag fix old.bag new.bag` of a ROS 1 installation"
-                    .to_owned(),
-        })
+        let what = format!("it is of an old format, `{line}`");
+        let hint =
+            "convert it to version 2 with `rosbag fix old.bag new.bag` of a ROS 1 installation";
+        Err(Error::unsupported(path, what, hint))
     }
 
     /// The first line names the version.

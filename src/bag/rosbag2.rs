@@ -44,11 +44,7 @@ struct BagFolder {
 
 fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let BagPlace::Folder(path) = place else {
-        return Err(Error::Unsupported {
-            path: PathBuf::new(),
-            what: "it is not a folder".to_owned(),
-            hint: String::new(),
-        });
+        return Err(Error::unsupported("", "it is not a folder", ""));
     };
     let (files, links) = storage_and_links(&path);
     // A folder with nothing but links out of it is opened too, for this format's error message.

@@ -57,11 +57,8 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         BagPlace::File(source) => source,
         BagPlace::Folder(path) => return Err(super::explain(&path, &[], true)),
         BagPlace::Pipe(name, _) => {
-            return Err(Error::Unsupported {
-                path: name.into(),
-                what: "a database cannot be read from a pipe".to_owned(),
-                hint: "give the file itself".to_owned(),
-            });
+            let what = "a database cannot be read from a pipe";
+            return Err(Error::unsupported(name, what, "give the file itself"));
         }
     };
     let ready = place::ready(source.path())?;

@@ -28,11 +28,7 @@ pub(crate) fn elsewhere(url: &str) -> Error {
     } else {
         "download the bag, or build with the feature `remote`: `cargo install bagreel --features remote`"
     };
-    Error::Unsupported {
-        path: url.into(),
-        what: "it is not on this machine".to_owned(),
-        hint: hint.to_owned(),
-    }
+    Error::unsupported(url, "it is not on this machine", hint)
 }
 
 fn guess(head: &[u8]) -> (&'static str, &'static str) {

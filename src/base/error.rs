@@ -135,6 +135,29 @@ impl Error {
         }
     }
 
+    /// The error for a bag that cannot be read.
+    pub(crate) fn unsupported(
+        path: impl Into<PathBuf>,
+        what: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Self {
+        Self::Unsupported {
+            path: path.into(),
+            what: what.into(),
+            hint: hint.into(),
+        }
+    }
+
+    /// The error for something that could not be drawn or written.
+    #[cfg(feature = "render")]
+    pub(crate) fn output(path: &Path, reason: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Output {
+            path: path.to_owned(),
+            reason: reason.into(),
+            hint: hint.into(),
+        }
+    }
+
     /// Advice for the user; empty if there is none.
     pub fn hint(&self) -> String {
         match self {

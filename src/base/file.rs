@@ -2,12 +2,37 @@
 
 use std::fs::File;
 use std::io::{self, Read as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+#[cfg(feature = "render")]
+use super::budget::SUMMARY;
 use super::error::{Error, Result};
 
 /// The number of first bytes checked for text before the rest is read.
 const HEAD: u64 = 4096;
+
+/// A path with more at its end.
+pub(crate) fn with_suffix(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
+}
+
+/// The text already in a file, with a blank line after it, if that is the file to append to.
+///
+/// # Errors
+/// As [`read_text`].
+#[cfg(feature = "render")]
+pub(crate) fn text_before(path: &Path, append_to: Option<&Path>) -> Result<String> {
+    if append_to != Some(path) || !path.is_file() {
+        return Ok(String::new());
+    }
+    let before = read_text(path, SUMMARY)?;
+    Ok(match before.trim_end() {
+        "" => String::new(),
+        before => format!("{before}\n\n"),
+    })
+}
 
 /// The bytes of a file of at most `limit` bytes.
 ///

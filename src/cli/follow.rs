@@ -144,7 +144,7 @@ fn server(at: std::net::SocketAddr, args: &FollowArgs, terminal: &mut Terminal) 
         ));
     }
     let server = Server::start(at)?;
-    terminal.say(&format!("the page is at http://{}/", server.address));
+    terminal.status(&format!("the page is at http://{}/", server.address));
     Ok(server)
 }
 
@@ -185,7 +185,7 @@ impl Follower<'_> {
                 self.update_whole(terminal)?;
             }
             if is_idle && let Some(idle) = self.args.idle {
-                terminal.say(&format!("nothing was written for {idle}"));
+                terminal.status(&format!("nothing was written for {idle}"));
             }
             if is_over {
                 break;
@@ -198,7 +198,7 @@ impl Follower<'_> {
     /// Prints the status messages of the connection.
     fn report(&self, terminal: &mut Terminal) {
         let news = self.live.iter().flat_map(Live::news);
-        news.for_each(|text| terminal.say(&text));
+        news.for_each(|text| terminal.status(&text));
     }
 
     /// Prints the new events; false if standard output was closed.

@@ -198,7 +198,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
             }
         };
         let changed = words::count(done.changed, "fact");
-        terminal.say(&format!("{}: {changed} updated{left}", path.display()));
+        terminal.status(&format!("{}: {changed} updated{left}", path.display()));
     } else {
         let counts = [(done.nodes, "node"), (done.topics, "topic")];
         let what = counts.map(|(count, word)| words::count(count, word));

@@ -103,7 +103,7 @@ impl Terminal {
     }
 
     /// Prints a line on standard error unless quiet.
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(crate) fn status(&mut self, text: &str) {
         self.progress.end();
         if !self.quiet {
             // Nothing can be reported if standard error is closed.
@@ -117,7 +117,7 @@ impl Terminal {
         let names = files.into_iter().map(|file| file.display().to_string());
         let names = names.collect::<Vec<_>>().join(", ");
         let seconds = self.seconds();
-        self.say(&format!("wrote {names}: {what}, in {seconds:.1} s"));
+        self.status(&format!("wrote {names}: {what}, in {seconds:.1} s"));
     }
 
     /// Prints results on standard output. A closed pipe is not an error.
@@ -228,7 +228,7 @@ impl Terminal {
     pub(crate) fn timings(&mut self) {
         self.progress.end();
         for line in self.progress.timings() {
-            self.say(&line);
+            self.status(&line);
         }
     }
 

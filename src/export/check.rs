@@ -8,6 +8,7 @@ use super::sink::probe;
 use super::target::{NUMBER, Target, folder_of, is_special, same_file};
 use crate::bag;
 use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 
 /// Checks every output file before the inputs are read: no duplicates, no kept files, and every folder can be created
 /// and written. Leaves no files.
@@ -73,11 +74,8 @@ fn would_harm(target: &Target, path: &Path) -> bool {
     if path.is_dir() {
         return existing(target).iter().any(|file| is_kept_in(path, file));
     }
-    BESIDE.iter().any(|end| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(end);
-        target.may_be(Path::new(&name))
-    })
+    let is_beside = |end: &&str| target.may_be(&with_suffix(path, end));
+    BESIDE.iter().any(|end| is_beside(&end))
 }
 
 /// The existing files that would be replaced.
@@ -110,29 +108,20 @@ fn check_place(target: &Target) -> Result<()> {
     let Target::Path(path) = target else {
         return Ok(());
     };
-    let refuse = |reason: String, hint: &str| {
-        Err(Error::Output {
-            path: path.clone(),
-            reason,
-            hint: hint.to_owned(),
-        })
-    };
+    let refuse = |reason: &str, hint: &str| Err(Error::output(path, reason, hint));
     if path.file_name().is_none() || path.is_dir() {
-        return refuse("it is a folder".to_owned(), "give a file in it");
+        return refuse("it is a folder", "give a file in it");
     }
     let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
     if Target::Path(path.clone()).is_numbered() && !is_text {
         return refuse(
-            "`{n}` is in a name that is not UTF-8".to_owned(),
+            "`{n}` is in a name that is not UTF-8",
             "give it a name in UTF-8, or omit `{n}`",
         );
     }
     let folder = folder_of(path);
     if folder.to_string_lossy().contains(NUMBER) {
-        return refuse(
-            "`{n}` is in the folder".to_owned(),
-            "put `{n}` into the file's name",
-        );
+        return refuse("`{n}` is in the folder", "put `{n}` into the file's name");
     }
     let there = folder
         .ancestors()
@@ -142,7 +131,7 @@ fn check_place(target: &Target) -> Result<()> {
         .unwrap_or(Path::new("."));
     if !there.is_dir() {
         return refuse(
-            format!("`{}` is not a folder", there.display()),
+            &format!("`{}` is not a folder", there.display()),
             "give an existing folder, or one that can be created",
         );
     }

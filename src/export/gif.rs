@@ -58,11 +58,9 @@ impl Encoder for Gif {
             return Ok(());
         };
         let (Ok(w), Ok(h)) = (u16::try_from(width), u16::try_from(height)) else {
-            return Err(Error::Output {
-                path: self.target.path().to_owned(),
-                reason: format!("{width} by {height} pixels exceed GIF's limit"),
-                hint: "give a `--size` below 65,536 pixels, or write `.apng`".to_owned(),
-            });
+            let reason = format!("{width} by {height} pixels exceed GIF's limit");
+            let hint = "give a `--size` below 65,536 pixels, or write `.apng`";
+            return Err(Error::output(self.target.path(), reason, hint));
         };
         let animation = Animation::new(sink, (w, h), palette);
         self.animation = Some(animation.map_err(self.error())?);

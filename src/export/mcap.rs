@@ -46,8 +46,8 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
     for (id, event) in (0..).zip(&mission.log.events) {
         if event.is_headline() {
             let at = event.time.max(mission.span.start).min(last);
-            let says = sentence(mission, &parts, id, event);
-            all.push((at, LOG, log(event.time, &says, event.kind.is_remark())));
+            let text = sentence(mission, &parts, id, event);
+            all.push((at, LOG, log(event.time, &text, event.kind.is_remark())));
         }
     }
     all.push((last, LOG, log(last, "the recording ends", false)));

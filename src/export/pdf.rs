@@ -42,18 +42,16 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     }))
 }
 
+const HINT: &str = "write `.svg` with `{n}` instead";
+
 impl Book<'_> {
-    fn failed(&self, reason: String) -> Error {
-        Error::Output {
-            path: self.target.path().to_owned(),
-            reason,
-            hint: "write `.svg` with `{n}` instead".to_owned(),
-        }
+    fn failed(&self, reason: &str) -> Error {
+        Error::output(self.target.path(), reason, HINT)
     }
 
     fn add(&self, scene: Scene, entry: String) -> Result<()> {
         let sent = self.sheets.send(PdfPage { scene, entry });
-        sent.map_err(|_| self.failed("the document ended early".to_owned()))
+        sent.map_err(|_| self.failed("the document ended early"))
     }
 
     /// The time of a window and its first change.
@@ -89,7 +87,6 @@ impl Encoder for Book<'_> {
         if let Some(scene) = self.strip {
             self.add(scene.clone(), scene.title.clone())?;
         }
-        let refused = self.failed("the document is not valid".to_owned());
         let Self {
             target,
             sheets,
@@ -101,13 +98,12 @@ impl Encoder for Book<'_> {
         let bytes = match press.join() {
             Ok(Ok(bytes)) => bytes,
             Ok(Err(reason)) => {
-                return Err(Error::Output {
-                    path: target.path().to_owned(),
-                    reason,
-                    hint: refused.hint(),
-                });
+                return Err(Error::output(target.path(), reason, HINT));
             }
-            Err(_) => return Err(refused),
+            Err(_) => {
+                let reason = "the document is not valid";
+                return Err(Error::output(target.path(), reason, HINT));
+            }
         };
         let mut written = Written::to(&target);
         written.add(write_file(&target, &bytes)?);

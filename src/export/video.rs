@@ -1,7 +1,7 @@
 //! The animation as video: frames are piped into `ffmpeg`, if it is in `PATH`.
 
 use std::io::{self, Read as _, Write as _};
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
@@ -42,16 +42,13 @@ pub(crate) fn check(target: &Target) -> Result<()> {
     let mut command = Command::new("ffmpeg");
     let command = command.arg("-version").stdin(Stdio::null());
     let run = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    run.map(drop)
-        .map_err(|e| missing(target.path().to_owned(), &e))
+    run.map(drop).map_err(|e| missing(target.path(), &e))
 }
 
-fn missing(path: PathBuf, error: &io::Error) -> Error {
-    Error::Output {
-        path,
-        reason: format!("video needs `ffmpeg`, which cannot be run: {error}"),
-        hint: "install ffmpeg, or write `.gif` or `.apng`, which need no other program".to_owned(),
-    }
+fn missing(path: &Path, error: &io::Error) -> Error {
+    let reason = format!("video needs `ffmpeg`, which cannot be run: {error}");
+    let hint = "install ffmpeg, or write `.gif` or `.apng`, which need no other program";
+    Error::output(path, reason, hint)
 }
 
 struct Video<'a> {
@@ -108,11 +105,8 @@ pub(crate) fn start<'a>(
 
 impl Video<'_> {
     fn failed(&self, reason: String) -> Error {
-        Error::Output {
-            path: self.target.path().to_owned(),
-            reason,
-            hint: "try `ffmpeg -version`; `.gif` and `.apng` need no ffmpeg".to_owned(),
-        }
+        let hint = "try `ffmpeg -version`; `.gif` and `.apng` need no ffmpeg";
+        Error::output(self.target.path(), reason, hint)
     }
 
     fn start(&self, first: &[u8]) -> Result<FfmpegJob> {
@@ -143,7 +137,7 @@ impl Video<'_> {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
-        let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
+        let mut child = child.map_err(|e| missing(self.target.path(), &e))?;
         Ok(FfmpegJob {
             pipe: child.stdin.take(),
             messages: child

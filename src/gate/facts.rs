@@ -243,8 +243,8 @@ impl<'a> Facts<'a> {
         let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
         let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
         let any = |words: &[&str]| {
-            let says = |id: &NodeId| has(self.mission.elements.nodes[*id].evidence, words);
-            named.iter().any(|nodes| nodes.iter().any(says))
+            let has_any = |id: &NodeId| has(self.mission.elements.nodes[*id].evidence, words);
+            named.iter().any(|nodes| nodes.iter().any(has_any))
         };
         !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
     }

@@ -11,7 +11,7 @@ use crate::base::yaml::YamlPlace;
 
 /// The kinds of findings: the name, the meaning, and how it is decided.
 macro_rules! kinds {
-    ($($kind:ident $word:literal: $says:literal, $more:literal;)+) => {
+    ($($kind:ident $word:literal: $meaning:literal, $more:literal;)+) => {
         /// A kind of finding: its index in [`KINDS`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub(crate) enum FindingKind {
@@ -20,7 +20,7 @@ macro_rules! kinds {
 
         /// All kinds in order: the name, the meaning, and how it is decided.
         pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] =
-            &[$((FindingKind::$kind, $word, $says, $more),)+];
+            &[$((FindingKind::$kind, $word, $meaning, $more),)+];
     };
 }
 
@@ -187,7 +187,7 @@ pub(crate) struct Finding {
     /// The node or topic that it is about.
     pub(crate) name: String,
     /// The finding in one sentence.
-    pub(crate) says: String,
+    pub(crate) text: String,
     /// The observed value, in short.
     pub(crate) seen: String,
     /// The expected value.
@@ -214,14 +214,14 @@ impl Finding {
         kind: FindingKind,
         name: &str,
         place: YamlPlace,
-        says: impl fmt::Display,
+        text: impl fmt::Display,
     ) -> Self {
         Self {
             kind,
             severity: Severity::Error,
             place,
             name: visible(name).into_owned(),
-            says: visible(&says.to_string()).into_owned(),
+            text: visible(&text.to_string()).into_owned(),
             seen: String::new(),
             expected: String::new(),
             when: None,
@@ -234,16 +234,16 @@ impl Finding {
         }
     }
 
-    /// A finding that is not observable, with the reason in `says`.
+    /// A finding that is not observable, with the reason in `text`.
     pub(crate) fn unknown(
         kind: FindingKind,
         name: &str,
         place: YamlPlace,
-        says: impl fmt::Display,
+        text: impl fmt::Display,
     ) -> Self {
         Self {
             severity: Severity::Unknown,
-            ..Self::new(kind, name, place, says)
+            ..Self::new(kind, name, place, text)
         }
     }
 
@@ -274,7 +274,7 @@ impl Finding {
 
     /// The sentence and all details, separated by `between`.
     pub(crate) fn reported(&self, between: &str) -> String {
-        let mut all = vec![self.says.as_str()];
+        let mut all = vec![self.text.as_str()];
         all.extend(self.details.iter().map(String::as_str));
         all.join(between)
     }

@@ -181,10 +181,10 @@ fn quoted(text: &str) -> String {
 /// The meaning of a kind of finding, for `--explain`, in lines of at most `width` characters; `None` for an unknown
 /// word.
 pub(crate) fn explain(word: &str, width: usize) -> Option<String> {
-    let (_, word, says, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
-    let [says, more] = [says, more].map(|text| hang("", text, 0, Some(width)));
+    let (_, word, meaning, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
+    let [meaning, more] = [meaning, more].map(|text| hang("", text, 0, Some(width)));
     Some(format!(
-        "{word}\n\n{says}\n{more}\nTo allow it:\n\nallow:\n  - finding: {word}\n    name: /name\n    until: 2027-01-31\n    why: \"…\"\n"
+        "{word}\n\n{meaning}\n{more}\nTo allow it:\n\nallow:\n  - finding: {word}\n    name: /name\n    until: 2027-01-31\n    why: \"…\"\n"
     ))
 }
 

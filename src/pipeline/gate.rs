@@ -84,18 +84,8 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
     let subject = job.subject(&mission);
     for report in &job.reports {
         let text = (report.format.write)(&subject, &verdict);
-        let path = report.target.path();
-        let before = match job.append_to.as_deref() {
-            Some(summary) if summary == path && path.is_file() => {
-                file::read_text(path, budget::SUMMARY)?
-            }
-            _ => String::new(),
-        };
-        let text = match before.trim_end() {
-            "" => text,
-            before => format!("{before}\n\n{text}"),
-        };
-        put(&report.target, &text)?;
+        let before = file::text_before(report.target.path(), job.append_to.as_deref())?;
+        put(&report.target, &(before + &text))?;
     }
     Ok(CheckResult { mission, verdict })
 }

@@ -87,11 +87,10 @@ impl Live {
             });
             return unknown.map_or(Ok(None), Err);
         };
-        let watch = way.ok_or_else(|| Error::Unsupported {
-            path: address.to_owned(),
-            what: "this build of bagreel has no WebSockets".to_owned(),
-            hint: "build with the feature `live`: `cargo install bagreel --features live`"
-                .to_owned(),
+        let watch = way.ok_or_else(|| {
+            let what = "this build of bagreel has no WebSockets";
+            let hint = "build with the feature `live`: `cargo install bagreel --features live`";
+            Error::unsupported(address, what, hint)
         })?;
         let host = place.split('/').next().unwrap_or_default();
         let parts = host.rsplit_once(':');

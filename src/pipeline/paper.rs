@@ -225,12 +225,9 @@ impl Bundle<'_> {
                 scene: drawn.scene,
                 entry: run.to_owned(),
             };
-            let bytes =
-                pdf::write(std::iter::once(page), &fonts).map_err(|reason| Error::Output {
-                    path: self.path.join(&name),
-                    reason,
-                    hint: "`bagreel figure` draws it as SVG".to_owned(),
-                })?;
+            let hint = "`bagreel figure` draws it as SVG";
+            let bytes = pdf::write(std::iter::once(page), &fonts)
+                .map_err(|reason| Error::output(&self.path.join(&name), reason, hint))?;
             self.write(&name, &bytes)?;
             self.write(&format!("{stem}.{}.tex", kind.word()), latex.as_bytes())?;
         }

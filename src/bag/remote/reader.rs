@@ -75,14 +75,9 @@ fn local(row: &FormatRow, source: &FileSource) -> Result<(FileSource, Temporary)
     let path = source.path();
     if source.len() > UNPACKED_COPY {
         let most = words::bytes(UNPACKED_COPY);
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: format!(
-                "{} needs a local copy, and it is larger than {most}",
-                row.name
-            ),
-            hint: "download the bag".to_owned(),
-        });
+        let name = row.name;
+        let what = format!("{name} needs a local copy, and it is larger than {most}");
+        return Err(Error::unsupported(path, what, "download the bag"));
     }
     let copy = Temporary::new()?;
     // Its own name, which the reader reports; never a path.

@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::base::budget::YAML;
+use crate::base::file::with_suffix;
 use crate::base::yaml::{self, Value};
 
 /// The contents of `metadata.yaml`.
@@ -119,7 +120,7 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let plain = folder.join(last);
     let found = [
         plain.clone(),
-        with_end(&plain, ".zstd"),
+        with_suffix(&plain, ".zstd"),
         plain.with_extension(""),
     ];
     let is_storage = |p: &&PathBuf| p.is_file() && is_storage(p);
@@ -142,12 +143,6 @@ pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
 /// The notice about a link that leads out of the folder.
 pub(super) fn leads_out(name: &str) -> String {
     format!("`{name}` is a link out of the folder and was not followed")
-}
-
-fn with_end(path: &Path, end: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(end);
-    name.into()
 }
 
 /// Whether a file has the name of a storage file.

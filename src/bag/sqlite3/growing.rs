@@ -7,12 +7,13 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::place::{Ready, with_suffix};
+use super::place::Ready;
 use super::rows::RowReader;
 use super::{Db, bag};
 use crate::bag::model::{Growing, Growth, OpenOptions, Sink, Want};
 use crate::bag::source::FileSource;
 use crate::base::error::Result;
+use crate::base::file::with_suffix;
 
 /// The number of polls between two openings of the database: polling is cheap, starting SQLite is not.
 const EVERY: u32 = 4;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::bag::source::Temporary;
 use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 
 /// A database ready to be opened.
 pub(super) struct Ready {
@@ -65,12 +66,6 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
     ready.path = copy.path().join(path.file_name().unwrap_or_default());
     ready.copy = Some(copy);
     Ok(ready)
-}
-
-pub(super) fn with_suffix(path: &Path, end: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(end);
-    name.into()
 }
 
 /// The URI under which SQLite opens the file.

@@ -63,7 +63,7 @@ struct Contract {
     /// The line of the row in the table, ≥ 1.
     line: usize,
     /// The address of the code that shows it.
-    says: String,
+    reference: String,
 }
 
 /// The rows of the table; malformed rows are left out.
@@ -76,7 +76,18 @@ fn contracts() -> Vec<Contract> {
 }
 
 fn contract(line: usize, row: &[String]) -> Option<Contract> {
-    let [node, files, ros, role, topic, kind, owns, package, says] = row else {
+    let [
+        node,
+        files,
+        ros,
+        role,
+        topic,
+        kind,
+        owns,
+        package,
+        reference,
+    ] = row
+    else {
         return None;
     };
     Some(Contract {
@@ -89,7 +100,7 @@ fn contract(line: usize, row: &[String]) -> Option<Contract> {
         owns: owns == "yes",
         package: package.clone(),
         line,
-        says: says.clone(),
+        reference: reference.clone(),
     })
 }
 
@@ -151,7 +162,7 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
         contract.package,
         contract.topic,
         contract.line,
-        contract.says.trim_start_matches("https://")
+        contract.reference.trim_start_matches("https://")
     )
 }
 

@@ -262,8 +262,8 @@ fn end(
     }
     let later = first * 5 <= all;
     if known.publishers(topic).next().is_some() {
-        let says = verb(before, after) != Some(true);
-        return (later && says).then_some(subscribe);
+        let is_unsent = verb(before, after) != Some(true);
+        return (later && is_unsent).then_some(subscribe);
     }
     match verb(before, after) {
         Some(true) => Some(publish),

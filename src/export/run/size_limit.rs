@@ -34,15 +34,10 @@ pub(crate) fn fit(
             return Ok(written);
         }
     }
-    let most = sequence.options.max_bytes.unwrap_or(0);
-    Err(Error::Output {
-        path: output.target.path().to_owned(),
-        reason: format!(
-            "it does not fit in {}, even small and with changes only",
-            words::bytes(most)
-        ),
-        hint: "raise `--max-bytes`, or show less: a longer `--period`, `--ns-filter`".to_owned(),
-    })
+    let most = words::bytes(sequence.options.max_bytes.unwrap_or(0));
+    let reason = format!("it does not fit in {most}, even small and with changes only");
+    let hint = "raise `--max-bytes`, or show less: a longer `--period`, `--ns-filter`";
+    Err(Error::output(output.target.path(), reason, hint))
 }
 
 /// The options that are tried, in order.

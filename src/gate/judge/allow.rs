@@ -15,8 +15,8 @@ impl Judge<'_> {
             if !forgive(&mut self.checks, allowance, start) {
                 let name = allowance.name.as_str();
                 let word = allowance.finding.word();
-                let says = format!("the allowance of {word} for {name} matched no finding");
-                let mut finding = Finding::new(FindingKind::AllowUnused, name, allowance.at, says)
+                let text = format!("the allowance of {word} for {name} matched no finding");
+                let mut finding = Finding::new(FindingKind::AllowUnused, name, allowance.at, text)
                     .saw("nothing", word)
                     .hint("remove it");
                 finding.severity = Severity::Warning;

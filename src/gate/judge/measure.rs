@@ -31,9 +31,9 @@ impl Judge<'_> {
             .filter_map(|(window, row)| Some((window.span, (measure.of)(&row, window.span)?)))
             .collect();
         if known.is_empty() {
-            let says = format!("cannot tell the {key} of {name}: this bag does not record it");
+            let text = format!("cannot tell the {key} of {name}: this bag does not record it");
             let hint = "enable topic statistics, or record `/statistics`";
-            return Some(Finding::unknown(measure.kind, name, at, says).hint(hint));
+            return Some(Finding::unknown(measure.kind, name, at, text).hint(hint));
         }
         let bad: Vec<&(Span, f64)> = known.iter().filter(|(_, v)| !range.holds(*v)).collect();
         if bad.len() as f64 <= known.len() as f64 * (1.0 - facts.percent.unwrap_or(100.0) / 100.0) {
@@ -44,7 +44,7 @@ impl Judge<'_> {
         let worst = bad.iter().max_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
         let span = Span::new(bad.first()?.0.start, bad.last()?.0.end);
         let (seen, expected) = ((measure.shown)(worst.1), measure.range_shown(range));
-        let says = format!("{name} has {key} {seen}, expected {expected}");
+        let text = format!("{name} has {key} {seen}, expected {expected}");
         let detail = format!(
             "{} ({} of {}), worst at {}",
             self.facts.stretch(span),
@@ -52,7 +52,7 @@ impl Judge<'_> {
             words::count(known.len(), "window"),
             self.facts.clock(worst.0.start),
         );
-        let mut finding = Finding::new(measure.kind, name, at, says)
+        let mut finding = Finding::new(measure.kind, name, at, text)
             .saw(seen, expected)
             .at(span)
             .detail(detail);

@@ -91,10 +91,10 @@ impl Judge<'_> {
             return match (facts.optional, self.names_nodes) {
                 (true, _) => Vec::new(),
                 (false, _) if facts.is_logged => {
-                    let says = format!(
+                    let text = format!(
                         "cannot tell whether {name} is present: only its log would show it"
                     );
-                    vec![Finding::unknown(FindingKind::NodeMissing, name, at, says)]
+                    vec![Finding::unknown(FindingKind::NodeMissing, name, at, text)]
                 }
                 (false, true) => vec![self.missing(pattern, at)],
                 (false, false) => vec![self.unnamed(FindingKind::NodeMissing, name, at)],
@@ -139,8 +139,8 @@ impl Judge<'_> {
                 "record /rosout and /parameter_events, or /rosgraph; see `bagreel info`",
             )
         };
-        let says = format!("cannot tell whether {name} is present: {why}");
-        Finding::unknown(kind, name, at, says).hint(hint)
+        let text = format!("cannot tell whether {name} is present: {why}");
+        Finding::unknown(kind, name, at, text).hint(hint)
     }
 
     /// The finding that a node is named, but none of the topics that only it publishes has messages.
@@ -158,8 +158,8 @@ impl Judge<'_> {
             return None;
         }
         let topics = words::some_of(&own, NAMED);
-        let says = format!("{pattern} sends nothing: {topics} without a message");
-        let finding = Finding::new(FindingKind::NodeMissing, pattern.as_str(), at, says);
+        let text = format!("{pattern} sends nothing: {topics} without a message");
+        let finding = Finding::new(FindingKind::NodeMissing, pattern.as_str(), at, text);
         Some(finding.saw("no message", topics))
     }
 
@@ -199,8 +199,8 @@ impl Judge<'_> {
         let clock = self.facts.clock(end);
         // It may have ended in the robot's shutdown.
         if whole.end.since(ended.latest) <= CLOSING_NS {
-            let says = format!("cannot tell when {role} ended: its last sign is at {clock}");
-            return Some(Finding::unknown(FindingKind::NodeGone, role, at, says));
+            let text = format!("cannot tell when {role} ended: its last sign is at {clock}");
+            return Some(Finding::unknown(FindingKind::NodeGone, role, at, text));
         }
         let finding = Finding::new(
             FindingKind::NodeGone,
@@ -234,18 +234,18 @@ impl Judge<'_> {
             }
             let clock = self.facts.clock(began.time);
             if is_late && began.earliest <= allowed.end {
-                let says = format!(
+                let text = format!(
                     "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
                 );
                 return Some(Finding::unknown(
                     FindingKind::NodeLate,
                     role,
                     within.at,
-                    says,
+                    text,
                 ));
             }
-            let says = format!("{role} appeared at {clock}, expected {expected}");
-            let finding = Finding::new(FindingKind::NodeLate, role, within.at, says);
+            let text = format!("{role} appeared at {clock}, expected {expected}");
+            let finding = Finding::new(FindingKind::NodeLate, role, within.at, text);
             Some(
                 finding
                     .saw(format!("at {clock}"), &expected)
@@ -262,8 +262,8 @@ impl Judge<'_> {
                 return None;
             }
             let many = words::count(events.len(), "time");
-            let says = format!("{role} restarted {many}, expected {}", range.value);
-            let mut finding = Finding::new(FindingKind::NodeRestarted, role, range.at, says)
+            let text = format!("{role} restarted {many}, expected {}", range.value);
+            let mut finding = Finding::new(FindingKind::NodeRestarted, role, range.at, text)
                 .saw(&many, words::count_range(range.value.from, range.value.to));
             for event in events.iter().take(6) {
                 let until = event.until.unwrap_or(event.time);
@@ -290,8 +290,8 @@ impl Judge<'_> {
             match self.facts.lifecycle(nodes) {
                 Some(seen) if *seen == *expected => None,
                 Some(seen) => {
-                    let says = format!("{role} ends {seen}, expected {expected}");
-                    Some(Finding::new(FindingKind::NodeLifecycle, role, at, says).saw(seen, expected))
+                    let text = format!("{role} ends {seen}, expected {expected}");
+                    Some(Finding::new(FindingKind::NodeLifecycle, role, at, text).saw(seen, expected))
                 }
                 None => Some(
                     Finding::unknown(

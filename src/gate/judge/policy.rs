@@ -39,9 +39,9 @@ impl Judge<'_> {
         let own = own.filter(|(_, event)| event.kind == kind && !event.quiet);
         let found = own.map(|(id, event)| {
             let (node, topic) = mission.elements.names(event.what);
-            let says = sentence(mission, &parts, id, event);
+            let text = sentence(mission, &parts, id, event);
             let name = topic.or(node).unwrap_or_default();
-            let mut found = Finding::new(finding, name, self.expectation.policy.at, says);
+            let mut found = Finding::new(finding, name, self.expectation.policy.at, text);
             found.severity = severity;
             found.at(Span::new(
                 event.time,
@@ -62,13 +62,13 @@ impl Judge<'_> {
             }
             let file = self.expectation.file.display();
             let name = nodes.first().map_or(role, |id| self.facts.node(*id));
-            let says = if name == role {
+            let text = if name == role {
                 format!("{role} is not in {file}")
             } else {
                 format!("{name} (role {role}) is not in {file}")
             };
             let policy = self.expectation.policy;
-            let mut finding = Finding::new(FindingKind::UnexpectedNode, role, policy.at, says)
+            let mut finding = Finding::new(FindingKind::UnexpectedNode, role, policy.at, text)
                 .saw("present", "not named");
             finding.severity = policy.nodes.severity().unwrap_or(finding.severity);
             finding.accept = Some(role.to_owned());
@@ -105,8 +105,8 @@ impl Judge<'_> {
             {
                 continue;
             }
-            let says = format!("{name} is not in {}", self.expectation.file.display());
-            let mut finding = Finding::new(FindingKind::UnexpectedTopic, name, policy.at, says)
+            let text = format!("{name} is not in {}", self.expectation.file.display());
+            let mut finding = Finding::new(FindingKind::UnexpectedTopic, name, policy.at, text)
                 .saw("present", "not named");
             finding.severity = policy.topics.severity().unwrap_or(finding.severity);
             finding.accept = Some(name.to_owned());

@@ -71,8 +71,8 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let hz = words::rate(mean);
         let span = Span::new(first.span.start, last.span.end);
-        let says = format!("{name} at {hz} from first to last message, expected {range}");
-        let finding = Finding::new(kind, name, at, says)
+        let text = format!("{name} at {hz} from first to last message, expected {range}");
+        let finding = Finding::new(kind, name, at, text)
             .saw(&hz, words::rate_range(range.from, range.to))
             .at(span)
             .detail(self.facts.stretch(span));
@@ -100,8 +100,8 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let clock = self.facts.clock(active.start);
         let expected = format!("within {}", self.facts.stretch(allowed));
-        let says = format!("{name} began at {clock}, expected {expected}");
-        let finding = Finding::new(FindingKind::TopicLate, name, within.at, says);
+        let text = format!("{name} began at {clock}, expected {expected}");
+        let finding = Finding::new(FindingKind::TopicLate, name, within.at, text);
         let span = Span::new(whole.start, active.start);
         let mut finding = finding.saw(format!("at {clock}"), expected).at(span);
         finding.details.extend(Self::senders(facts));
@@ -127,9 +127,9 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let clock = self.facts.clock(active.end);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
-        let says = format!("{name} ended at {clock}, expected {expected}");
+        let text = format!("{name} ended at {clock}, expected {expected}");
         let around = Span::new(active.end.plus(-CLOSING_NS), active.end.plus(CLOSING_NS));
-        let mut finding = Finding::new(FindingKind::TopicGone, name, may_end.at, says)
+        let mut finding = Finding::new(FindingKind::TopicGone, name, may_end.at, text)
             .saw(format!("ended at {clock}"), expected)
             .at(Span::new(active.end, whole.end));
         finding.details.extend(Self::senders(facts));
@@ -143,8 +143,8 @@ impl Judge<'_> {
             return Vec::new();
         }
         let name = self.facts.topic(topic);
-        let says = format!("cannot tell the rate of {name}: it has no whole window to check");
-        let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, says);
+        let text = format!("cannot tell the rate of {name}: it has no whole window to check");
+        let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, text);
         vec![finding.hint("use a shorter period: `period: 5s`, or `--period 5`")]
     }
 
@@ -210,7 +210,7 @@ impl Judge<'_> {
         } else {
             ("highest", bad.iter().max_by(by)?)
         };
-        let says = format!("{name} at {hz}, expected {range}");
+        let text = format!("{name} at {hz}, expected {range}");
         let detail = format!(
             "{} ({} of {}), {word} {} at {}, {}",
             self.facts.stretch(span),
@@ -220,7 +220,7 @@ impl Judge<'_> {
             self.facts.clock(worst.span.start),
             words::count(usize::try_from(count).unwrap_or(usize::MAX), "message"),
         );
-        let mut finding = Finding::new(kind, name, at, says)
+        let mut finding = Finding::new(kind, name, at, text)
             .saw(hz, words::rate_range(range.from, range.to))
             .at(span)
             .detail(detail);
@@ -244,8 +244,8 @@ impl Judge<'_> {
         };
         let name = self.facts.topic(topic);
         let (seen, expected) = (words::duration(*nanos), words::duration(most));
-        let says = format!("{name} was silent for {seen}, expected at most {expected}");
-        let mut finding = Finding::new(FindingKind::TopicGap, name, at, says)
+        let text = format!("{name} was silent for {seen}, expected at most {expected}");
+        let mut finding = Finding::new(FindingKind::TopicGap, name, at, text)
             .saw(seen, format!("at most {expected}"))
             .at(*span)
             .detail(format!("within {}", self.facts.stretch(*span)));

@@ -86,8 +86,8 @@ impl Judge<'_> {
     fn too_short(&self, name: &At<Pattern>) -> Finding {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
-        let says = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
-        Finding::unknown(FindingKind::NodeLate, name, at, says)
+        let text = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
+        Finding::unknown(FindingKind::NodeLate, name, at, text)
     }
 
     fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, facts: &TopicFacts) {
@@ -116,9 +116,9 @@ impl Judge<'_> {
                 .iter()
                 .filter_map(|(_, nodes)| self.facts.began(nodes));
             let Some(began) = began.min_by_key(|bound| bound.time) else {
-                let says = format!("{} never appeared, expected in order", name.value);
+                let text = format!("{} never appeared, expected in order", name.value);
                 let mut finding =
-                    Finding::new(FindingKind::OrderBroken, name.value.as_str(), name.at, says)
+                    Finding::new(FindingKind::OrderBroken, name.value.as_str(), name.at, text)
                         .saw("absent", order_of(names));
                 finding.cause = Some(absence(name.value.as_str()));
                 found.push(finding);
@@ -143,17 +143,17 @@ impl Judge<'_> {
         let (one, other) = (first.value.as_str(), second.value.as_str());
         let at = |bound: Bound| self.facts.clock(bound.time);
         if began.latest >= earlier.earliest {
-            let says =
+            let text =
                 format!("cannot tell whether {other} appeared after {one}: the times overlap");
-            return Finding::unknown(FindingKind::OrderBroken, other, second.at, says);
+            return Finding::unknown(FindingKind::OrderBroken, other, second.at, text);
         }
-        let says = format!(
+        let text = format!(
             "{other} appeared at {}, expected after {one} at {}",
             at(began),
             at(earlier)
         );
         let seen = format!("{other} at {}, {one} at {}", at(began), at(earlier));
-        Finding::new(FindingKind::OrderBroken, other, second.at, says)
+        Finding::new(FindingKind::OrderBroken, other, second.at, text)
             .saw(seen, order_of(names))
             .at(Span::new(began.time, earlier.time))
     }
@@ -206,14 +206,14 @@ impl Judge<'_> {
         let what = format!("{} {}", when.name, past(when));
         let clock = self.facts.clock(cause.time);
         if let Some(doubt) = doubt {
-            let says = format!(
+            let text = format!(
                 "cannot tell whether {name} {} in time after {what} at {clock}: {doubt}",
                 past(expect)
             );
-            return Finding::unknown(FindingKind::ReactionMissing, name, at, says);
+            return Finding::unknown(FindingKind::ReactionMissing, name, at, text);
         }
-        let says = format!("{what} at {clock}, and {expected} did not follow");
-        let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, says)
+        let text = format!("{what} at {clock}, and {expected} did not follow");
+        let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, text)
             .saw("nothing", expected)
             .at(Span::new(cause.time, cause.latest.plus(within)));
         let after = self
@@ -240,12 +240,12 @@ impl Judge<'_> {
             return Vec::new();
         }
         let seen = words::count(events.len(), "reconfiguration");
-        let says = format!(
+        let text = format!(
             "{seen} from {} to {}, expected {many}",
             self.facts.clock(span.start),
             self.facts.clock(span.end)
         );
-        let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
+        let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, text)
             .saw(events.len(), words::count_range(many.from, many.to))
             .at(span);
         let parts = self.facts.mission.log.all_parts();

@@ -99,9 +99,9 @@ impl Judge<'_> {
     pub(super) fn forbidden_topics(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let found = self.facts.topics(pattern).into_iter().map(|topic| {
             let name = self.facts.topic(topic);
-            let says = format!("{name} is in the bag, and `{pattern}` is forbidden");
+            let text = format!("{name} is in the bag, and `{pattern}` is forbidden");
             let many = usize::try_from(self.facts.messages(topic)).unwrap_or(usize::MAX);
-            Finding::new(FindingKind::TopicForbidden, name, at, says)
+            Finding::new(FindingKind::TopicForbidden, name, at, text)
                 .saw("present", "absent")
                 .detail(words::count(many, "message"))
         });
@@ -128,7 +128,7 @@ impl Judge<'_> {
         let topics = self.facts.mission.elements.topics.iter();
         let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
         let near = self.near(pattern, names);
-        let (says, seen, expected) = if is_named {
+        let (text, seen, expected) = if is_named {
             (
                 format!("{name} has no message in the bag"),
                 "no message",
@@ -138,7 +138,7 @@ impl Judge<'_> {
             (format!("{name} is not in the bag"), "absent", "present")
         };
         let mut finding =
-            Finding::new(FindingKind::TopicMissing, name, at, says).saw(seen, expected);
+            Finding::new(FindingKind::TopicMissing, name, at, text).saw(seen, expected);
         // A missing publisher is the cause.
         let by = facts.by.iter().flat_map(|by| &by.value);
         let mut lost = by.filter(|by| self.facts.nodes(&by.value).is_empty());
@@ -183,20 +183,20 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let expected = words::some_of(&expected, NAMED);
         if types.is_empty() {
-            let says = format!("cannot tell whether {name} is a {expected}: its type is unknown");
+            let text = format!("cannot tell whether {name} is a {expected}: its type is unknown");
             return vec![Finding::unknown(
                 FindingKind::TopicType,
                 name,
                 kinds.at,
-                says,
+                text,
             )];
         }
         if other.is_empty() {
             return Vec::new();
         }
         let seen = words::some_of(&other, NAMED);
-        let says = format!("{name} is a {seen}, expected {expected}");
-        vec![Finding::new(FindingKind::TopicType, name, kinds.at, says).saw(seen, expected)]
+        let text = format!("{name} is a {seen}, expected {expected}");
+        vec![Finding::new(FindingKind::TopicType, name, kinds.at, text).saw(seen, expected)]
     }
 
     fn publishers(&self, topic: TopicId, by: &At<Vec<At<Pattern>>>) -> Vec<Finding> {
@@ -226,8 +226,8 @@ impl Judge<'_> {
                 continue;
             }
             let role = self.facts.role(*node);
-            let says = format!("{name} is also published by {role}, expected only {expected}");
-            let mut finding = Finding::new(FindingKind::PublisherUnexpected, name, by.at, says)
+            let text = format!("{name} is also published by {role}, expected only {expected}");
+            let mut finding = Finding::new(FindingKind::PublisherUnexpected, name, by.at, text)
                 .saw(role, &expected);
             finding.severity = severity;
             if let Some((span, count)) = self.facts.sent(*node, *edge) {
@@ -249,10 +249,10 @@ impl Judge<'_> {
         let who = wanted.value.as_str();
         let kind = FindingKind::PublisherMissing;
         if !self.facts.lists_publishers(topic) {
-            let says =
+            let text =
                 format!("cannot tell whether {who} publishes {name}: its publishers are unknown");
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
-            return Finding::unknown(kind, name, wanted.at, says).hint(hint);
+            return Finding::unknown(kind, name, wanted.at, text).hint(hint);
         }
         let known = self.facts.publishers(topic);
         let roles: Vec<&str> = known
@@ -264,8 +264,8 @@ impl Judge<'_> {
         } else {
             words::some_of(&roles, NAMED)
         };
-        let says = format!("{who} does not publish {name}, which is published by {seen}");
-        let mut finding = Finding::new(kind, name, wanted.at, says).saw(seen, who);
+        let text = format!("{who} does not publish {name}, which is published by {seen}");
+        let mut finding = Finding::new(kind, name, wanted.at, text).saw(seen, who);
         if self.facts.nodes(&wanted.value).is_empty() {
             finding.cause = Some(absence(who));
         }
@@ -299,14 +299,14 @@ impl Judge<'_> {
         // An absent node has no subscriptions.
         let is_absent = roles.is_empty() && self.names_nodes;
         if !is_absent && !self.facts.lists_subscribers(&nodes) {
-            let says = format!(
+            let text = format!(
                 "cannot tell whether {who} subscribes to {name}: this bag has no evidence of subscribers"
             );
             let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
-            return Some(Finding::unknown(kind, name, wanted.at, says).hint(hint));
+            return Some(Finding::unknown(kind, name, wanted.at, text).hint(hint));
         }
-        let says = format!("{who} does not subscribe to {name}");
-        let mut finding = Finding::new(kind, name, wanted.at, says).saw("nothing", who);
+        let text = format!("{who} does not subscribe to {name}");
+        let mut finding = Finding::new(kind, name, wanted.at, text).saw("nothing", who);
         if is_absent {
             finding.cause = Some(absence(who));
         }
@@ -321,12 +321,12 @@ impl Judge<'_> {
         match self.facts.is_latched(topic) {
             Some(seen) if seen == wanted.value => Vec::new(),
             Some(seen) => {
-                let says = format!("{name} is {}, expected {expected}", word(seen));
-                vec![Finding::new(FindingKind::TopicQos, name, at, says).saw(word(seen), expected)]
+                let text = format!("{name} is {}, expected {expected}", word(seen));
+                vec![Finding::new(FindingKind::TopicQos, name, at, text).saw(word(seen), expected)]
             }
             None => {
-                let says = format!("cannot tell whether {name} is {expected}: unknown in this bag");
-                vec![Finding::unknown(FindingKind::TopicQos, name, at, says)]
+                let text = format!("cannot tell whether {name} is {expected}: unknown in this bag");
+                vec![Finding::unknown(FindingKind::TopicQos, name, at, text)]
             }
         }
     }
@@ -336,16 +336,16 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let expected = &wanted.value;
         let Some(seen) = &self.facts.mission.elements.topics[topic].qos else {
-            let says = format!(
+            let text = format!(
                 "cannot tell whether {name} is {expected}: this bag has no quality of service"
             );
-            return vec![Finding::unknown(FindingKind::TopicQos, name, at, says)];
+            return vec![Finding::unknown(FindingKind::TopicQos, name, at, text)];
         };
         let has = |word: &str| seen.split_whitespace().any(|own| own == word);
         if expected.split_whitespace().all(has) {
             return Vec::new();
         }
-        let says = format!("{name} is {seen}, expected {expected}");
-        vec![Finding::new(FindingKind::TopicQos, name, at, says).saw(seen, expected)]
+        let text = format!("{name} is {seen}, expected {expected}");
+        vec![Finding::new(FindingKind::TopicQos, name, at, text).saw(seen, expected)]
     }
 }

@@ -24,12 +24,12 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
             own.len()
         };
         for finding in own.iter().take(shown) {
-            annotation(subject, command, finding, &finding.says, &mut out);
+            annotation(subject, command, finding, &finding.text, &mut out);
         }
         if let Some(next) = own.get(shown) {
             let rest = own.len() - shown - 1;
-            let says = format!("{} (and {rest} more in the log)", next.says);
-            annotation(subject, command, next, &says, &mut out);
+            let text = format!("{} (and {rest} more in the log)", next.text);
+            annotation(subject, command, next, &text, &mut out);
         }
     }
     let text = text::write(subject, verdict);
@@ -44,18 +44,18 @@ fn annotation(
     subject: &Subject<'_>,
     command: &str,
     finding: &Finding,
-    says: &str,
+    text: &str,
     out: &mut String,
 ) {
     let details = finding.details.iter().map(String::as_str);
-    let says: Vec<&str> = std::iter::once(says).chain(details).collect();
+    let text: Vec<&str> = std::iter::once(text).chain(details).collect();
     let _ = writeln!(
         out,
         "::{command} file={},line={},title={}::{}",
         property(&subject.tracked),
         finding.place.line.max(1),
         property(finding.kind.word()),
-        data(&says.join("\n"))
+        data(&text.join("\n"))
     );
 }
 

@@ -37,7 +37,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
 
 fn issue<'a>(subject: &'a Subject<'_>, finding: &'a Finding) -> Issue<'a> {
     Issue {
-        description: &finding.says,
+        description: &finding.text,
         check_name: finding.kind.word(),
         fingerprint: finding.fingerprint(),
         severity: match finding.severity {

@@ -94,7 +94,7 @@ fn found(finding: &Finding) -> Found<'_> {
         id: finding.kind.word(),
         severity: finding.severity.word(),
         name: &finding.name,
-        message: &finding.says,
+        message: &finding.text,
         seen: &finding.seen,
         expected: &finding.expected,
         line: finding.place.line,

@@ -53,12 +53,12 @@ fn case(xml: &mut Xml, subject: &Subject<'_>, check: &Checked) {
     if let Some(first) = errors.first() {
         xml.open("failure")
             .attribute("type", first.kind.word())
-            .attribute("message", &first.says)
+            .attribute("message", &first.text)
             .text(&details(subject, &errors))
             .close();
     } else if let Some(first) = unknown.first() {
         xml.open("skipped")
-            .attribute("message", &first.says)
+            .attribute("message", &first.text)
             .close_empty();
     } else if check.judgement() == Judgement::Moot {
         let message = "its subject is not in the bag";

@@ -215,7 +215,7 @@ fn list(findings: &[&Finding], title: &str, out: &mut String) {
         for fresh in finding.help.iter().filter(|help| hinted.insert(*help)) {
             let _ = write!(help, ": {}", plain(fresh));
         }
-        let line = format!("- {}{why}{help}\n", plain(&finding.says));
+        let line = format!("- {}{why}{help}\n", plain(&finding.text));
         if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);
             break;

@@ -19,10 +19,10 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let rules: Vec<Value> = KINDS
         .iter()
         .filter(|(kind, ..)| found.contains(kind))
-        .map(|(_, word, says, more)| {
+        .map(|(_, word, meaning, more)| {
             json!({
                 "id": word,
-                "shortDescription": {"text": says},
+                "shortDescription": {"text": meaning},
                 "help": {"text": more},
             })
         })

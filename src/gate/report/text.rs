@@ -48,7 +48,7 @@ fn finding(
 ) {
     let (severity, kind) = (finding.severity.word(), finding.kind.word());
     // Writing into a string does not fail.
-    let _ = writeln!(out, "{severity}[{kind}]: {}", finding.says);
+    let _ = writeln!(out, "{severity}[{kind}]: {}", finding.text);
     let _ = writeln!(out, "  --> {}:{}", subject.file, finding.place.line);
     for line in &finding.details {
         let _ = writeln!(out, "   |  {line}");

@@ -98,16 +98,10 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
         .types
         .iter()
         .map(|(name, why)| format!("{name}: {why}"));
-    let types: Vec<String> = types.collect();
-    Error::Unsupported {
-        path,
-        what: format!(
-            "no message could be decoded; {}",
-            words::some_of(&types, MOST_NAMED)
-        ),
-        hint: "`--msg-path DIR` names a folder of `.msg` or `.idl` files for missing definitions"
-            .to_owned(),
-    }
+    let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
+    let what = format!("no message could be decoded; {types}");
+    let hint = "`--msg-path DIR` names a folder of `.msg` or `.idl` files for missing definitions";
+    Error::unsupported(path, what, hint)
 }
 
 /// What the tables lack: the messages that could not be decoded, their types with a reason each, and notices; and all

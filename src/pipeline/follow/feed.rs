@@ -222,11 +222,11 @@ impl FindingFeed {
                     format!(
                         "{{\"kind\":\"finding\",\"finding\":\"{kind}\",\"severity\":\"{severity}\",\"name\":{},\"text\":{},\"time_ns\":{}}}",
                         quoted(&finding.name),
-                        quoted(&finding.says),
+                        quoted(&finding.text),
                         now.0
                     )
                 } else {
-                    format!("{severity}[{kind}]: {}", finding.says)
+                    format!("{severity}[{kind}]: {}", finding.text)
                 };
                 let line = LogLine::plain(&line);
                 printed = Some(line.clone());
