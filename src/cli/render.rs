@@ -47,19 +47,21 @@ pub(super) fn render(
     {
         terminal.note(&note);
     }
-    if job
-        .outputs
-        .iter()
-        .any(|output| output.target == Target::Stdout)
-    {
-        terminal.make_room();
-    }
+    make_room(&job, terminal);
     if args.watch {
         return watch(args, job, terminal);
     }
     let done = crate::pipeline::render(&job, terminal)?;
     report(&done, args.timings, terminal);
     Ok(code(&done.mission))
+}
+
+/// Hides the progress if an output is standard output.
+fn make_room(job: &Render, terminal: &mut Terminal) {
+    let mut targets = job.outputs.iter().map(|output| &output.target);
+    if targets.any(|target| *target == Target::Stdout) {
+        terminal.make_room();
+    }
 }
 
 /// Reads once and draws a figure.
@@ -72,13 +74,7 @@ pub(super) fn figure(
     applies::check_figure(&job.outputs)?;
     crate::pipeline::check(&job)?;
     applies::check_inputs(given, &job.reading)?;
-    if job
-        .outputs
-        .iter()
-        .any(|output| output.target == Target::Stdout)
-    {
-        terminal.make_room();
-    }
+    make_room(&job, terminal);
     let done = crate::pipeline::render(&job, terminal)?;
     // A figure shows continuous time, independent of windows.
     terminal.notices(&done.notices.without(NoticeKind::Chosen));

@@ -25,6 +25,13 @@ pub(crate) enum Where {
     Both,
 }
 
+impl Where {
+    /// The side of what only the first mission has, or only the second.
+    fn only(is_first: bool) -> Self {
+        if is_first { Self::First } else { Self::Second }
+    }
+}
+
 /// One difference.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Difference {
@@ -50,15 +57,9 @@ impl Difference {
             Where::Second => (String::new(), what.to_owned()),
             _ => (what.to_owned(), String::new()),
         };
-        let name = name.into();
         Self {
-            kind,
-            element: name.clone(),
-            name,
             side,
-            first,
-            second,
-            is_known: true,
+            ..Self::changed(kind, name, first, second)
         }
     }
 

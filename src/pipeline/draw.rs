@@ -11,7 +11,7 @@ use crate::draw::text::Fonts;
 use crate::layout::{Engine, Layout};
 use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
-use crate::view::{View, ViewOptions, view};
+use crate::view::{View, ViewOptions};
 
 /// The kind of picture of a mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -121,21 +121,10 @@ pub(super) struct Composed {
     pub(super) notices: Notices,
 }
 
-/// The view if nothing is drawn: everything requested, without positions.
-pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
+/// A view that is not drawn, without positions.
+pub(super) fn unplaced(view: View, drawing: &Drawing) -> Composed {
     Composed {
-        view: view(mission, &drawing.view).0,
-        options: drawing.view.clone(),
-        page: drawing.page.clone(),
-        layout: Layout::default(),
-        notices: Notices::new(),
-    }
-}
-
-/// The empty view, if only data is written.
-pub(super) fn unseen(drawing: &Drawing) -> Composed {
-    Composed {
-        view: View::default(),
+        view,
         options: drawing.view.clone(),
         page: drawing.page.clone(),
         layout: Layout::default(),

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Body, Composed, places, unplaced, unseen};
+use super::draw::{Body, Composed, places, unplaced};
 use super::fit::compose;
 use super::{Drawing, Reading, Stage, Watch, read, unfolded};
 use crate::base::cast;
@@ -24,7 +24,7 @@ use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, unmatched};
+use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, unmatched, view};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -223,9 +223,9 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     } = if is_drawn && !is_timeline {
         compose(&mission, &drawing, watch)
     } else if is_timeline || job.outputs.iter().any(|o| o.format.is_viewed) {
-        unplaced(&mission, &drawing)
+        unplaced(view(&mission, &drawing.view).0, &drawing)
     } else {
-        unseen(&drawing)
+        unplaced(View::default(), &drawing)
     };
     if is_timeline {
         return show_timeline(job, mission, &drawing, (&view, &options), watch);

@@ -170,6 +170,7 @@ pub(crate) struct Baseline {
 }
 
 /// The outcome of `bagreel baseline`.
+#[derive(Default)]
 pub(crate) struct BaselineWritten {
     pub(crate) missions: Vec<Mission>,
     /// The number of rewritten facts.
@@ -213,11 +214,7 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
     }
     let mut done = BaselineWritten {
         missions,
-        changed: 0,
-        left: 0,
-        nodes: 0,
-        topics: 0,
-        left_out: 0,
+        ..BaselineWritten::default()
     };
     let text = if let Some((path, text, _)) = old {
         let is_part = job.runs.iter().any(is_part);

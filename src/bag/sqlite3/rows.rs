@@ -145,18 +145,22 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Reports the rows of a part to `sink`. Rows after a damaged page are read from the other end.
-    pub(super) fn read(&self, part: RowRange, sink: &mut dyn Sink) {
+    fn reading<'s>(&self, left: RowRange, sink: &'s mut dyn Sink) -> RowReading<'_, 's> {
         let mut gather = Gather::default();
         gather.sizeless = !self.sized;
-        let mut reading = RowReading {
+        RowReading {
             rows: self,
-            left: part,
+            left,
             repeated: false,
             lost: LostRows::default(),
             gather,
             sink,
-        };
+        }
+    }
+
+    /// Reports the rows of a part to `sink`. Rows after a damaged page are read from the other end.
+    pub(super) fn read(&self, part: RowRange, sink: &mut dyn Sink) {
+        let mut reading = self.reading(part, sink);
         let mut result = reading.on(Direction::Up);
         if result.is_err() && reading.left.0 <= reading.left.1 {
             result = result.and(reading.on(Direction::Down));
@@ -171,15 +175,7 @@ impl<'a> RowReader<'a> {
 
     /// Reports the rows from `next` on, up to one that cannot be read; returns the row after the last.
     pub(super) fn read_from(&self, db: &Db, next: i64, sink: &mut dyn Sink) -> i64 {
-        let mut reading = RowReading {
-            rows: self,
-            left: (next, i64::MAX),
-            repeated: false,
-            lost: LostRows::default(),
-            gather: Gather::default(),
-            sink,
-        };
-        reading.gather.sizeless = !self.sized;
+        let mut reading = self.reading((next, i64::MAX), sink);
         // Rows that cannot be read yet follow at the next poll.
         let _ = reading.some(db, &format!("{} ORDER BY rowid", self.sql), Direction::Up);
         reading.gather.flush(reading.sink);

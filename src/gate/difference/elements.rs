@@ -60,11 +60,7 @@ fn presence<'a>(
     let all: BTreeSet<&str> = first.symmetric_difference(second).copied().collect();
     let first = first.clone();
     all.into_iter().map(move |name| {
-        let side = if first.contains(name) {
-            Where::First
-        } else {
-            Where::Second
-        };
+        let side = Where::only(first.contains(name));
         Difference::only(kind, name, side, "present")
     })
 }
@@ -180,11 +176,7 @@ fn topic(
             .symmetric_difference(&other)
             .filter(|role| in_both(role))
         {
-            let side = if one.contains(role) {
-                Where::First
-            } else {
-                Where::Second
-            };
+            let side = Where::only(one.contains(role));
             let edge = match kind {
                 "publishes" => format!("{role} → {name}"),
                 _ => format!("{name} → {role}"),
