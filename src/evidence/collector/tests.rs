@@ -1,7 +1,7 @@
 //! Tests of every source with single messages.
 
 use super::*;
-use crate::bag::Encoding;
+use crate::bag::{ConnectionId, Encoding, Sink as _};
 use crate::evidence::observation::{Confidence, Observation, Observations, Statement};
 
 /// A payload under construction.
