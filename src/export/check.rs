@@ -74,8 +74,8 @@ fn would_harm(target: &Target, path: &Path) -> bool {
     if path.is_dir() {
         return existing(target).iter().any(|file| is_kept_in(path, file));
     }
-    let is_beside = |end: &&str| target.may_be(&with_suffix(path, end));
-    BESIDE.iter().any(|end| is_beside(&end))
+    let mut beside = BESIDE.iter().map(|end| with_suffix(path, end));
+    beside.any(|path| target.may_be(&path))
 }
 
 /// The existing files that would be replaced.
