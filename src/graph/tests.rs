@@ -1,6 +1,6 @@
 //! Tests of graphs from hand-made streams.
 
-mod merged;
+mod tests_merged;
 
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
