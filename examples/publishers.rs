@@ -12,21 +12,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let topic = arguments.next().ok_or("give a topic")?;
     let reading = Reading::of([bag]);
     let mission = read(&reading)?;
-    let elements = &mission.elements;
     for (window, graph) in mission.each() {
         println!("{:.0} s", mission.offset(window.span.start) as f64 / 1e9);
-        for state in &graph.publishes {
-            let edge = &elements.publishes[state.id];
-            if elements.topics[edge.topic].name.as_str() != topic {
-                continue;
-            }
-            let node = &elements.nodes[edge.node].name;
-            let evidence: Vec<&str> = edge.evidence.words().collect();
+        let all = graph.publications(&mission.elements);
+        for (node, _, state) in all.filter(|(_, of, _)| of.name.as_str() == topic) {
+            let evidence = mission.elements.evidence(state.what);
+            let evidence: Vec<&str> = evidence.words().collect();
             let rate = state
                 .hz
                 .map_or_else(|| "?".to_owned(), |hz| format!("{hz:.1} Hz"));
             println!(
-                "  {node}  {rate}  {} by {}",
+                "  {}  {rate}  {} by {}",
+                node.name,
                 state.confidence.word(),
                 evidence.join(", ")
             );

@@ -19,9 +19,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!(
             "{:>4}  {:>3} nodes  {:>3} topics  {:>3} edges  {:>3} changes",
             window.index,
-            graph.nodes.len(),
-            graph.topics.len(),
-            graph.publishes.len() + graph.subscribes.len(),
+            graph.nodes().count(),
+            graph.topics().count(),
+            graph.publishes().chain(graph.subscribes()).count(),
             window.changes.len()
         );
     }

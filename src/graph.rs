@@ -166,21 +166,6 @@ worded! {
     }
 }
 
-/// The state of a node in one window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct NodeState {
-    /// The node.
-    pub id: NodeId,
-    /// The state.
-    pub state: State,
-    /// The strength of the evidence for it in this window.
-    pub confidence: Confidence,
-    /// The sum of the rates of its publications, in messages per second; `None` if unknown.
-    pub hz: Option<f64>,
-    /// The lifecycle state, if it has one: `inactive`, `active`, …
-    pub lifecycle: Option<Arc<str>>,
-}
-
 /// Measurements of the messages of a topic or edge in one window, besides their number.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub struct Measures {
@@ -196,60 +181,60 @@ pub struct Measures {
     pub age_s: Option<f64>,
 }
 
-/// The state of a topic in one window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TopicState {
-    /// The topic.
-    pub id: TopicId,
+/// The state of an element in one window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElementState {
+    /// The element.
+    pub what: Element,
     /// The state.
     pub state: State,
     /// The strength of the evidence for it in this window.
     pub confidence: Confidence,
-    /// The number of messages in the window, ≥ 0.
-    pub count: u64,
-    /// The payload bytes of these messages, if known.
-    pub bytes: Option<u64>,
-    /// Messages per second over the window's true length; `None` below 1 ms of length.
-    pub hz: Option<f64>,
-    /// The median time between messages in seconds; `None` with fewer than two messages.
-    pub median_period_s: Option<f64>,
-    /// The longest time between messages in seconds; `None` with fewer than two messages.
-    pub max_gap_s: Option<f64>,
-    /// Further numbers.
-    pub measures: Measures,
-}
-
-/// The state of a publication or subscription in one window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EdgeState {
-    /// The edge.
-    pub id: EdgeId,
-    /// The state.
-    pub state: State,
-    /// The strength of the evidence for it in this window.
-    pub confidence: Confidence,
-    /// The number of messages over this edge in the window, if known.
+    /// The number of messages on the topic or over the edge in the window, if known; `None` for a node.
     pub count: Option<u64>,
-    /// The messages per second over this edge; `None` if unknown.
-    pub hz: Option<f64>,
     /// The payload bytes of these messages, if known.
     pub bytes: Option<u64>,
+    /// Messages per second over the window's true length; for a node, the sum of those of its publications.
+    /// `None` if unknown, and below 1 ms of length.
+    pub hz: Option<f64>,
+    /// The median time between messages of a topic in seconds; `None` with fewer than two messages.
+    pub median_period_s: Option<f64>,
+    /// The longest time between messages of a topic in seconds; `None` with fewer than two messages.
+    pub max_gap_s: Option<f64>,
+    /// The lifecycle state of a node, if it has one: `inactive`, `active`, …
+    pub lifecycle: Option<Arc<str>>,
     /// Further numbers.
     pub measures: Measures,
 }
 
-/// The computation graph of one window. Each list is sorted by id; an element that does not exist in the window is not
-/// listed.
+impl ElementState {
+    /// A state without numbers.
+    pub fn new(what: Element, state: State, confidence: Confidence) -> Self {
+        Self {
+            what,
+            state,
+            confidence,
+            count: None,
+            bytes: None,
+            hz: None,
+            median_period_s: None,
+            max_gap_s: None,
+            lifecycle: None,
+            measures: Measures::default(),
+        }
+    }
+
+    /// The number of messages, 0 if unknown.
+    pub fn messages(&self) -> u64 {
+        self.count.unwrap_or(0)
+    }
+}
+
+/// The computation graph of one window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
-    /// Nodes in the window.
-    pub nodes: Vec<NodeState>,
-    /// Topics in the window.
-    pub topics: Vec<TopicState>,
-    /// Publications in the window.
-    pub publishes: Vec<EdgeState>,
-    /// Subscriptions in the window.
-    pub subscribes: Vec<EdgeState>,
+    /// The elements that exist in the window, sorted: nodes, topics, publications, subscriptions.
+    pub states: Vec<ElementState>,
 }
 
 /// The traffic of a node in one window: the messages of its topics.
@@ -270,7 +255,49 @@ pub struct NodeLoad {
     pub bytes_out: Option<u64>,
 }
 
+/// The states of one kind of element, by id.
+macro_rules! of_kind {
+    ($($(#[$doc:meta])* $name:ident: $kind:ident $id:ident;)*) => {$(
+        $(#[$doc])*
+        pub fn $name(&self) -> impl Iterator<Item = ($id, &ElementState)> + Clone {
+            self.states.iter().filter_map(|state| match state.what {
+                Element::$kind(id) => Some((id, state)),
+                _ => None,
+            })
+        }
+    )*};
+}
+
 impl Graph {
+    of_kind! {
+        /// Nodes in the window, sorted by id.
+        nodes: Node NodeId;
+        /// Topics in the window, sorted by id.
+        topics: Topic TopicId;
+        /// Publications in the window, sorted by id.
+        publishes: Publish EdgeId;
+        /// Subscriptions in the window, sorted by id.
+        subscribes: Subscribe EdgeId;
+    }
+
+    /// The state of an element; `None` if it does not exist in the window.
+    pub fn get(&self, what: Element) -> Option<&ElementState> {
+        let at = self.states.binary_search_by_key(&what, |state| state.what);
+        self.states.get(at.ok()?)
+    }
+
+    /// Who publishes what in the window: node, topic, and the state of the publication with its rate.
+    pub fn publications<'a>(
+        &'a self,
+        elements: &'a Elements,
+    ) -> impl Iterator<Item = (&'a Node, &'a Topic, &'a ElementState)> {
+        self.publishes().filter_map(|(id, state)| {
+            let edge = elements.publishes.get(id)?;
+            let node = elements.nodes.get(edge.node)?;
+            Some((node, elements.topics.get(edge.topic)?, state))
+        })
+    }
+
     /// The traffic of each node, in the order of [`Graph::nodes`].
     pub fn loads(&self, elements: &Elements) -> Vec<NodeLoad> {
         let idle = NodeLoad {
@@ -278,39 +305,33 @@ impl Graph {
             bytes_out: Some(0),
             ..NodeLoad::default()
         };
-        let mut all = vec![idle; self.nodes.len()];
-        let place = |node: NodeId| self.nodes.binary_search_by_key(&node, |state| state.id);
+        let nodes: Vec<NodeId> = self.nodes().map(|(id, _)| id).collect();
+        let mut all = vec![idle; nodes.len()];
+        let place = |edge: Option<&Edge>| nodes.binary_search(&edge?.node).ok();
         let add = |sum: &mut Option<u64>, more: Option<u64>| {
             *sum = sum.zip(more).map(|(sum, more)| sum.saturating_add(more));
         };
-        for state in &self.publishes {
-            let edge = elements.publishes.get(state.id);
-            let load = edge.and_then(|edge| all.get_mut(place(edge.node).ok()?));
-            if let Some(load) = load {
+        for (id, state) in self.publishes() {
+            if let Some(at) = place(elements.publishes.get(id)) {
+                let load = &mut all[at];
                 load.topics_out += 1;
-                load.messages_out += state.count.unwrap_or(0);
-                let is_none = state.count.is_none_or(|count| count == 0);
-                let bytes = state.bytes.or(is_none.then_some(0));
+                load.messages_out += state.messages();
+                let bytes = state.bytes.or((state.messages() == 0).then_some(0));
                 add(&mut load.bytes_out, bytes);
             }
         }
-        for state in &self.subscribes {
-            let Some(edge) = elements.subscribes.get(state.id) else {
-                continue;
-            };
-            let Some(load) = place(edge.node).ok().and_then(|at| all.get_mut(at)) else {
-                continue;
-            };
-            let topic = self
-                .topics
-                .binary_search_by_key(&edge.topic, |state| state.id);
-            let topic = topic.ok().and_then(|at| self.topics.get(at));
-            load.topics_in += 1;
-            load.messages_in += topic.map_or(0, |topic| topic.count);
-            add(
-                &mut load.bytes_in,
-                topic.map_or(Some(0), |topic| topic.bytes),
-            );
+        for (id, _) in self.subscribes() {
+            let edge = elements.subscribes.get(id);
+            if let (Some(at), Some(edge)) = (place(edge), edge) {
+                let load = &mut all[at];
+                let topic = self.get(Element::Topic(edge.topic));
+                load.topics_in += 1;
+                load.messages_in += topic.map_or(0, ElementState::messages);
+                add(
+                    &mut load.bytes_in,
+                    topic.map_or(Some(0), |topic| topic.bytes),
+                );
+            }
         }
         all
     }
@@ -346,6 +367,21 @@ impl Element {
             Self::Publish(id) => (2, id.at()),
             Self::Subscribe(id) => (3, id.at()),
         }
+    }
+
+    /// Whether it is a node.
+    pub fn is_node(&self) -> bool {
+        matches!(self, Self::Node(_))
+    }
+
+    /// Whether it is a topic.
+    pub fn is_topic(&self) -> bool {
+        matches!(self, Self::Topic(_))
+    }
+
+    /// Whether it is a publication or subscription.
+    pub fn is_edge(&self) -> bool {
+        !self.is_node() && !self.is_topic()
     }
 
     /// The word for the element's kind in JSON: `node`, `topic`, `publish` or `subscribe`.

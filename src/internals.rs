@@ -17,8 +17,8 @@ pub mod evidence {
 /// See `src/graph.rs`.
 pub mod graph {
     pub use crate::graph::{
-        Built, EdgeState, Element, Elements, Graph, Measures, NodeState, PerElement, State,
-        TopicState, build, diff, window,
+        Built, Element, ElementState, Elements, Graph, Measures, PerElement, State, build, diff,
+        window,
     };
 }
 

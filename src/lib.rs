@@ -16,7 +16,7 @@
 //! let reading = Reading::of([bag]);
 //! let mission = read(&reading)?;
 //! for (window, graph) in mission.each() {
-//!     println!("{}: {} nodes, {} changes", window.index, graph.nodes.len(), window.changes.len());
+//!     println!("{}: {} nodes, {} changes", window.index, graph.nodes().count(), window.changes.len());
 //! }
 //! # assert!(mission.windows.len() >= 5 && mission.elements.nodes.len() > 5);
 //! let job = Render::new(reading, vec![Output::parse(&page, None)?])?;
@@ -130,8 +130,8 @@ pub mod values {
     pub use crate::evidence::{Confidence, Evidence};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
-        ById, Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Id, Measures, Node,
-        NodeId, NodeLoad, NodeState, State, Topic, TopicId, TopicState,
+        ById, Edge, EdgeId, Element, ElementState, Elements, Graphs, GraphsIter, Id, Measures,
+        Node, NodeId, NodeLoad, State, Topic, TopicId,
     };
     pub use crate::mission::event_log::{
         Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,

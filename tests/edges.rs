@@ -72,29 +72,18 @@ fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
         |evidence: bagreel::internals::evidence::Evidence| evidence.words().any(|word| word == by);
     let node = |id| all.nodes[id].name.as_str();
     let topic = |id| all.topics[id].name.as_str();
-    let confidence = |states: &[graph::EdgeState], id: usize| {
-        let state = states.iter().find(|s| s.id.0 as usize == id);
-        state.map_or("never", |s| s.confidence.word())
-    };
     let graph = &built.graphs[0];
-    let publishes = all
-        .publishes
-        .iter()
-        .enumerate()
-        .filter(|(_, e)| by(e.evidence));
-    let subscribes = all
-        .subscribes
-        .iter()
-        .enumerate()
-        .filter(|(_, e)| by(e.evidence));
+    let confidence = |what| graph.get(what).map_or("never", |s| s.confidence.word());
+    let publishes = all.publishes.with_ids().filter(|(_, e)| by(e.evidence));
+    let subscribes = all.subscribes.with_ids().filter(|(_, e)| by(e.evidence));
     let mut lines: Vec<String> = publishes
         .map(|(id, e)| {
-            let confidence = confidence(&graph.publishes, id);
+            let confidence = confidence(graph::Element::Publish(id));
             format!("{} > {} {confidence}", node(e.node), topic(e.topic))
         })
         .collect();
     lines.extend(subscribes.map(|(id, e)| {
-        let confidence = confidence(&graph.subscribes, id);
+        let confidence = confidence(graph::Element::Subscribe(id));
         format!("{} > {} {confidence}", topic(e.topic), node(e.node))
     }));
     lines
@@ -650,9 +639,8 @@ fn only_measured_edges_depend_on_messages() {
     let bag = logging(&[("/arm", "a.cpp")], &[("/arm/state", "a/msg/State")]);
     let (built, _) = concluded(&bag, CollectOptions::default());
     let confidences: Vec<_> = built.graphs[0]
-        .publishes
-        .iter()
-        .map(|s| s.confidence)
+        .publishes()
+        .map(|(_, s)| s.confidence)
         .collect();
     assert_eq!(confidences, [Confidence::Inferred, Confidence::Stated]);
 }
@@ -716,7 +704,7 @@ fn an_end_given_by_the_user_is_exclusive() {
     let node = || NamedElement::Node("/slam".to_owned());
     let there = |end| {
         let built = shown(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
-        let nodes = built.graphs.iter().map(|g| g.nodes.len());
+        let nodes = built.graphs.iter().map(|g| g.nodes().count());
         nodes.collect::<Vec<_>>()
     };
     // Including the node `/rosout`, which every ROS 1 mission has.
@@ -931,7 +919,7 @@ fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
         .map(|n| n.name.to_string())
         .collect();
     let id = names.iter().position(|name| name == node);
-    let is_there = |g: &graph::Graph| g.nodes.iter().any(|n| Some(n.id.0 as usize) == id);
+    let is_there = |g: &graph::Graph| g.nodes().any(|(n, _)| Some(n.0 as usize) == id);
     (built.graphs.iter().map(is_there).collect(), names)
 }
 

@@ -67,10 +67,10 @@ fn names(built: &Built, window: usize) -> [Names; 3] {
     let (all, graph) = (&built.elements, &built.graphs[window]);
     let node = |id| all.nodes[id].name.as_str().to_owned();
     let topic = |id| all.topics[id].name.as_str().to_owned();
-    let publishes = graph.publishes.iter().map(|e| &all.publishes[e.id]);
-    let subscribes = graph.subscribes.iter().map(|e| &all.subscribes[e.id]);
+    let publishes = graph.publishes().map(|(id, _)| &all.publishes[id]);
+    let subscribes = graph.subscribes().map(|(id, _)| &all.subscribes[id]);
     [
-        graph.nodes.iter().map(|n| vec![node(n.id)]).collect(),
+        graph.nodes().map(|(id, _)| vec![node(id)]).collect(),
         publishes
             .map(|e| vec![node(e.node), topic(e.topic)])
             .collect(),
@@ -100,21 +100,16 @@ fn confidences((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]
             continue;
         };
         let graph = &built.graphs[window];
-        let nodes = graph.nodes.iter().map(|s| {
-            (
-                s.confidence,
-                "nodes",
-                node(s.id),
-                serde_json::json!(node(s.id)),
-            )
-        });
-        let publishes = graph.publishes.iter().map(|s| {
-            let edge = &all.publishes[s.id];
+        let nodes = graph
+            .nodes()
+            .map(|(id, s)| (s.confidence, "nodes", node(id), serde_json::json!(node(id))));
+        let publishes = graph.publishes().map(|(id, s)| {
+            let edge = &all.publishes[id];
             let names = serde_json::json!([node(edge.node), topic(edge.topic)]);
             (s.confidence, "publishes", node(edge.node), names)
         });
-        let subscribes = graph.subscribes.iter().map(|s| {
-            let edge = &all.subscribes[s.id];
+        let subscribes = graph.subscribes().map(|(id, s)| {
+            let edge = &all.subscribes[id];
             let names = serde_json::json!([topic(edge.topic), node(edge.node)]);
             (s.confidence, "subscribes", node(edge.node), names)
         });

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use bagreel::values::{Length, Period};
+use bagreel::values::{Element, Length, Period};
 use bagreel::{Mission, Reading, read};
 
 use crate::support::cdr::Cdr;
@@ -203,14 +203,14 @@ fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     let all = &mission.elements;
     let topic = all.topic("/scan").unwrap();
     let graph = mission.graphs.iter().nth(1).unwrap();
-    let scan = graph.topics.iter().find(|t| t.id == topic).unwrap();
+    let scan = graph.get(Element::Topic(topic)).unwrap();
     let count = |n: Option<u64>| n.map(|n| n as f64);
     assert!(near(count(scan.bytes), 100_000.0), "{scan:?}");
     assert!(near(count(scan.measures.drops), 20.0), "{scan:?}");
     assert!(near(scan.measures.jitter_s, 0.02), "{scan:?}");
     assert!(near(scan.measures.age_s, 0.05), "{scan:?}");
     let is_scan = |id| all.subscribes[id].topic == topic;
-    let edge = graph.subscribes.iter().find(|e| is_scan(e.id)).unwrap();
+    let (_, edge) = graph.subscribes().find(|e| is_scan(e.0)).unwrap();
     assert!(near(count(edge.count), 80.0), "{edge:?}");
     assert!(near(edge.hz, 8.0), "{edge:?}");
     assert!(near(count(edge.bytes), 80_000.0), "{edge:?}");
@@ -218,13 +218,13 @@ fn bytes_drops_jitter_and_age_are_accurate_to_one_percent() {
     assert!(near(edge.measures.jitter_s, 0.02), "{edge:?}");
     assert!(near(edge.measures.age_s, 0.07), "{edge:?}");
     let is_scan = |id| all.publishes[id].topic == topic;
-    let edge = graph.publishes.iter().find(|e| is_scan(e.id)).unwrap();
+    let (_, edge) = graph.publishes().find(|e| is_scan(e.0)).unwrap();
     assert!(near(count(edge.bytes), 100_000.0), "{edge:?}");
     assert!(near(edge.measures.age_s, 0.05), "{edge:?}");
     let loads = graph.loads(all);
     let of = |name: &str| {
         let is_it = |id| all.nodes[id].name.as_str() == name;
-        loads[graph.nodes.iter().position(|n| is_it(n.id)).unwrap()]
+        loads[graph.nodes().position(|n| is_it(n.0)).unwrap()]
     };
     let (lidar, slam) = (of("/lidar"), of("/slam"));
     assert_eq!((lidar.messages_out, lidar.bytes_out), (100, Some(100_000)));
@@ -292,14 +292,11 @@ fn seen(mission: &Mission) -> Vec<Vec<String>> {
     let node = |id| all.nodes[id].name.as_str();
     let topic = |id| all.topics[id].name.as_str();
     let graphs = mission.graphs.iter().map(|graph| {
-        let nodes = graph.nodes.iter().map(|s| format!("node {}", node(s.id)));
-        let topics = graph
-            .topics
-            .iter()
-            .map(|s| format!("topic {}", topic(s.id)));
-        let publishes = graph.publishes.iter().map(|s| &all.publishes[s.id]);
+        let nodes = graph.nodes().map(|(id, _)| format!("node {}", node(id)));
+        let topics = graph.topics().map(|(id, _)| format!("topic {}", topic(id)));
+        let publishes = graph.publishes().map(|(id, _)| &all.publishes[id]);
         let publishes = publishes.map(|e| format!("{} -> {}", node(e.node), topic(e.topic)));
-        let subscribes = graph.subscribes.iter().map(|s| &all.subscribes[s.id]);
+        let subscribes = graph.subscribes().map(|(id, _)| &all.subscribes[id]);
         let subscribes = subscribes.map(|e| format!("{} <- {}", node(e.node), topic(e.topic)));
         nodes
             .chain(topics)

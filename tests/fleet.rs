@@ -491,9 +491,9 @@ fn finished_counts_equal_the_mission_read_directly() {
         assert_eq!(spans(&made), spans(&read));
         for ((window, a), (_, b)) in made.each().zip(read.each()) {
             let topics = |m: &Mission, g: &bagreel::Graph| -> BTreeMap<String, String> {
-                let sent = g.topics.iter().filter(|t| t.count > 0);
+                let sent = g.topics().filter(|(_, t)| t.messages() > 0);
                 let name = |id| m.elements.topics[id].name.to_string();
-                sent.map(|t| (name(t.id), format!("{:?} {:?}", t.count, t.hz)))
+                sent.map(|(id, t)| (name(id), format!("{:?} {:?}", t.count, t.hz)))
                     .collect()
             };
             assert_eq!(
@@ -503,17 +503,14 @@ fn finished_counts_equal_the_mission_read_directly() {
                 window.index
             );
             let edges = |m: &Mission, g: &bagreel::Graph| -> BTreeMap<String, String> {
-                let sent = g
-                    .publishes
-                    .iter()
-                    .filter(|e| e.count.is_some_and(|n| n > 0));
+                let sent = g.publishes().filter(|(_, e)| e.messages() > 0);
                 let all = &m.elements;
                 let name = |id| {
                     let edge = &all.publishes[id];
                     let node = all.nodes[edge.node].name.as_str();
                     format!("{node} {}", all.topics[edge.topic].name.as_str())
                 };
-                sent.map(|e| (name(e.id), format!("{:?} {:?}", e.count, e.hz)))
+                sent.map(|(id, e)| (name(id), format!("{:?} {:?}", e.count, e.hz)))
                     .collect()
             };
             // In ROS 2, other evidence than the index names publishers.

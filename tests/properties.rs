@@ -2,7 +2,7 @@
 
 use bagreel::internals::evidence::Confidence;
 use bagreel::internals::graph::diff::{apply, diff};
-use bagreel::internals::graph::{EdgeState, Graph, Measures, NodeState, State, TopicState};
+use bagreel::internals::graph::{ElementState, Graph, State};
 use std::collections::BTreeSet;
 
 use bagreel::values::{EdgeId, Element, Kind, Length, NodeId, Period, TopicId};
@@ -21,54 +21,29 @@ fn confidence() -> impl Strategy<Value = Confidence> {
     prop::sample::select(Confidence::ALL.to_vec())
 }
 
-fn edges() -> impl Strategy<Value = Vec<EdgeState>> {
+/// The states of some of `many` elements of a kind.
+fn some(kind: fn(u32) -> Element, many: u32) -> impl Strategy<Value = Vec<ElementState>> {
     let one = (state(), confidence(), prop::option::of(0..500_u64));
-    btree_map(0..40_u32, one, 0..20).prop_map(|edges| {
-        let made = edges
-            .into_iter()
-            .map(|(id, (state, confidence, count))| EdgeState {
-                id: EdgeId(id),
-                state,
-                confidence,
-                count,
-                hz: count.map(|n| n as f64 / 10.0),
-                bytes: None,
-                measures: Measures::default(),
-            });
+    btree_map(0..many, one, 0..20).prop_map(move |all| {
+        let all = all.into_iter();
+        let made = all.map(|(id, (state, confidence, count))| ElementState {
+            count,
+            hz: count.map(|n| n as f64 / 10.0),
+            ..ElementState::new(kind(id), state, confidence)
+        });
         made.collect()
     })
 }
 
 fn graph() -> impl Strategy<Value = Graph> {
-    let nodes = btree_map(0..30_u32, (state(), confidence()), 0..15);
-    let topics = btree_map(0..30_u32, (state(), confidence(), 0..500_u64), 0..15);
-    (nodes, topics, edges(), edges()).prop_map(|(nodes, topics, publishes, subscribes)| Graph {
-        nodes: nodes
-            .into_iter()
-            .map(|(id, (state, confidence))| NodeState {
-                id: NodeId(id),
-                state,
-                confidence,
-                hz: None,
-                lifecycle: None,
-            })
-            .collect(),
-        topics: topics
-            .into_iter()
-            .map(|(id, (state, confidence, count))| TopicState {
-                id: TopicId(id),
-                state,
-                confidence,
-                count,
-                bytes: None,
-                hz: Some(count as f64 / 10.0),
-                median_period_s: None,
-                max_gap_s: None,
-                measures: Measures::default(),
-            })
-            .collect(),
-        publishes,
-        subscribes,
+    let kinds = [
+        some(|id| Element::Node(NodeId(id)), 30),
+        some(|id| Element::Topic(TopicId(id)), 30),
+        some(|id| Element::Publish(EdgeId(id)), 40),
+        some(|id| Element::Subscribe(EdgeId(id)), 40),
+    ];
+    kinds.prop_map(|states| Graph {
+        states: states.concat(),
     })
 }
 
@@ -115,15 +90,7 @@ fn mission(bag: &std::path::Path, seconds: i64) -> Mission {
 }
 
 fn there(graph: &Graph) -> BTreeSet<Element> {
-    let nodes = graph.nodes.iter().map(|s| Element::Node(s.id));
-    let topics = graph.topics.iter().map(|s| Element::Topic(s.id));
-    let publishes = graph.publishes.iter().map(|s| Element::Publish(s.id));
-    let subscribes = graph.subscribes.iter().map(|s| Element::Subscribe(s.id));
-    nodes
-        .chain(topics)
-        .chain(publishes)
-        .chain(subscribes)
-        .collect()
+    graph.states.iter().map(|state| state.what).collect()
 }
 
 /// Whether the changes of every window turn the previous window's elements into its own, each with a matching

@@ -35,9 +35,9 @@ fn all_counts_match_an_independent_reader() {
     assert_eq!(mission.span.start.0, expected["start_ns"].as_i64().unwrap());
     assert_eq!(mission.messages, expected["messages"].as_u64().unwrap());
     for ((window, graph), expected) in mission.each().zip(expected["windows"].as_array().unwrap()) {
-        let counted = graph.topics.iter().filter(|t| t.count > 0);
+        let counted = graph.topics().filter(|(_, t)| t.messages() > 0);
         let counted: BTreeMap<&str, u64> = counted
-            .map(|t| (mission.elements.topics[t.id].name.as_str(), t.count))
+            .map(|(id, t)| (mission.elements.topics[id].name.as_str(), t.messages()))
             .collect();
         let expected: BTreeMap<&str, u64> = expected
             .as_object()
@@ -57,9 +57,8 @@ fn all_counts_match_an_independent_reader() {
 fn alive(mission: &Mission, node: &str, second: usize) -> bool {
     let graph = mission.graphs.get(second / 10).unwrap();
     graph
-        .nodes
-        .iter()
-        .any(|n| mission.elements.nodes[n.id].name.as_str().starts_with(node))
+        .nodes()
+        .any(|(id, _)| mission.elements.nodes[id].name.as_str().starts_with(node))
 }
 
 #[test]
@@ -91,7 +90,7 @@ fn nodes_of_another_part_of_the_recording_are_not_in_the_graph() {
     let names = |mission: &Mission, window: usize| -> BTreeSet<String> {
         let graph = mission.graphs.get(window).unwrap();
         let node = |id| mission.elements.nodes[id].name.to_string();
-        graph.nodes.iter().map(|n| node(n.id)).collect()
+        graph.nodes().map(|(id, _)| node(id)).collect()
     };
     let (whole, part) = (mission(), part(Some("280"), None));
     let (alive, drawn) = (names(&whole, 28), names(&part, 0));

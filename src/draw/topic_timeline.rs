@@ -18,7 +18,7 @@ use crate::draw::picture::title::Title;
 use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
-use crate::graph::{Element, NodeId};
+use crate::graph::{Element, ElementState, NodeId};
 use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
@@ -253,9 +253,8 @@ impl<'a> TopicTimeline<'a> {
             .get(window)
             .map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
         let count = |track: &Track| {
-            let topics = &graph.as_ref()?.topics;
-            let at = topics.binary_search_by_key(&track.topic?, |t| t.id).ok()?;
-            Some(topics[at].count)
+            let topic = Element::Topic(track.topic?);
+            graph.as_ref()?.get(topic).map(ElementState::messages)
         };
         let mut canvas = self.canvas();
         canvas.begin("past");
@@ -271,7 +270,7 @@ impl<'a> TopicTimeline<'a> {
         canvas.begin("nodes");
         let alive: BTreeSet<NodeId> = graph
             .iter()
-            .flat_map(|g| g.nodes.iter().map(|n| n.id))
+            .flat_map(|g| g.nodes().map(|(id, _)| id))
             .collect();
         self.nodes(&mut canvas, &|nodes| {
             nodes.iter().any(|n| alive.contains(n))

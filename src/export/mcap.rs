@@ -97,7 +97,7 @@ impl<'a> Ends<'a> {
         let nodes = self.of.keys().map(|id| Element::Node(*id));
         let edges = self.of.values().flatten().flatten().map(|(what, _)| *what);
         let all = mission.elements.all();
-        let topics = all.filter(|what| matches!(what, Element::Topic(_)));
+        let topics = all.filter(Element::is_topic);
         let runs = nodes.chain(edges).chain(topics);
         let runs = runs.flat_map(|what| mission.elements.runs(what));
         let turns = runs.flat_map(|run| [run.start, run.end]);

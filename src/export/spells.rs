@@ -83,7 +83,7 @@ impl SpellOf {
             let span = mission.graphs.spans()[at];
             all.confidence = all.confidence.min(row.confidence);
             // A node's count is that of its topics' messages.
-            if let (Some(count), false) = (row.count, matches!(what, Element::Node(_))) {
+            if let (Some(count), false) = (row.count, what.is_node()) {
                 *all.messages.get_or_insert(0) += count;
             }
             if let Some(hz) = row.hz(span) {

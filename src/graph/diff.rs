@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::base::time::Stamp;
 use crate::base::words::worded;
-use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicState};
+use crate::graph::{Element, ElementState, Graph, NodeId, TopicId};
 
 /// A reconfiguration, as in JSON and the log of events.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,63 +94,16 @@ worded! {
     }
 }
 
-/// The exact difference between two graphs: [`apply`] of it to the first gives the second.
+/// The exact difference between two graphs: [`apply`] of it to the first gives the second. Each list is sorted
+/// by element.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Diff {
-    /// Differences in nodes.
-    pub nodes: Delta<NodeState>,
-    /// Differences in topics.
-    pub topics: Delta<TopicState>,
-    /// Differences in publications.
-    pub publishes: Delta<EdgeState>,
-    /// Differences in subscriptions.
-    pub subscribes: Delta<EdgeState>,
-}
-
-/// The elements of one part of a difference.
-macro_rules! elements {
-    ($diff:expr, $part:ident) => {{
-        let nodes = $diff.nodes.$part.iter().map(|s| Element::Node(s.id));
-        let topics = $diff.topics.$part.iter().map(|s| Element::Topic(s.id));
-        let publishes = $diff.publishes.$part.iter();
-        let subscribes = $diff.subscribes.$part.iter();
-        let publishes = publishes.map(|s| Element::Publish(s.id));
-        let subscribes = subscribes.map(|s| Element::Subscribe(s.id));
-        nodes.chain(topics).chain(publishes).chain(subscribes)
-    }};
-}
-
-impl Diff {
-    /// The new elements.
-    pub(crate) fn added(&self) -> impl Iterator<Item = Element> {
-        elements!(self, added)
-    }
-
-    /// The removed elements.
-    pub(crate) fn removed(&self) -> impl Iterator<Item = Element> {
-        elements!(self, removed)
-    }
-}
-
-/// The difference between one list of two graphs. Each part is sorted by id.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Delta<T> {
     /// States of new elements.
-    pub added: Vec<T>,
-    /// States of removed elements, before.
-    pub removed: Vec<T>,
+    pub added: Vec<ElementState>,
+    /// Removed elements.
+    pub removed: Vec<Element>,
     /// States before and after of elements that differ.
-    pub changed: Vec<(T, T)>,
-}
-
-impl<T> Default for Delta<T> {
-    fn default() -> Self {
-        Self {
-            added: Vec::new(),
-            removed: Vec::new(),
-            changed: Vec::new(),
-        }
-    }
+    pub changed: Vec<(ElementState, ElementState)>,
 }
 
 impl Diff {
@@ -162,68 +115,30 @@ impl Diff {
 
 /// The difference from `before` to `after`.
 pub fn diff(before: &Graph, after: &Graph) -> Diff {
-    Diff {
-        nodes: delta(&before.nodes, &after.nodes),
-        topics: delta(&before.topics, &after.topics),
-        publishes: delta(&before.publishes, &after.publishes),
-        subscribes: delta(&before.subscribes, &after.subscribes),
+    let mut diff = Diff::default();
+    let mut old = before.states.iter().peekable();
+    for new in &after.states {
+        while let Some(gone) = old.next_if(|old| old.what < new.what) {
+            diff.removed.push(gone.what);
+        }
+        match old.next_if(|old| old.what == new.what) {
+            Some(old) if old == new => {}
+            Some(old) => diff.changed.push((old.clone(), new.clone())),
+            None => diff.added.push(new.clone()),
+        }
     }
+    diff.removed.extend(old.map(|gone| gone.what));
+    diff
 }
 
 /// The result of applying `diff` to `before`.
 pub fn apply(before: &Graph, diff: &Diff) -> Graph {
+    let gone: BTreeSet<Element> = diff.removed.iter().copied().collect();
+    let kept = before.states.iter().filter(|s| !gone.contains(&s.what));
+    let fresh = diff.changed.iter().map(|(_, after)| after);
+    let all = kept.chain(&diff.added).chain(fresh);
+    let all: BTreeMap<Element, &ElementState> = all.map(|s| (s.what, s)).collect();
     Graph {
-        nodes: patched(&before.nodes, &diff.nodes),
-        topics: patched(&before.topics, &diff.topics),
-        publishes: patched(&before.publishes, &diff.publishes),
-        subscribes: patched(&before.subscribes, &diff.subscribes),
+        states: all.into_values().cloned().collect(),
     }
-}
-
-/// An element state with an index in the mission's list of elements.
-trait HasId {
-    fn place(&self) -> u32;
-}
-
-macro_rules! placed {
-    ($($type:ty),*) => { $(impl HasId for $type { fn place(&self) -> u32 { self.id.0 } })* };
-}
-placed!(NodeState, TopicState, EdgeState);
-
-/// The difference between two lists that are sorted by id.
-fn delta<T: HasId + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
-    let mut delta = Delta::default();
-    let (mut old, mut new) = (before.iter().peekable(), after.iter().peekable());
-    loop {
-        match (old.peek(), new.peek()) {
-            (Some(b), Some(a)) if b.place() == a.place() => {
-                if b != a {
-                    delta.changed.push(((*b).clone(), (*a).clone()));
-                }
-                old.next();
-                new.next();
-            }
-            (Some(b), a) if a.is_none_or(|a| b.place() < a.place()) => {
-                delta.removed.push((*b).clone());
-                old.next();
-            }
-            (_, Some(a)) => {
-                delta.added.push((*a).clone());
-                new.next();
-            }
-            _ => return delta,
-        }
-    }
-}
-
-fn patched<T: HasId + Clone>(before: &[T], delta: &Delta<T>) -> Vec<T> {
-    let gone: BTreeSet<u32> = delta.removed.iter().map(T::place).collect();
-    let kept = before.iter().filter(|s| !gone.contains(&s.place()));
-    let mut all: BTreeMap<u32, T> = kept.map(|s| (s.place(), s.clone())).collect();
-    let fresh = delta
-        .added
-        .iter()
-        .chain(delta.changed.iter().map(|(_, after)| after));
-    all.extend(fresh.map(|s| (s.place(), s.clone())));
-    all.into_values().collect()
 }

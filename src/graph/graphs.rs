@@ -11,7 +11,7 @@ pub(crate) use walk::ColumnWalk;
 
 use std::sync::Arc;
 
-use super::{EdgeState, Element, Elements, Graph, Id, NodeState, PerElement, TopicState};
+use super::{Element, Elements, Graph, PerElement};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
 
@@ -139,14 +139,14 @@ impl Iterator for Iter<'_> {
     fn next(&mut self) -> Option<Graph> {
         let span = *self.all.spans.get(self.next)?;
         self.next += 1;
-        let lifecycles = &self.all.lifecycles;
-        let [nodes, topics, publishes, subscribes] = &mut self.cursors;
-        Some(Graph {
-            nodes: states(nodes, |id, row| row.node(id, span, lifecycles)),
-            topics: states(topics, |id, row| row.topic(id, span)),
-            publishes: states(publishes, |id, row| row.edge(id, span)),
-            subscribes: states(subscribes, |id, row| row.edge(id, span)),
-        })
+        let mut states = Vec::with_capacity(self.cursors.iter().map(Vec::len).sum());
+        for (cursors, kind) in self.cursors.iter_mut().zip(Element::KINDS) {
+            for (at, cursor) in cursors.iter_mut().enumerate() {
+                let row = cursor.next();
+                states.extend(row.map(|row| row.state(kind(at), span, &self.all.lifecycles)));
+            }
+        }
+        Some(Graph { states })
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
@@ -175,15 +175,6 @@ impl<'a> IntoIterator for &'a Graphs {
     }
 }
 
-/// The states of the elements in the next window, by id.
-fn states<I: Id, T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(I, &Row) -> T) -> Vec<T> {
-    // Reserved at once: growing would take half as much again.
-    let mut states = Vec::with_capacity(cursors.len());
-    let rows = (0..).map(I::of).zip(cursors);
-    states.extend(rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?))));
-    states
-}
-
 /// A writer of the graphs of windows, state by state: each element's in order of the windows, elements in any order.
 #[derive(Debug, Default)]
 pub(crate) struct GraphsWriter {
@@ -199,27 +190,6 @@ impl GraphsWriter {
             spans,
             ..Self::default()
         }
-    }
-
-    /// Adds the state of a node in the window with an index.
-    pub(crate) fn node(&mut self, at: usize, state: &NodeState) {
-        let lifecycle = state
-            .lifecycle
-            .as_ref()
-            .map_or(0, |word| self.lifecycle(word));
-        let row = Row::of_node(state, self.spans[at], lifecycle);
-        self.row(Element::Node(state.id), at, row);
-    }
-
-    /// Adds the state of a topic.
-    pub(crate) fn topic(&mut self, at: usize, state: &TopicState) {
-        let row = Row::of_topic(state, self.spans[at]);
-        self.row(Element::Topic(state.id), at, row);
-    }
-
-    /// Adds the state of an edge.
-    pub(crate) fn edge(&mut self, what: Element, at: usize, state: &EdgeState) {
-        self.row(what, at, Row::of_edge(state, self.spans[at]));
     }
 
     /// Adds the row of an element in the window with an index.
@@ -239,13 +209,11 @@ impl GraphsWriter {
 
     /// Adds all states of the window with an index.
     pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
-        graph.nodes.iter().for_each(|state| self.node(at, state));
-        graph.topics.iter().for_each(|state| self.topic(at, state));
-        for state in &graph.publishes {
-            self.edge(Element::Publish(state.id), at, state);
-        }
-        for state in &graph.subscribes {
-            self.edge(Element::Subscribe(state.id), at, state);
+        for state in &graph.states {
+            let lifecycle = state.lifecycle.as_ref();
+            let lifecycle = lifecycle.map_or(0, |word| self.lifecycle(word));
+            let row = Row::of(state, self.spans[at], lifecycle);
+            self.row(state.what, at, row);
         }
     }
 

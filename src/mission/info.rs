@@ -215,7 +215,7 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: confidences(|what| matches!(what, Element::Node(_))),
+        nodes_by_degree: confidences(Element::is_node),
         publishes_by_degree: confidences(|what| matches!(what, Element::Publish(_))),
         subscribes_by_degree: listeners(mission)
             .filter(|(_, edge)| !edge.evidence.is_guess())
@@ -313,11 +313,11 @@ fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId,
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic].count;
     }
-    for state in mission.graphs.iter().flat_map(|graph| graph.publishes) {
-        if let Some(count) = state.count {
-            *traffic[elements.publishes[state.id].node]
-                .sent
-                .get_or_insert(0) += count;
+    for graph in &mission.graphs {
+        for (id, state) in graph.publishes() {
+            if let Some(count) = state.count {
+                *traffic[elements.publishes[id].node].sent.get_or_insert(0) += count;
+            }
         }
     }
     traffic
@@ -344,13 +344,13 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
         })
         .collect();
     for (window, graph) in mission.each() {
-        for state in &graph.topics {
-            let topic = &mut topics[state.id];
-            topic.count += state.count;
+        for (id, state) in graph.topics() {
+            let topic = &mut topics[id];
+            topic.count += state.messages();
             topic.bytes = state
                 .bytes
                 .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
-            topic.activity[window.index] = state.count;
+            topic.activity[window.index] = state.messages();
         }
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();

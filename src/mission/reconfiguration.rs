@@ -62,21 +62,11 @@ impl Reconfiguration {
         let mut before: Option<BTreeSet<Element>> = None;
         let mut windows = Vec::new();
         for (window, graph) in mission.each() {
-            let nodes = graph.nodes.iter().map(|state| Element::Node(state.id));
-            let sent = graph
-                .publishes
-                .iter()
-                .map(|state| Element::Publish(state.id));
-            let subscribed = graph
-                .subscribes
-                .iter()
-                .map(|state| Element::Subscribe(state.id));
-            let own: BTreeSet<Element> = nodes
-                .chain(sent)
-                .chain(subscribed)
-                .filter(is_robot)
+            let all = graph.states.iter().map(|state| state.what);
+            let own: BTreeSet<Element> = all
+                .filter(|what| !what.is_topic() && is_robot(what))
                 .collect();
-            let is_node = |what: &&Element| matches!(what, Element::Node(_));
+            let is_node = |what: &&Element| what.is_node();
             let nodes = own.iter().filter(is_node).count();
             let split = |some: Vec<&Element>| {
                 let nodes = some.iter().filter(|what| is_node(what)).count();

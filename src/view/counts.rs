@@ -15,7 +15,7 @@ impl Counts {
     }
 
     fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
-        let is_topic = matches!(what, Element::Topic(_));
+        let is_topic = what.is_topic();
         match kind {
             Kind::Started => &mut self.nodes_added,
             Kind::Stopped => &mut self.nodes_removed,

@@ -5,7 +5,9 @@ use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
-use crate::graph::{ById, Edge, EdgeId, EdgeState, Element, Elements, Graph, Id, NodeId, TopicId};
+use crate::graph::{
+    ById, Edge, EdgeId, Element, ElementState, Elements, Graph, Id, NodeId, TopicId,
+};
 use crate::mission::event_log::{Detail, Event};
 use crate::mission::{EventId, EventLog, Mission, Window};
 
@@ -133,36 +135,25 @@ impl Keep {
     }
 
     fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed) -> Graph {
-        let nodes = graph.nodes.iter().filter(|n| shows_node(n.state, options));
-        let topics = graph
-            .topics
-            .iter()
-            .filter(|t| shows_topic(t.state, options));
-        let mut nodes: Vec<_> = nodes.cloned().collect();
-        let mut topics: Vec<_> = topics.cloned().collect();
-        nodes.retain_mut(|n| moved(&mut n.id, &self.nodes));
-        topics.retain_mut(|t| moved(&mut t.id, &self.topics));
-        let there = |node: Option<NodeId>, topic: Option<TopicId>| {
-            node.is_some_and(|id| nodes.binary_search_by_key(&id, |n| n.id).is_ok())
-                && topic.is_some_and(|id| topics.binary_search_by_key(&id, |t| t.id).is_ok())
+        let is_shown = |state: &ElementState| match state.what {
+            Element::Node(_) => shows_node(state.state, options),
+            Element::Topic(_) | Element::Publish(_) => shows_topic(state.state, options),
+            Element::Subscribe(_) => true,
         };
-        let edges = |states: &[EdgeState], ids: &NewIds<EdgeId>, ends: &ById<EdgeId, _>| {
-            let mut states: Vec<EdgeState> = states.to_vec();
-            states.retain_mut(|s| {
-                let (node, topic) = ends[s.id];
-                there(new_id(&self.nodes, node), new_id(&self.topics, topic))
-                    && moved(&mut s.id, ids)
-            });
-            states
-        };
-        let mut publishes = edges(&graph.publishes, &self.publishes, &viewed.published);
-        publishes.retain(|p| shows_topic(p.state, options));
-        let subscribes = edges(&graph.subscribes, &self.subscribes, &viewed.subscribed);
+        let is_there = |what: Element| graph.get(what).is_some_and(is_shown);
+        let states = graph.states.iter().filter_map(|state| {
+            let (node, topic) = viewed.ends_of(state.what);
+            let ends = node.map(Element::Node).into_iter();
+            let mut ends = ends.chain(topic.map(Element::Topic));
+            let stays = is_shown(state) && ends.all(is_there);
+            let what = self.element(state.what).filter(|_| stays)?;
+            Some(ElementState {
+                what,
+                ..state.clone()
+            })
+        });
         Graph {
-            nodes,
-            topics,
-            publishes,
-            subscribes,
+            states: states.collect(),
         }
     }
 
@@ -220,13 +211,6 @@ fn numbered<I: Id>(stays: impl Iterator<Item = bool>) -> NewIds<I> {
 
 fn new_id<I: Id>(ids: &NewIds<I>, id: I) -> Option<I> {
     ids.get(id).copied().flatten()
-}
-
-/// Gives a state its new id; false if its element does not stay.
-fn moved<I: Id>(id: &mut I, ids: &NewIds<I>) -> bool {
-    let new = new_id(ids, *id);
-    *id = new.unwrap_or(*id);
-    new.is_some()
 }
 
 fn kept<I: Id, T: Clone>(all: &ById<I, T>, ids: &NewIds<I>) -> ById<I, T> {

@@ -403,7 +403,7 @@ impl Viewed {
     }
 
     /// The node and the topic of an element: both of an edge, one of the others.
-    fn both_of(&self, what: Element) -> (Option<NodeId>, Option<TopicId>) {
+    pub(crate) fn ends_of(&self, what: Element) -> (Option<NodeId>, Option<TopicId>) {
         match what {
             Element::Node(id) => (Some(id), None),
             Element::Topic(id) => (None, Some(id)),
@@ -414,7 +414,7 @@ impl Viewed {
 
     /// The topic of an element: that of an edge, or itself.
     pub(crate) fn topic_of(&self, what: Element) -> Option<TopicId> {
-        self.both_of(what).1
+        self.ends_of(what).1
     }
 
     /// Records the arrows that each topic's publications are part of.
@@ -437,7 +437,7 @@ impl Viewed {
     /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not reported
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
-        let (node, topic) = self.both_of(what);
+        let (node, topic) = self.ends_of(what);
         let is_node = node.is_none_or(|id| self.selection.nodes.get(id) == Some(&None));
         let is_topic = topic.is_none_or(|id| self.selection.topics.get(id) == Some(&None));
         (node.is_some() || topic.is_some()) && is_node && is_topic
@@ -473,13 +473,13 @@ pub(super) fn arrow(
 /// The messages and the payload bytes of each topic in all windows in which its bytes are known.
 fn sizes(mission: &Mission) -> ById<TopicId, (u64, u64)> {
     let mut sizes = ById::like(&mission.elements.topics, (0_u64, 0_u64));
-    for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
-        if let Some(bytes) = state.bytes {
-            let size = &mut sizes[state.id];
-            *size = (
-                size.0.saturating_add(state.count),
-                size.1.saturating_add(bytes),
-            );
+    for graph in &mission.graphs {
+        for (id, state) in graph.topics() {
+            if let Some(bytes) = state.bytes {
+                let size = &mut sizes[id];
+                size.0 = size.0.saturating_add(state.messages());
+                size.1 = size.1.saturating_add(bytes);
+            }
         }
     }
     sizes

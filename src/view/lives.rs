@@ -35,7 +35,7 @@ impl<'a> ItemTurns<'a> {
             // run would exist all the time.
             let whole = event.part_of.and_then(|id| events.get(id as usize));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
-            if is_kept && !matches!(event.what, Element::Node(_)) {
+            if is_kept && !event.what.is_node() {
                 continue;
             }
             let begins = match event.kind {

@@ -114,7 +114,7 @@ impl WindowMarks {
             Element::Publish(id) => viewed.publish.get(id).copied(),
             Element::Subscribe(id) => viewed.subscribe.get(id).copied(),
         };
-        if !viewed.pairs.is_empty() && matches!(what, Element::Publish(_) | Element::Subscribe(_)) {
+        if !viewed.pairs.is_empty() && what.is_edge() {
             self.add_carriers(viewed, what, sign);
         }
         match place {

@@ -160,8 +160,7 @@ impl<'a> Known<'a> {
 
     fn nodes_or_topics(&self, space: &str) -> Vec<Element> {
         let all = self.inside.get(space).into_iter().flatten().copied();
-        let (nodes, topics): (Vec<Element>, Vec<Element>) =
-            all.partition(|element| matches!(element, Element::Node(_)));
+        let (nodes, topics): (Vec<Element>, Vec<Element>) = all.partition(Element::is_node);
         if nodes.is_empty() { topics } else { nodes }
     }
 }
@@ -223,7 +222,7 @@ fn index(space: &str) -> &str {
 fn described(elements: &Elements) -> Vec<(&str, u64)> {
     let mut all = Vec::new();
     for (name, element) in names(elements) {
-        let kind = matches!(element, Element::Node(_));
+        let kind = element.is_node();
         if let Some(space) = space_of(name) {
             all.push((space, hash(&(kind, seen(name, space)))));
         }

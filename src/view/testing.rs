@@ -6,8 +6,7 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
-    ById, Edge, EdgeId, EdgeState, Elements, Graph, Measures, Node, NodeId, NodeState, State,
-    Topic, TopicId, TopicState,
+    Edge, Element, ElementState, Elements, Graph, Node, NodeId, State, Topic, TopicId,
 };
 use crate::mission::{Mission, Window};
 
@@ -100,6 +99,12 @@ impl<'a> Word<'a> {
     }
 }
 
+impl Word<'_> {
+    fn is(&self, kind: EdgeKind, node: Option<&str>, topic: Option<&str>) -> bool {
+        self.kind == kind && Some(self.node) == node && Some(self.topic) == topic
+    }
+}
+
 fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
     let words = || windows.iter().flatten();
     let nodes: BTreeSet<&str> = words().map(|w| w.node).filter(|n| !n.is_empty()).collect();
@@ -162,73 +167,34 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
 }
 
 fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
-    let mut graph = Graph::default();
-    for (id, node) in elements.nodes.with_ids() {
-        let own = |w: &&Word<'_>| w.node == node.name.as_str();
-        if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
-            let hz = words
-                .iter()
-                .filter(own)
-                .filter_map(|w| w.hz)
-                .reduce(|a, b| a + b);
-            graph.nodes.push(NodeState {
-                id,
-                state,
-                confidence: Confidence::Measured,
-                hz,
-                lifecycle: None,
-            });
-        }
-    }
-    for (id, topic) in elements.topics.with_ids() {
-        let own = |w: &&Word<'_>| w.topic == topic.name.as_str();
-        if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
-            let hz = words
-                .iter()
-                .filter(own)
-                .filter_map(|w| w.hz)
-                .reduce(|a, b| a + b);
-            graph.topics.push(TopicState {
-                id,
-                state,
-                confidence: Confidence::Measured,
-                count: count(hz).unwrap_or(0),
-                bytes: None,
-                hz,
-                median_period_s: None,
-                max_gap_s: None,
-                measures: Measures::default(),
-            });
-        }
-    }
-    let edges = |edges: &ById<EdgeId, Edge>, kind: EdgeKind| -> Vec<EdgeState> {
-        let word = |edge: &Edge| {
-            let (node, topic) = (
-                elements.nodes[edge.node].name.as_str(),
-                elements.topics[edge.topic].name.as_str(),
-            );
-            words
-                .iter()
-                .find(|w| w.kind == kind && w.node == node && w.topic == topic)
+    let states = elements.all().filter_map(|what| {
+        let (node, topic) = elements.names(what);
+        let own = |w: &&Word<'_>| match what {
+            Element::Node(_) => Some(w.node) == node,
+            Element::Topic(_) => Some(w.topic) == topic,
+            Element::Publish(_) => w.is(EdgeKind::Publish, node, topic),
+            Element::Subscribe(_) => w.is(EdgeKind::Subscribe, node, topic),
         };
-        edges
-            .with_ids()
-            .filter_map(|(id, edge)| {
-                word(edge).map(|w| EdgeState {
-                    id,
-                    state: w.state,
-                    confidence: Confidence::Measured,
-                    count: count(w.hz),
-                    hz: w.hz,
-                    bytes: None,
-                    measures: Measures::default(),
-                })
-            })
-            .collect()
-    };
-    graph.publishes = edges(&elements.publishes, EdgeKind::Publish);
-    graph.subscribes = edges(&elements.subscribes, EdgeKind::Subscribe);
-    graph
+        let own = words.iter().filter(own);
+        let own: Vec<&Word<'_>> = own
+            .take(if what.is_edge() { 1 } else { usize::MAX })
+            .collect();
+        let hz = own.iter().filter_map(|w| w.hz).reduce(|a, b| a + b);
+        let state = own.iter().map(|w| w.state).min()?;
+        let count = match what {
+            Element::Node(_) => None,
+            Element::Topic(_) => Some(count(hz).unwrap_or(0)),
+            _ => count(hz),
+        };
+        Some(ElementState {
+            count,
+            hz,
+            ..ElementState::new(what, state, Confidence::Measured)
+        })
+    });
+    Graph {
+        states: states.collect(),
+    }
 }
 
 /// The number of messages in a window of one second.
@@ -249,17 +215,16 @@ pub(crate) fn text(mission: &Mission) -> Vec<String> {
         (node, all.topics[edge.topic].name.to_string())
     };
     let windows = mission.graphs.iter().map(|graph| {
-        let nodes = graph.nodes.iter().map(|n| all.nodes[n.id].name.to_string());
-        let topics = graph
-            .topics
-            .iter()
-            .map(|t| format!("={}", all.topics[t.id].name));
-        let publishes = graph.publishes.iter().map(|e| {
-            let (node, topic) = ends(&all.publishes[e.id]);
+        let nodes = graph.nodes();
+        let nodes = nodes.map(|(id, _)| all.nodes[id].name.to_string());
+        let topics = graph.topics();
+        let topics = topics.map(|(id, _)| format!("={}", all.topics[id].name));
+        let publishes = graph.publishes().map(|(id, _)| {
+            let (node, topic) = ends(&all.publishes[id]);
             format!("{node}>{topic}")
         });
-        let subscribes = graph.subscribes.iter().map(|e| {
-            let (node, topic) = ends(&all.subscribes[e.id]);
+        let subscribes = graph.subscribes().map(|(id, _)| {
+            let (node, topic) = ends(&all.subscribes[id]);
             format!("{node}<{topic}")
         });
         let words = nodes.chain(topics).chain(publishes).chain(subscribes);

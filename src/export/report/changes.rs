@@ -88,7 +88,7 @@ fn changes_of(mission: &Mission, frame: &Frame) -> String {
 /// Whether headlines of this kind are grouped; topics of unknown publishers appear and vanish separately.
 fn is_together(headline: &Headline) -> bool {
     let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
-    kinds && !matches!(headline.what, Element::Topic(_))
+    kinds && !headline.what.is_topic()
 }
 
 /// The name of an element: the role of a node, the name of a topic, both ends of an edge.

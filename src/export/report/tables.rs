@@ -100,10 +100,10 @@ pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
     let shown = shown(view);
     let is_shown = |id: NodeId| shown.contains(&Element::Node(id));
     let mut presence = ById::like(&elements.nodes, WindowsOf::default());
-    for state in mission.graphs.iter().flat_map(|graph| graph.nodes) {
-        if let Some(one) = presence.get_mut(state.id) {
-            one.add(state.hz);
-        }
+    for graph in &mission.graphs {
+        graph
+            .nodes()
+            .for_each(|(id, state)| presence[id].add(state.hz));
     }
     let all = elements.nodes.with_ids().zip(&presence);
     let all = all.filter(|((id, _), _)| is_shown(*id));
@@ -129,10 +129,11 @@ pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     let shown = shown(view);
     let is_shown = |id: TopicId| shown.contains(&Element::Topic(id));
     let mut presence = ById::like(&elements.topics, (WindowsOf::default(), 0_u64));
-    for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
-        if let Some((one, messages)) = presence.get_mut(state.id) {
+    for graph in &mission.graphs {
+        for (id, state) in graph.topics() {
+            let (one, messages) = &mut presence[id];
             one.add(state.hz);
-            *messages += state.count;
+            *messages += state.messages();
         }
     }
     let all = elements.topics.with_ids().zip(&presence);

@@ -1,6 +1,6 @@
 //! The tables of a mission: their columns, each with its cell, and their rows.
 
-use super::seen::{Seen, edges, nodes, topics};
+use super::seen::{Seen, each};
 use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, columns};
 use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
@@ -26,17 +26,17 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "edges",
         batch: || Batch::with(EDGES),
-        fill: |all, has_runs, row| edges(all, has_runs, &mut |one| put(all, EDGES, one, row)),
+        fill: |all, runs, row| elements(all, Element::is_edge, runs, (EDGES, row)),
     },
     Table {
         word: "topics",
         batch: || Batch::with(TOPICS),
-        fill: |all, has_runs, row| topics(all, has_runs, &mut |one| put(all, TOPICS, one, row)),
+        fill: |all, runs, row| elements(all, Element::is_topic, runs, (TOPICS, row)),
     },
     Table {
         word: "nodes",
         batch: || Batch::with(NODES),
-        fill: |all, has_runs, row| nodes(all, has_runs, &mut |one| put(all, NODES, one, row)),
+        fill: |all, runs, row| elements(all, Element::is_node, runs, (NODES, row)),
     },
     Table {
         word: "changes",
@@ -100,24 +100,24 @@ element_columns! {
     START "start_ns" Time |_, one| start(one.span);
     END "end_ns" Time |_, one| end(one.span);
     LENGTH "length_ns" I64 |_, one| length(one.span);
-    WHAT "what" Text |_, one| what(one.what);
-    NODE "node" Text |all, one| node(all, one.what);
+    WHAT "what" Text |_, one| what(one.state.what);
+    NODE "node" Text |all, one| node(all, one.state.what);
     ROLE "node_role" Text |all, one| text(node_of(all, one).map(|node| &*node.role));
-    TOPIC "topic" Text |all, one| topic(all, one.what);
+    TOPIC "topic" Text |all, one| topic(all, one.state.what);
     TYPES "types" Text |all, one| words(topic_of(all, one).iter().flat_map(|topic| &topic.types).map(|kind| &**kind));
     QOS "qos" Text |all, one| text(topic_of(all, one).and_then(|topic| topic.qos.as_deref()));
-    STATE "state" Text |_, one| TableCell::text(one.state.word());
-    DEGREE "degree" Text |_, one| TableCell::text(one.confidence.word());
-    EVIDENCE "evidence" Text |all, one| words(all.elements.evidence(one.what).words());
-    LIFECYCLE "lifecycle" Text |_, one| text(one.lifecycle.as_deref());
-    N "n" I64 |_, one| count(one.count);
-    HZ "hz" F64 |_, one| float(one.hz);
-    BYTES "bytes" I64 |_, one| count(one.bytes);
-    MEDIAN "median_period_s" F64 |_, one| float(one.median);
-    GAP "max_gap_s" F64 |_, one| float(one.gap);
-    DROPS "drops" I64 |_, one| count(one.measures.drops);
-    JITTER "jitter_s" F64 |_, one| float(one.measures.jitter_s);
-    AGE "age_s" F64 |_, one| float(one.measures.age_s);
+    STATE "state" Text |_, one| TableCell::text(one.state.state.word());
+    DEGREE "degree" Text |_, one| TableCell::text(one.state.confidence.word());
+    EVIDENCE "evidence" Text |all, one| words(all.elements.evidence(one.state.what).words());
+    LIFECYCLE "lifecycle" Text |_, one| text(one.state.lifecycle.as_deref());
+    N "n" I64 |_, one| count(one.state.count);
+    HZ "hz" F64 |_, one| float(one.state.hz);
+    BYTES "bytes" I64 |_, one| count(one.state.bytes);
+    MEDIAN "median_period_s" F64 |_, one| float(one.state.median_period_s);
+    GAP "max_gap_s" F64 |_, one| float(one.state.max_gap_s);
+    DROPS "drops" I64 |_, one| count(one.state.measures.drops);
+    JITTER "jitter_s" F64 |_, one| float(one.state.measures.jitter_s);
+    AGE "age_s" F64 |_, one| float(one.state.measures.age_s);
     SKEW "skew" F64 |_, one| float(one.skew);
     MESSAGES_IN "messages_in" I64 |_, one| count(one.load.map(|load| load.messages_in));
     MESSAGES_OUT "messages_out" I64 |_, one| count(one.load.map(|load| load.messages_out));
@@ -125,19 +125,30 @@ element_columns! {
     BYTES_OUT "bytes_out" I64 |_, one| count(one.load.and_then(|load| load.bytes_out));
     TOPICS_IN "topics_in" I64 |_, one| count(one.load.map(|load| load.topics_in.into()));
     TOPICS_OUT "topics_out" I64 |_, one| count(one.load.map(|load| load.topics_out.into()));
-    FIRST "first_ns" Time |all, one| time(all.elements.life(one.what).0);
-    LAST "last_ns" Time |all, one| time(all.elements.life(one.what).1);
+    FIRST "first_ns" Time |all, one| time(all.elements.life(one.state.what).0);
+    LAST "last_ns" Time |all, one| time(all.elements.life(one.state.what).1);
+}
+
+fn elements(
+    all: &Mission,
+    is_kind: fn(&Element) -> bool,
+    has_runs: bool,
+    (columns, row): (&[Column<Seen>], RowTaker<'_>),
+) {
+    each(all, is_kind, has_runs, &mut |one| {
+        put(all, columns, one, row);
+    });
 }
 
 fn node_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Node> {
-    match one.what {
+    match one.state.what {
         Element::Node(id) => mission.elements.nodes.get(id),
         _ => None,
     }
 }
 
 fn topic_of<'a>(mission: &'a Mission, one: &Seen) -> Option<&'a Topic> {
-    match one.what {
+    match one.state.what {
         Element::Topic(id) => mission.elements.topics.get(id),
         _ => None,
     }

@@ -2,126 +2,56 @@
 //! not change.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Confidence;
 use crate::graph::diff::Change;
-use crate::graph::{self, EdgeState, Element, Measures, NodeLoad, State};
-use crate::mission::{Mission, Window};
+use crate::graph::{self, Element, ElementState, Id, NodeLoad};
+use crate::mission::Mission;
 
 /// An element in a window, or in a run of windows.
 pub(super) struct Seen {
-    pub(super) what: Element,
     /// The window, the first one of a run.
     pub(super) win: usize,
     pub(super) span: Span,
-    pub(super) state: State,
-    pub(super) confidence: Confidence,
-    pub(super) lifecycle: Option<Arc<str>>,
-    pub(super) count: Option<u64>,
-    pub(super) bytes: Option<u64>,
-    pub(super) hz: Option<f64>,
-    pub(super) median: Option<f64>,
-    pub(super) gap: Option<f64>,
-    pub(super) measures: Measures,
+    pub(super) state: ElementState,
     /// The skew of a topic over all windows.
     pub(super) skew: Option<f64>,
     pub(super) load: Option<NodeLoad>,
 }
 
-impl Seen {
-    fn new(what: Element, window: &Window, state: State, confidence: Confidence) -> Self {
-        Self {
-            what,
-            win: window.index,
-            span: window.span,
-            state,
-            confidence,
-            lifecycle: None,
-            count: None,
-            bytes: None,
-            hz: None,
-            median: None,
-            gap: None,
-            measures: Measures::default(),
-            skew: None,
-            load: None,
-        }
-    }
-
-    fn edge(what: Element, window: &Window, state: &EdgeState) -> Self {
-        Self {
-            count: state.count,
-            bytes: state.bytes,
-            hz: state.hz,
-            measures: state.measures,
-            ..Self::new(what, window, state.state, state.confidence)
-        }
-    }
-}
-
 /// A function that takes an element.
 pub(super) type SeenTaker<'a> = &'a mut dyn FnMut(&Seen);
 
-pub(super) fn nodes(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
+/// The elements of a kind in each window.
+pub(super) fn each(
+    mission: &Mission,
+    is_kind: fn(&Element) -> bool,
+    has_runs: bool,
+    take: SeenTaker<'_>,
+) {
     if has_runs {
-        return runs(mission, |what| matches!(what, Element::Node(_)), take);
-    }
-    for (window, graph) in mission.each() {
-        for (state, load) in graph.nodes.iter().zip(graph.loads(&mission.elements)) {
-            take(&Seen {
-                lifecycle: state.lifecycle.clone(),
-                hz: state.hz,
-                load: Some(load),
-                ..Seen::new(
-                    Element::Node(state.id),
-                    window,
-                    state.state,
-                    state.confidence,
-                )
-            });
-        }
-    }
-}
-
-pub(super) fn topics(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
-    if has_runs {
-        return runs(mission, |what| matches!(what, Element::Topic(_)), take);
+        return runs(mission, is_kind, take);
     }
     let skews = mission.skews();
     for (window, graph) in mission.each() {
-        for state in &graph.topics {
-            take(&Seen {
-                count: Some(state.count),
-                bytes: state.bytes,
-                hz: state.hz,
-                median: state.median_period_s,
-                gap: state.max_gap_s,
-                measures: state.measures,
-                skew: skews.get(state.id).copied().flatten(),
-                ..Seen::new(
-                    Element::Topic(state.id),
-                    window,
-                    state.state,
-                    state.confidence,
-                )
-            });
-        }
-    }
-}
-
-pub(super) fn edges(mission: &Mission, has_runs: bool, take: SeenTaker<'_>) {
-    if has_runs {
-        let is_edge = |what| matches!(what, Element::Publish(_) | Element::Subscribe(_));
-        return runs(mission, is_edge, take);
-    }
-    for (window, graph) in mission.each() {
-        for state in &graph.publishes {
-            take(&Seen::edge(Element::Publish(state.id), window, state));
-        }
-        for state in &graph.subscribes {
-            take(&Seen::edge(Element::Subscribe(state.id), window, state));
+        // Of nodes, which come first.
+        let has_loads = is_kind(&Element::Node(Id::of(0)));
+        let loads = has_loads.then(|| graph.loads(&mission.elements));
+        let mut loads = loads.into_iter().flatten();
+        for state in graph.states {
+            let load = loads.next();
+            if is_kind(&state.what) {
+                take(&Seen {
+                    win: window.index,
+                    span: window.span,
+                    skew: match state.what {
+                        Element::Topic(id) => skews.get(id).copied().flatten(),
+                        _ => None,
+                    },
+                    load,
+                    state,
+                });
+            }
         }
     }
 }
@@ -163,18 +93,18 @@ impl StateRun {
         let is_one = self.first == self.last || mission.step == mission.period;
         let count = self.row.count.filter(|_| is_one);
         Seen {
-            what,
             win: self.first,
             span,
-            state: self.row.state,
-            confidence: self.row.confidence,
-            lifecycle: mission.graphs.lifecycle_word(&self.row),
-            count,
-            bytes: self.row.bytes.filter(|_| count.is_some()),
-            hz: count.and_then(|count| graph::per_second(count, span)),
-            median: self.row.median.value(),
-            gap: self.row.gap.value(),
-            measures: self.row.measures(),
+            state: ElementState {
+                count,
+                bytes: self.row.bytes.filter(|_| count.is_some()),
+                hz: count.and_then(|count| graph::per_second(count, span)),
+                median_period_s: self.row.median.value(),
+                max_gap_s: self.row.gap.value(),
+                lifecycle: mission.graphs.lifecycle_word(&self.row),
+                measures: self.row.measures(),
+                ..ElementState::new(what, self.row.state, self.row.confidence)
+            },
             skew: None,
             load: None,
         }
@@ -186,9 +116,9 @@ fn add(a: Option<u64>, b: Option<u64>) -> Option<u64> {
 }
 
 /// The runs of all elements of a kind, in order.
-fn runs(mission: &Mission, is_kind: impl Fn(Element) -> bool, take: SeenTaker<'_>) {
+fn runs(mission: &Mission, is_kind: fn(&Element) -> bool, take: SeenTaker<'_>) {
     let turns = turns(mission);
-    for what in mission.elements.all().filter(|what| is_kind(*what)) {
+    for what in mission.elements.all().filter(is_kind) {
         let mut open: Option<StateRun> = None;
         for (at, row) in mission.graphs.rows(what) {
             let turns = turns.contains(&(what, at));

@@ -9,10 +9,7 @@ use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
-use crate::graph::{
-    Edge, EdgeId, EdgeState, Element, Elements, Graph, Node, NodeId, NodeState, Topic, TopicId,
-    TopicState,
-};
+use crate::graph::{Edge, Element, ElementState, Elements, Graph, Node, NodeId, State, Topic};
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
 
@@ -220,44 +217,26 @@ fn both<'a, K: Ord>(
 }
 
 fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
-    let node = |id: NodeId| elements.nodes[id].name.to_string();
-    let topic = |id: TopicId| elements.topics[id].name.to_string();
-    let edge = |id: EdgeId, known: Option<&(Confidence, Evidence)>| {
-        let confidence = known?.0;
-        Some(EdgeState {
-            id,
-            confidence,
-            ..EdgeState::default()
-        })
+    let state = |what: Element| {
+        let (node, topic) = elements.names(what);
+        let names = |a: Option<&str>, b: Option<&str>| Some((a?.to_owned(), b?.to_owned()));
+        let known = match what {
+            Element::Node(_) => seen.nodes.get(node?),
+            Element::Topic(_) => {
+                let topic = seen.topics.get(topic?)?;
+                return Some(ElementState {
+                    count: Some(topic.count),
+                    hz: topic.hz,
+                    ..ElementState::new(what, State::default(), Confidence::default())
+                });
+            }
+            Element::Publish(_) => seen.publishes.get(&names(node, topic)?),
+            Element::Subscribe(_) => seen.subscribes.get(&names(topic, node)?),
+        };
+        Some(ElementState::new(what, State::default(), known?.0))
     };
-    let nodes = elements.nodes.with_ids().filter_map(|(id, own)| {
-        let (confidence, _) = seen.nodes.get(own.name.as_str())?;
-        Some(NodeState {
-            id,
-            confidence: *confidence,
-            ..NodeState::default()
-        })
-    });
-    let topics = elements.topics.with_ids().filter_map(|(id, own)| {
-        let topic = seen.topics.get(own.name.as_str())?;
-        Some(TopicState {
-            id,
-            count: topic.count,
-            hz: topic.hz,
-            ..TopicState::default()
-        })
-    });
-    let publishes = elements.publishes.with_ids();
-    let publishes = publishes
-        .filter_map(|(id, e)| edge(id, seen.publishes.get(&(node(e.node), topic(e.topic)))));
-    let subscribes = elements.subscribes.with_ids();
-    let subscribes = subscribes
-        .filter_map(|(id, e)| edge(id, seen.subscribes.get(&(topic(e.topic), node(e.node)))));
     Graph {
-        nodes: nodes.collect(),
-        topics: topics.collect(),
-        publishes: publishes.collect(),
-        subscribes: subscribes.collect(),
+        states: elements.all().filter_map(state).collect(),
     }
 }
 

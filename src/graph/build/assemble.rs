@@ -9,14 +9,14 @@ use super::rates::{Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::error::Result;
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::evidence::Confidence;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::Name;
 use crate::graph::{
-    ById, Column, ColumnCursor, ColumnWriter, EdgeState, Element, Graphs, GraphsWriter, Measures,
-    NodeId, NodeState, Number, Row, State, TopicId, TopicState, per_second,
+    ById, Column, ColumnCursor, ColumnWriter, Element, Graphs, GraphsWriter, Measures, NodeId,
+    Number, Row, State, TopicId, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -130,7 +130,8 @@ impl GraphAssembly<'_> {
     }
 
     fn topic(&mut self, id: TopicId, sums: Option<&[Sums]>) {
-        let Some(record) = self.history.records.of(Element::Topic(id)) else {
+        let what = Element::Topic(id);
+        let Some(record) = self.history.records.of(what) else {
             return;
         };
         let mut list = sums.unwrap_or_default().iter().peekable();
@@ -140,30 +141,30 @@ impl GraphAssembly<'_> {
             if !self.sees(record, *window) {
                 continue;
             }
-            let count = sum.map_or(0, |sum| sum.count);
-            let state = TopicState {
-                id,
-                state: record.state(*window, sum.is_some()),
-                confidence: degree_in(record, self.history.elements.topics[id].first, *window),
-                count,
+            let state = Row::new(
+                record.state(*window, sum.is_some()),
+                self.confidence(what, record, *window),
+            );
+            states.push(at, state);
+            let row = Row {
+                count: Some(sum.map_or(0, |sum| sum.count)),
                 bytes: bytes(sum, sums.is_some()),
-                hz: per_second(count, *window),
-                median_period_s: sum.and_then(|sum| sum.median_period_s),
-                max_gap_s: sum.and_then(|sum| sum.max_gap_s),
-                measures: Measures {
+                median: Number::of(sum.and_then(|sum| sum.median_period_s)),
+                gap: Number::of(sum.and_then(|sum| sum.max_gap_s)),
+                ..state.with_measures(&Measures {
                     jitter_s: sum.and_then(|sum| sum.jitter_s),
-                    ..self.measures.of(Element::Topic(id), at)
-                },
+                    ..self.measures.of(what, at)
+                })
             };
-            states.push(at, Row::new(state.state, state.confidence));
-            self.graphs.topic(at, &state);
+            self.graphs.row(what, at, row);
         }
         self.topics.insert(id, states.finish());
     }
 
     fn nodes(&mut self) {
         for (name, id) in &self.history.node_ids {
-            let Some(record) = self.history.records.of(Element::Node(*id)) else {
+            let what = Element::Node(*id);
+            let Some(record) = self.history.records.of(what) else {
                 continue;
             };
             let sent = self.sent.get(name);
@@ -171,14 +172,19 @@ impl GraphAssembly<'_> {
                 if !self.sees(record, *window) {
                     continue;
                 }
-                let state = NodeState {
-                    id: *id,
-                    state: record.state(*window, false),
-                    confidence: degree_in(record, self.history.elements.nodes[*id].first, *window),
-                    hz: sent.and_then(|of| per_second(of[at], *window)),
-                    lifecycle: self.findings.values.lifecycle(*name, *window),
+                let lifecycle = self.findings.values.lifecycle(*name, *window);
+                let row = Row {
+                    // A node's count only stands for its rate.
+                    count: sent
+                        .filter(|_| per_second(0, *window).is_some())
+                        .map(|of| of[at]),
+                    lifecycle: lifecycle.map_or(0, |word| self.graphs.lifecycle(&word)),
+                    ..Row::new(
+                        record.state(*window, false),
+                        self.confidence(what, record, *window),
+                    )
                 };
-                self.graphs.node(at, &state);
+                self.graphs.row(what, at, row);
             }
         }
     }
@@ -188,7 +194,8 @@ impl GraphAssembly<'_> {
         let nodes: ById<NodeId, Name> = self.history.node_ids.keys().copied().collect();
         let topics: ById<TopicId, Name> = self.history.topic_ids.keys().copied().collect();
         for (id, edge) in self.history.elements.publishes.with_ids() {
-            let Some(record) = self.history.records.of(Element::Publish(id)) else {
+            let what = Element::Publish(id);
+            let Some(record) = self.history.records.of(what) else {
                 continue;
             };
             let ends = nodes.get(edge.node).zip(topics.get(edge.topic));
@@ -201,23 +208,20 @@ impl GraphAssembly<'_> {
                 if !self.sees(record, *window) {
                     continue;
                 }
-                let what = Element::Publish(id);
                 let (delivered, bytes) = self.measures.counted(what, at);
                 let measures = self.measures.of(what, at);
                 let jitter = own.and_then(|row| row.jitter.value());
-                let state = EdgeState {
-                    id,
-                    state: record.state(*window, count.is_some_and(|n| n > 0)),
-                    confidence: degree_in(record, edge.first, *window),
+                let state = record.state(*window, count.is_some_and(|n| n > 0));
+                let row = Row {
                     count: count.or(delivered),
-                    hz: count.or(delivered).and_then(|n| per_second(n, *window)),
                     bytes: own.and_then(|row| row.bytes).or(bytes),
-                    measures: Measures {
-                        jitter_s: jitter.or(measures.jitter_s),
-                        ..measures
-                    },
+                    ..Row::new(state, self.confidence(what, record, *window))
                 };
-                self.graphs.edge(what, at, &state);
+                let measures = Measures {
+                    jitter_s: jitter.or(measures.jitter_s),
+                    ..measures
+                };
+                self.graphs.row(what, at, row.with_measures(&measures));
             }
         }
     }
@@ -225,7 +229,8 @@ impl GraphAssembly<'_> {
     /// Adds the subscriptions: each has the state of its topic.
     fn subscribes(&mut self) {
         for (id, edge) in self.history.elements.subscribes.with_ids() {
-            let Some(record) = self.history.records.of(Element::Subscribe(id)) else {
+            let what = Element::Subscribe(id);
+            let Some(record) = self.history.records.of(what) else {
                 continue;
             };
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
@@ -239,19 +244,25 @@ impl GraphAssembly<'_> {
                     Some(row) => row.state,
                     None => State::Silent,
                 };
-                let what = Element::Subscribe(id);
                 let (count, bytes) = self.measures.counted(what, at);
-                let state = EdgeState {
-                    id,
-                    state,
-                    confidence: degree_in(record, edge.first, *window),
+                let row = Row {
                     count,
-                    hz: count.and_then(|n| per_second(n, *window)),
                     bytes,
-                    measures: self.measures.of(what, at),
+                    ..Row::new(state, self.confidence(what, record, *window))
                 };
-                self.graphs.edge(what, at, &state);
+                let measures = self.measures.of(what, at);
+                self.graphs.row(what, at, row.with_measures(&measures));
             }
+        }
+    }
+
+    /// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
+    fn confidence(&self, what: Element, record: &Record, window: Span) -> Confidence {
+        let (first, _) = self.history.elements.life(what);
+        if first.is_some_and(|first| window.end <= first) {
+            record.confidence.max(Confidence::Inferred)
+        } else {
+            record.confidence
         }
     }
 
@@ -278,15 +289,6 @@ fn counted(count: u64, is_sole: bool, sum: &Sums, of: impl Fn(&Vec<u64>) -> u64)
         bytes: sum.stream_bytes.as_ref().map(of),
         jitter: Number::of(sum.jitter_s.filter(|_| is_sole)),
         ..Row::new(State::Active, Confidence::Measured)
-    }
-}
-
-/// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
-fn degree_in(record: &Record, first: Option<Stamp>, window: Span) -> Confidence {
-    if first.is_some_and(|first| window.end <= first) {
-        record.confidence.max(Confidence::Inferred)
-    } else {
-        record.confidence
     }
 }
 

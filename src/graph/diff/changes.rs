@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Change, Delta, Diff, ValueKind, diff};
+use super::{Change, Diff, ValueKind, diff};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{ById, EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
+use crate::graph::{ById, Element, ElementState, Elements, Graph, NodeId, State, TopicId};
 
 /// The default share by which a rate must change to count as changed.
 pub const RATE_CHANGE: f64 = 0.25;
@@ -72,14 +72,16 @@ impl<'a> Changes<'a> {
     }
 
     fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        changes.extend(diff.added().map(|what| {
+        changes.extend(diff.added.iter().map(|state| {
+            let what = state.what;
             let time = self.elements.life(what).0.filter(|t| span.contains(*t));
             Change::Added { what, time }
         }));
     }
 
     fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        changes.extend(diff.removed().map(|what| {
+        changes.extend(diff.removed.iter().map(|what| {
+            let what = *what;
             let time = self.elements.life(what).1.filter(|t| *t < span.end);
             Change::Removed { what, time }
         }));
@@ -87,20 +89,23 @@ impl<'a> Changes<'a> {
 
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
         let mut steady = BTreeSet::new();
-        for (old, new) in &diff.topics.changed {
-            let topic = Element::Topic(new.id);
-            let secs = (self.present(topic, spans.0), self.present(topic, spans.1));
-            if is_steady(old, secs.0) && is_steady(new, secs.1) {
-                steady.insert(new.id);
-                changes.extend(self.rate(topic, (old.hz, new.hz), spans));
-            }
-        }
         let crowded = self.crowded(graph);
-        for (old, new) in &diff.publishes.changed {
-            let topic = self.elements.publishes[new.id].topic;
-            // With one publisher the topic's own change is sufficient.
-            if crowded.contains(&topic) && steady.contains(&topic) {
-                changes.extend(self.rate(Element::Publish(new.id), (old.hz, new.hz), spans));
+        for (old, new) in &diff.changed {
+            let is_rated = match new.what {
+                Element::Topic(id) => {
+                    let secs = [spans.0, spans.1].map(|span| self.present(new.what, span));
+                    let is_steady = is_steady(old, secs[0]) && is_steady(new, secs[1]);
+                    is_steady && steady.insert(id)
+                }
+                Element::Publish(id) => {
+                    let topic = self.elements.publishes[id].topic;
+                    // With one publisher the topic's own change is sufficient.
+                    crowded.contains(&topic) && steady.contains(&topic)
+                }
+                Element::Node(_) | Element::Subscribe(_) => false,
+            };
+            if is_rated {
+                changes.extend(self.rate(new.what, (old.hz, new.hz), spans));
             }
         }
     }
@@ -142,26 +147,21 @@ impl<'a> Changes<'a> {
     /// Topics with more than one publisher in this graph.
     fn crowded(&self, graph: &Graph) -> BTreeSet<TopicId> {
         let mut seen = BTreeSet::new();
-        let topics = graph
-            .publishes
-            .iter()
-            .map(|s| self.elements.publishes[s.id].topic);
+        let topics = graph.publishes();
+        let topics = topics.map(|(id, _)| self.elements.publishes[id].topic);
         topics.filter(|topic| !seen.insert(*topic)).collect()
     }
 
     /// Adds hand-overs: a topic is taken over if none of the nodes that publish it now were the last to
     /// publish it.
     fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
-        let there = |graph: &Graph, topic| {
-            graph
-                .topics
-                .binary_search_by_key(&topic, |t: &TopicState| t.id)
-                .is_ok()
-        };
         for (topic, to) in self.sending(after) {
             let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
             let other = !from.is_empty() && from.is_disjoint(&to);
-            if other && there(before, topic) && !self.elements.topics[topic].is_shared() {
+            if other
+                && before.get(Element::Topic(topic)).is_some()
+                && !self.elements.topics[topic].is_shared()
+            {
                 let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
                 changes.push(Change::HandedOver { topic, from, to });
             }
@@ -171,12 +171,8 @@ impl<'a> Changes<'a> {
     /// The nodes that sent messages on each topic in a window.
     fn sending(&self, graph: &Graph) -> BTreeMap<TopicId, BTreeSet<NodeId>> {
         let mut sending: BTreeMap<TopicId, BTreeSet<NodeId>> = BTreeMap::new();
-        for state in graph
-            .publishes
-            .iter()
-            .filter(|s: &&EdgeState| s.count.unwrap_or(0) > 0)
-        {
-            let edge = &self.elements.publishes[state.id];
+        for (id, _) in graph.publishes().filter(|(_, s)| s.messages() > 0) {
+            let edge = &self.elements.publishes[id];
             sending.entry(edge.topic).or_default().insert(edge.node);
         }
         sending
@@ -202,10 +198,10 @@ fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
 
 /// Whether a topic has a steady rate in a window of which it existed for `secs` seconds: not latched, and in
 /// even steps all the time, as far as known.
-fn is_steady(topic: &TopicState, secs: f64) -> bool {
+fn is_steady(topic: &ElementState, secs: f64) -> bool {
     let even = match (topic.median_period_s, topic.max_gap_s) {
         (Some(median), Some(gap)) => {
-            gap <= UNSTEADY * median && median * topic.count as f64 >= COVERED * secs
+            gap <= UNSTEADY * median && median * topic.messages() as f64 >= COVERED * secs
         }
         _ => true,
     };
@@ -229,15 +225,15 @@ fn sent(elements: &Elements) -> ById<TopicId, (Option<Stamp>, Option<Stamp>)> {
 }
 
 fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
-    let Delta { changed, .. } = &diff.nodes;
-    for (old, new) in changed
+    for (old, new) in diff
+        .changed
         .iter()
         .filter(|(old, new)| old.lifecycle != new.lifecycle)
     {
         let word = |state: &Option<Arc<str>>| state.clone().unwrap_or_default();
         changes.push(Change::Value {
             kind: ValueKind::Lifecycle,
-            what: Element::Node(new.id),
+            what: new.what,
             from: word(&old.lifecycle),
             to: word(&new.lifecycle),
         });

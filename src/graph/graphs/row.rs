@@ -5,9 +5,7 @@ use std::sync::Arc;
 use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::Confidence;
-use crate::graph::{
-    EdgeId, EdgeState, Measures, NodeId, NodeState, State, TopicId, TopicState, per_second,
-};
+use crate::graph::{Element, ElementState, Measures, State, per_second};
 
 /// A number, as an integer where possible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,7 +74,7 @@ impl Row {
         }
     }
 
-    fn with_measures(self, measures: &Measures) -> Self {
+    pub(crate) fn with_measures(self, measures: &Measures) -> Self {
         Self {
             drops: measures.drops,
             jitter: Number::of(measures.jitter_s),
@@ -94,14 +92,6 @@ impl Row {
         }
     }
 
-    fn with_rate(self, hz: Option<f64>, span: Span) -> Self {
-        let follows = self.hz(span).map(f64::to_bits) == hz.map(f64::to_bits);
-        Self {
-            rate: (!follows).then(|| Number::of(hz)),
-            ..self
-        }
-    }
-
     /// Messages per second in a window of this length.
     pub(crate) fn hz(&self, span: Span) -> Option<f64> {
         match self.rate {
@@ -110,73 +100,47 @@ impl Row {
         }
     }
 
-    pub(super) fn of_node(state: &NodeState, span: Span, lifecycle: u32) -> Self {
-        let count = state
-            .hz
-            .map(|hz| libm::round(hz * span.nanos() as f64 / 1e9));
-        let count = count.filter(|n| (0.0..EXACT).contains(n)).map(cast::to_u64);
+    /// The row of a state in the window `span`; `lifecycle` is the number of its lifecycle state.
+    pub(super) fn of(state: &ElementState, span: Span, lifecycle: u32) -> Self {
+        let sent = || {
+            let count = libm::round(state.hz? * span.nanos() as f64 / 1e9);
+            let is_exact = (0.0..EXACT).contains(&count);
+            is_exact.then(|| cast::to_u64(count))
+        };
         let row = Self {
             lifecycle,
-            count,
-            ..Self::new(state.state, state.confidence)
-        };
-        row.with_rate(state.hz, span)
-    }
-
-    pub(super) fn of_topic(state: &TopicState, span: Span) -> Self {
-        let row = Self {
-            count: Some(state.count),
+            count: match state.what {
+                Element::Node(_) => sent(),
+                _ => state.count,
+            },
             bytes: state.bytes,
             median: Number::of(state.median_period_s),
             gap: Number::of(state.max_gap_s),
-            ..Self::new(state.state, state.confidence)
+            ..Self::new(state.state, state.confidence).with_measures(&state.measures)
         };
-        row.with_measures(&state.measures).with_rate(state.hz, span)
-    }
-
-    pub(super) fn of_edge(state: &EdgeState, span: Span) -> Self {
-        let row = Self {
-            count: state.count,
-            bytes: state.bytes,
-            ..Self::new(state.state, state.confidence)
-        };
-        row.with_measures(&state.measures).with_rate(state.hz, span)
-    }
-
-    pub(super) fn node(&self, id: NodeId, span: Span, lifecycles: &[Arc<str>]) -> NodeState {
-        let lifecycle = (self.lifecycle as usize).checked_sub(1);
-        NodeState {
-            id,
-            state: self.state,
-            confidence: self.confidence,
-            hz: self.hz(span),
-            lifecycle: lifecycle.and_then(|at| lifecycles.get(at)).map(Arc::clone),
+        let follows = row.hz(span).map(f64::to_bits) == state.hz.map(f64::to_bits);
+        Self {
+            rate: (!follows).then(|| Number::of(state.hz)),
+            ..row
         }
     }
 
-    pub(super) fn topic(&self, id: TopicId, span: Span) -> TopicState {
-        TopicState {
-            id,
-            state: self.state,
-            confidence: self.confidence,
-            count: self.count.unwrap_or(0),
+    /// The state of an element in the window `span`.
+    pub(super) fn state(&self, what: Element, span: Span, lifecycles: &[Arc<str>]) -> ElementState {
+        let lifecycle = (self.lifecycle as usize).checked_sub(1);
+        ElementState {
+            count: match what {
+                Element::Node(_) => None,
+                Element::Topic(_) => Some(self.count.unwrap_or(0)),
+                _ => self.count,
+            },
             bytes: self.bytes,
             hz: self.hz(span),
             median_period_s: self.median.value(),
             max_gap_s: self.gap.value(),
+            lifecycle: lifecycle.and_then(|at| lifecycles.get(at)).map(Arc::clone),
             measures: self.measures(),
-        }
-    }
-
-    pub(super) fn edge(&self, id: EdgeId, span: Span) -> EdgeState {
-        EdgeState {
-            id,
-            state: self.state,
-            confidence: self.confidence,
-            count: self.count,
-            hz: self.hz(span),
-            bytes: self.bytes,
-            measures: self.measures(),
+            ..ElementState::new(what, self.state, self.confidence)
         }
     }
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::base::time::Stamp;
 use crate::evidence::Confidence;
-use crate::graph::{EdgeId, Measures, NodeId, State, TopicId};
+use crate::graph::{ElementState, Measures, NodeId, State, TopicId};
 
 fn number() -> impl Strategy<Value = Option<f64>> {
     prop_oneof![
@@ -40,86 +40,56 @@ fn measures() -> impl Strategy<Value = Measures> {
     })
 }
 
-fn topic() -> impl Strategy<Value = TopicState> {
-    (
-        look(),
-        count(),
-        count(),
-        number(),
-        number(),
-        number(),
-        measures(),
-    )
-        .prop_map(
-            |((state, confidence), count, bytes, hz, median_period_s, max_gap_s, measures)| {
-                TopicState {
-                    id: TopicId(0),
-                    state,
-                    confidence,
-                    count: count.unwrap_or(0),
-                    bytes,
-                    hz,
-                    median_period_s,
-                    max_gap_s,
-                    measures,
-                }
-            },
-        )
-}
-
-fn node() -> impl Strategy<Value = NodeState> {
+/// A state of some element of a kind, with the numbers that this kind has.
+fn state(kind: fn(usize) -> Element) -> impl Strategy<Value = ElementState> {
     let lifecycle = prop_oneof![
         Just(None),
         Just(Some(Arc::from("active"))),
         Just(Some(Arc::from("x")))
     ];
-    (look(), number(), lifecycle).prop_map(|((state, confidence), hz, lifecycle)| NodeState {
-        id: NodeId(0),
-        state,
-        confidence,
-        hz,
-        lifecycle,
+    let numbers = (count(), count(), number(), number(), number(), measures());
+    (look(), numbers, lifecycle).prop_map(move |((state, confidence), numbers, lifecycle)| {
+        let (count, bytes, hz, median_period_s, max_gap_s, measures) = numbers;
+        let all = ElementState {
+            hz,
+            ..ElementState::new(kind(0), state, confidence)
+        };
+        match all.what {
+            Element::Node(_) => ElementState { lifecycle, ..all },
+            Element::Topic(_) => ElementState {
+                count: Some(count.unwrap_or(0)),
+                bytes,
+                median_period_s,
+                max_gap_s,
+                measures,
+                ..all
+            },
+            _ => ElementState {
+                count,
+                bytes,
+                measures,
+                ..all
+            },
+        }
     })
 }
 
-fn edge() -> impl Strategy<Value = EdgeState> {
-    (look(), count(), number(), count(), measures()).prop_map(
-        |((state, confidence), count, hz, bytes, measures)| EdgeState {
-            id: EdgeId(0),
-            state,
-            confidence,
-            count,
-            hz,
-            bytes,
-            measures,
-        },
-    )
-}
-
-/// Some of three elements, by id.
-fn some<T: std::fmt::Debug + Clone>(
-    one: impl Strategy<Value = T> + 'static,
-    number: impl Fn(&mut T, u32) + Clone + 'static,
-) -> impl Strategy<Value = Vec<T>> {
-    proptest::collection::vec(proptest::option::of(one), 3).prop_map(move |list| {
-        let there = (0..).zip(list).filter_map(|(id, state)| Some((id, state?)));
-        let with_id = |(id, mut state): (u32, T)| {
-            number(&mut state, id);
-            state
-        };
-        there.map(with_id).collect()
+/// The states of some of three elements of a kind.
+fn some(kind: fn(usize) -> Element) -> impl Strategy<Value = Vec<ElementState>> {
+    let one = proptest::option::of(state(kind));
+    proptest::collection::vec(one, 3).prop_map(move |list| {
+        let there = (0..).zip(list).filter_map(|(id, state)| {
+            let what = kind(id);
+            Some(ElementState { what, ..state? })
+        });
+        there.collect()
     })
 }
 
 pub(crate) fn graph() -> impl Strategy<Value = Graph> {
-    let nodes = some(node(), |state, id| state.id = NodeId(id));
-    let topics = some(topic(), |state, id| state.id = TopicId(id));
-    let edges = || some(edge(), |state: &mut EdgeState, id| state.id = EdgeId(id));
-    (nodes, topics, edges(), edges()).prop_map(|(nodes, topics, publishes, subscribes)| Graph {
-        nodes,
-        topics,
-        publishes,
-        subscribes,
+    let kinds = Element::KINDS.map(some);
+    kinds.prop_map(|states| Graph {
+        states: states.concat(),
     })
 }
 
@@ -148,14 +118,14 @@ proptest! {
             walk.next(|what, row| {
                 now.insert(what, row);
             });
-            let topics = now.iter().filter_map(|(what, row)| match (what, row) {
-                (Element::Topic(id), Some(row)) => Some(row.topic(*id, *span)),
-                _ => None,
+            let states = now.iter().filter_map(|(what, row): (&Element, &Option<Row>)| {
+                row.as_ref().map(|row| row.state(*what, *span, &all.lifecycles))
             });
-            prop_assert_eq!(topics.collect::<Vec<_>>(), put.topics.clone());
+            prop_assert_eq!(states.collect::<Vec<_>>(), put.states.clone());
         }
-        let of_topic: Vec<_> = all.rows(Element::Topic(TopicId(1))).map(|(at, row)| row.topic(TopicId(1), graphs[at].0)).collect();
-        let put = graphs.iter().flat_map(|(_, g)| g.topics.iter().filter(|t| t.id == TopicId(1)));
+        let topic = Element::Topic(TopicId(1));
+        let of_topic: Vec<_> = all.rows(topic).map(|(at, row)| row.state(topic, graphs[at].0, &[])).collect();
+        let put = graphs.iter().filter_map(|(_, g)| g.get(topic));
         prop_assert_eq!(of_topic, put.cloned().collect::<Vec<_>>());
     }
 }
@@ -163,20 +133,19 @@ proptest! {
 #[test]
 fn constant_states_take_no_memory() {
     let second = |n: i64| Span::new(Stamp(n * 1_000_000_000), Stamp((n + 1) * 1_000_000_000));
-    let topic = TopicState {
-        id: TopicId(0),
-        state: State::Active,
-        confidence: Confidence::Measured,
-        count: 10,
-        bytes: None,
+    let topic = ElementState {
+        count: Some(10),
         hz: Some(10.0),
         median_period_s: Some(0.1),
         max_gap_s: Some(0.1),
-        measures: Measures::default(),
+        ..ElementState::new(
+            Element::Topic(TopicId(0)),
+            State::Active,
+            Confidence::Measured,
+        )
     };
     let graph = Graph {
-        topics: vec![topic],
-        ..Graph::default()
+        states: vec![topic],
     };
     let all: Graphs = (0..100_000).map(|n| (second(n), graph.clone())).collect();
     assert!(all.columns.0[1][0].len() < 32, "{:?}", all.columns);
@@ -184,16 +153,9 @@ fn constant_states_take_no_memory() {
 
 #[test]
 fn memory_is_proportional_to_the_states_of_elements() {
-    let node = |id| NodeState {
-        id,
-        state: State::Active,
-        confidence: Confidence::Stated,
-        hz: None,
-        lifecycle: None,
-    };
+    let node = |id| ElementState::new(Element::Node(id), State::Active, Confidence::Stated);
     let graph = Graph {
-        nodes: (0..1000).map(NodeId).map(node).collect(),
-        ..Graph::default()
+        states: (0..1000).map(NodeId).map(node).collect(),
     };
     let span = Span::new(Stamp(0), Stamp(1));
     let all: Graphs = [(span, graph)].into_iter().collect();

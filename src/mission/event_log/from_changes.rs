@@ -203,7 +203,7 @@ impl<'a> WindowTurns<'a> {
 
 /// The event for a change: its element, its time if known, and its values.
 pub(crate) fn described(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
-    let is_node = |what: &Element| matches!(what, Element::Node(_));
+    let is_node = |what: &Element| what.is_node();
     match change {
         Change::Added { what, time } if is_node(what) => {
             (Kind::Started, *what, *time, Detail::None)

@@ -135,7 +135,7 @@ fn begins_steadily(mission: &Mission, what: Element) -> bool {
 fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let elements = &mission.elements;
     let own = elements.ends(event.what);
-    let is_node = matches!(event.what, Element::Node(_));
+    let is_node = event.what.is_node();
     let (mut alike, mut silent) = (Vec::new(), Vec::new());
     for part in parts
         .iter()

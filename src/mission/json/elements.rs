@@ -11,8 +11,7 @@ use super::sending::SendingJson;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
-    Edge, EdgeId, EdgeState, Elements, Measures, Node, NodeId, NodeState, State, Topic, TopicId,
-    TopicState,
+    Edge, Element, ElementState, Elements, Measures, Node, NodeId, State, Topic, TopicId,
 };
 
 /// A text, borrowed when written.
@@ -148,7 +147,7 @@ pub(crate) struct EdgeNumbers {
 
 impl<'a> NodeJson<'a> {
     /// A node in the window in which it has this state; in the whole mission without one.
-    pub(crate) fn new(node: &'a Node, seen: Option<&'a NodeState>) -> Self {
+    pub(crate) fn new(node: &'a Node, seen: Option<&'a ElementState>) -> Self {
         Self {
             name: node.name.as_str().into(),
             role: Some((&*node.role).into()),
@@ -164,22 +163,24 @@ impl<'a> NodeJson<'a> {
         }
     }
 
-    pub(crate) fn state(&self, id: NodeId) -> NodeState {
+    pub(crate) fn state(&self, id: NodeId) -> ElementState {
         let numbers = self.numbers.as_ref();
         let lifecycle = numbers.and_then(|n| n.lifecycle.as_deref());
-        NodeState {
-            id,
-            state: state_of(self.state.as_deref()),
-            confidence: confidence_of(self.degree.as_deref()),
+        ElementState {
             hz: numbers.and_then(|n| n.hz),
             lifecycle: lifecycle.map(Into::into),
+            ..state(
+                Element::Node(id),
+                self.state.as_deref(),
+                self.degree.as_deref(),
+            )
         }
     }
 }
 
 impl<'a> TopicJson<'a> {
     /// A topic, as a node.
-    pub(crate) fn new(topic: &'a Topic, seen: Option<&TopicState>) -> Self {
+    pub(crate) fn new(topic: &'a Topic, seen: Option<&ElementState>) -> Self {
         Self {
             name: topic.name.as_str().into(),
             types: topic.types.iter().map(|t| Text::from(&**t)).collect(),
@@ -187,7 +188,7 @@ impl<'a> TopicJson<'a> {
             degree: seen.map(|s| s.confidence.word().into()),
             evidence: words(topic.evidence),
             numbers: seen.map(|s| TopicNumbers {
-                count: Some(s.count),
+                count: Some(s.messages()),
                 bytes: s.bytes,
                 hz: s.hz,
                 median_period_s: s.median_period_s,
@@ -203,26 +204,28 @@ impl<'a> TopicJson<'a> {
         }
     }
 
-    pub(crate) fn state(&self, id: TopicId) -> TopicState {
+    pub(crate) fn state(&self, id: TopicId) -> ElementState {
         let none = TopicNumbers::default();
         let numbers = self.numbers.as_ref().unwrap_or(&none);
-        TopicState {
-            id,
-            state: state_of(self.state.as_deref()),
-            confidence: confidence_of(self.degree.as_deref()),
-            count: numbers.count.unwrap_or(0),
+        ElementState {
+            count: Some(numbers.count.unwrap_or(0)),
             bytes: numbers.bytes,
             hz: numbers.hz,
             median_period_s: numbers.median_period_s,
             max_gap_s: numbers.max_gap_s,
             measures: numbers.measures,
+            ..state(
+                Element::Topic(id),
+                self.state.as_deref(),
+                self.degree.as_deref(),
+            )
         }
     }
 }
 
 impl<'a> PublishJson<'a> {
     /// A publication or subscription, as a node.
-    pub(crate) fn new(edge: &'a Edge, elements: &'a Elements, seen: Option<&EdgeState>) -> Self {
+    pub(crate) fn new(edge: &'a Edge, elements: &'a Elements, seen: Option<&ElementState>) -> Self {
         Self {
             node: elements.nodes[edge.node].name.as_str().into(),
             topic: elements.topics[edge.topic].name.as_str().into(),
@@ -251,18 +254,21 @@ impl<'a> From<PublishJson<'a>> for SubscribeJson<'a> {
 }
 
 impl EdgeJson<'_> {
-    pub(crate) fn state(&self, id: EdgeId) -> EdgeState {
+    pub(crate) fn state(&self, what: Element) -> ElementState {
         let none = EdgeNumbers::default();
         let numbers = self.numbers.as_ref().unwrap_or(&none);
-        EdgeState {
-            id,
-            state: state_of(self.state.as_deref()),
-            confidence: confidence_of(self.degree.as_deref()),
+        ElementState {
             count: numbers.count,
             hz: numbers.hz,
             bytes: numbers.bytes,
             measures: numbers.measures,
+            ..state(what, self.state.as_deref(), self.degree.as_deref())
         }
+    }
+
+    /// The state of an end, which is at least as certain as the edge.
+    pub(crate) fn end(&self, what: Element) -> ElementState {
+        state(what, self.state.as_deref(), self.degree.as_deref())
     }
 }
 
@@ -299,6 +305,11 @@ pub(crate) fn pairs(spans: &[Span]) -> Vec<[i64; 2]> {
 pub(crate) fn spans(pairs: &[[i64; 2]]) -> Vec<Span> {
     let span = |[start, end]: &[i64; 2]| Span::new(Stamp(*start), Stamp(*end.max(start)));
     pairs.iter().map(span).collect()
+}
+
+/// The state of an element by these words, without numbers.
+fn state(what: Element, state: Option<&str>, degree: Option<&str>) -> ElementState {
+    ElementState::new(what, state_of(state), confidence_of(degree))
 }
 
 /// The state of this name; active if unknown or missing.

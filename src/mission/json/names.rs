@@ -6,9 +6,7 @@ use std::sync::Arc;
 use super::elements::{EdgeJson, LifeJson, NodeJson, PublishJson, TopicJson, evidence, spans};
 use super::raw::RawWindow;
 use crate::base::time::{Span, Stamp};
-use crate::graph::{
-    Edge, EdgeId, EdgeState, Elements, Graph, Node, NodeId, NodeState, Topic, TopicId, TopicState,
-};
+use crate::graph::{Edge, Element, ElementState, Elements, Graph, Node, Topic};
 
 /// Names with their facts over all windows.
 #[derive(Default)]
@@ -134,68 +132,39 @@ fn widen(
 
 /// The graph of a window; an element listed twice counts once, and the ends of an edge are always included.
 pub(crate) fn graph(window: &RawWindow, all: &Elements) -> Graph {
-    let mut graph = GraphParts::default();
-    for raw in &window.publishes {
-        let (node, topic) = graph.ends(all, &raw.node, &raw.topic, &raw.edge);
-        if let Some(id) = all.publication(node, topic) {
-            graph.publishes.insert(id, raw.edge.state(id));
-        }
-    }
-    for raw in &window.subscribes {
-        let (node, topic) = graph.ends(all, &raw.node, &raw.topic, &raw.edge);
-        if let Some(id) = all.subscription(topic, node) {
-            graph.subscribes.insert(id, raw.edge.state(id));
+    let mut states = BTreeMap::new();
+    let mut add = |state: ElementState| _ = states.insert(state.what, state);
+    let publishes = window.publishes.iter();
+    let publishes = publishes.map(|raw| (&raw.node, &raw.topic, &raw.edge, true));
+    let subscribes = window.subscribes.iter();
+    let subscribes = subscribes.map(|raw| (&raw.node, &raw.topic, &raw.edge, false));
+    for (node, topic, edge, publishes) in publishes.chain(subscribes) {
+        let ends = (
+            all.node(node).unwrap_or_default(),
+            all.topic(topic).unwrap_or_default(),
+        );
+        add(edge.end(Element::Node(ends.0)));
+        let topic = edge.end(Element::Topic(ends.1));
+        add(ElementState {
+            count: Some(0),
+            ..topic
+        });
+        let what = if publishes {
+            all.published(ends)
+        } else {
+            all.subscribed(ends)
+        };
+        if let Some(what) = what {
+            add(edge.state(what));
         }
     }
     for raw in &window.nodes {
-        let id = all.node(&raw.name).unwrap_or_default();
-        graph.nodes.insert(id, raw.state(id));
+        add(raw.state(all.node(&raw.name).unwrap_or_default()));
     }
     for raw in &window.topics {
-        let id = all.topic(&raw.name).unwrap_or_default();
-        graph.topics.insert(id, raw.state(id));
+        add(raw.state(all.topic(&raw.name).unwrap_or_default()));
     }
     Graph {
-        nodes: graph.nodes.into_values().collect(),
-        topics: graph.topics.into_values().collect(),
-        publishes: graph.publishes.into_values().collect(),
-        subscribes: graph.subscribes.into_values().collect(),
-    }
-}
-
-/// The states of a window's elements, by id.
-#[derive(Default)]
-struct GraphParts {
-    nodes: BTreeMap<NodeId, NodeState>,
-    topics: BTreeMap<TopicId, TopicState>,
-    publishes: BTreeMap<EdgeId, EdgeState>,
-    subscribes: BTreeMap<EdgeId, EdgeState>,
-}
-
-impl GraphParts {
-    /// Adds the ends of an edge in the edge's state, and returns their indices.
-    fn ends(
-        &mut self,
-        all: &Elements,
-        node: &str,
-        topic: &str,
-        edge: &EdgeJson<'_>,
-    ) -> (NodeId, TopicId) {
-        let node = all.node(node).unwrap_or_default();
-        let topic = all.topic(topic).unwrap_or_default();
-        let (state, degree) = (edge.state.clone(), edge.degree.clone());
-        let end = NodeJson {
-            state: state.clone(),
-            degree: degree.clone(),
-            ..NodeJson::default()
-        };
-        self.nodes.insert(node, end.state(node));
-        let end = TopicJson {
-            state,
-            degree,
-            ..TopicJson::default()
-        };
-        self.topics.insert(topic, end.state(topic));
-        (node, topic)
+        states: states.into_values().collect(),
     }
 }

@@ -244,9 +244,12 @@ mod tests {
             .map(|n| n.name.as_str())
             .collect();
         assert_eq!(names, ["/a", "/b"]);
-        assert_eq!(mission.graphs.get(0).unwrap().nodes[0].state, State::Silent);
         assert_eq!(
-            mission.graphs.get(0).unwrap().topics.len(),
+            mission.graphs.get(0).unwrap().states[0].state,
+            State::Silent
+        );
+        assert_eq!(
+            mission.graphs.get(0).unwrap().topics().count(),
             1,
             "an edge brings its ends"
         );

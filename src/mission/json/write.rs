@@ -13,7 +13,7 @@ use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, Topi
 use super::runs::JsonColumns;
 use super::sending::{SendingJson, senders};
 use crate::bag::Report;
-use crate::graph::{ById, Edge, EdgeId, EdgeState, Element, Elements, Graph};
+use crate::graph::{Element, Elements, Graph};
 use crate::mission::{Mission, Places, Window};
 
 /// The schema that is written and read.
@@ -183,24 +183,25 @@ struct WindowOf<'a> {
     elements: &'a Elements,
 }
 
-impl<'a> Serialize for WindowOf<'a> {
+impl Serialize for WindowOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (window, all) = (self.window, self.elements);
         let mut map = serializer.serialize_map(None)?;
         head(window, &mut map)?;
         if let Some(graph) = &self.graph {
-            let nodes = graph.nodes.iter();
-            let nodes = nodes.map(|s| NodeJson::new(&all.nodes[s.id], Some(s)));
+            let nodes = graph.nodes();
+            let nodes = nodes.map(|(id, s)| NodeJson::new(&all.nodes[id], Some(s)));
             map.serialize_entry("nodes", &List(nodes))?;
-            let topics = graph.topics.iter();
-            let topics = topics.map(|s| TopicJson::new(&all.topics[s.id], Some(s)));
+            let topics = graph.topics();
+            let topics = topics.map(|(id, s)| TopicJson::new(&all.topics[id], Some(s)));
             map.serialize_entry("topics", &List(topics))?;
-            let edge = |edges: &'a ById<EdgeId, Edge>| {
-                move |s: &EdgeState| PublishJson::new(&edges[s.id], all, Some(s))
-            };
-            let publishes = graph.publishes.iter().map(edge(&all.publishes));
+            let publishes = graph.publishes();
+            let publishes =
+                publishes.map(|(id, s)| PublishJson::new(&all.publishes[id], all, Some(s)));
             map.serialize_entry("publishes", &List(publishes))?;
-            let subscribes = graph.subscribes.iter().map(edge(&all.subscribes));
+            let subscribes = graph.subscribes();
+            let subscribes =
+                subscribes.map(|(id, s)| PublishJson::new(&all.subscribes[id], all, Some(s)));
             map.serialize_entry("subscribes", &List(subscribes.map(SubscribeJson::from)))?;
         }
         let changes = window.changes.iter().zip(&window.events);

@@ -114,7 +114,7 @@ fn invalid_columns_are_ignored() {
     let counts: Vec<Vec<u64>> = mission
         .graphs
         .iter()
-        .map(|g| g.topics.iter().map(|t| t.count).collect())
+        .map(|g| g.topics().map(|(_, t)| t.messages()).collect())
         .collect();
     assert_eq!(counts, [vec![], vec![3]]);
 }
