@@ -3,8 +3,8 @@
 
     tests/bench/pictures.py BAGREEL BAG... [-- OPTION...]
 
-Prints per bag, over all frames: boxes and lines per frame; lines with a twin between the same two boxes; new lines without a
-name; labels with a line of others under them; titles of namespaces with a line under them; badges on a line of others;
+Prints per bag, over all frames: boxes and lines per frame; crossings of lines per frame; lines with a twin between the same
+two boxes; new lines without a name; labels with a line of others under them; titles of namespaces with a line under them; badges on a line of others;
 heads of lines below words; changes that are folded away; most things with a colour in a frame; the smallest text in pixels;
 the part of the graph's page that boxes fill.
 """
@@ -67,6 +67,34 @@ def centre(form):
     return float(form.get("cx")), float(form.get("cy"))
 
 
+def crossings(lines):
+    """How often lines between different pairs of boxes cross."""
+    cells, found = collections.defaultdict(list), set()
+    for at, line in enumerate(lines):
+        for way in line["ways"]:
+            for a, b in zip(way, way[1:]):
+                piece = at, a, b
+                for x in range(*span(a[0], b[0])):
+                    for y in range(*span(a[1], b[1])):
+                        for other in cells[x, y]:
+                            if lines[other[0]]["pair"] != line["pair"] and cross(piece, other):
+                                found.add((other, piece))
+                        cells[x, y].append(piece)
+    return len(found)
+
+
+def span(a, b):
+    """The cells of a grid from one coordinate to another."""
+    return int(min(a, b) // 16), int(max(a, b) // 16) + 1
+
+
+def cross(one, other):
+    """Whether two straight pieces cross; those that only touch do not."""
+    (_, a, b), (_, c, d) = one, other
+    side = lambda p, q, r: (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    return side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
+
+
 def shape(group):
     """The rectangle of the box of a node or topic."""
     for form in group:
@@ -92,7 +120,7 @@ def frame(root, sums):
         if kind == "edge":
             name = group.get("id").split("..over")[0]
             ends = group.get("data-from"), group.get("data-to")
-            line = lines.setdefault(name, {"ends": ends, "points": [], "words": words, "label": False})
+            line = lines.setdefault(name, {"ends": ends, "pair": frozenset(ends), "points": [], "ways": [], "words": words, "label": False})
             line["label"] |= any(re.search("[a-z]{2}", "".join(t.itertext()).replace("Hz", "")) for t in texts)
             labels += [(name, box(text)) for text in texts]
             for path in group.iter(SVG + "path"):
@@ -101,6 +129,7 @@ def frame(root, sums):
                     heads.append((name, way[0]))
                 else:
                     line["points"] += way
+                    line["ways"].append(way)
             line["topics"] = group.get("data-topics")
             badges += [(name, centre(form)) for form in group.iter(SVG + "ellipse") if float(form.get("rx")) > 4]
         elif kind in ("node", "topic"):
@@ -112,9 +141,10 @@ def frame(root, sums):
             titles += [box(text) for text in texts]
         if {"added", "removed", "changed", "away"} & set(words):
             coloured |= set((group.get("data-entries") or "").split()) if kind != "crowd" else {group.get("data-entries")}
-    pairs = collections.Counter(frozenset(line["ends"]) for line in lines.values())
+    pairs = collections.Counter(line["pair"] for line in lines.values())
     sums["lines"] += len(lines)
-    sums["twins"] += sum(pairs[frozenset(line["ends"])] > 1 for line in lines.values())
+    sums["crossings"] += crossings(list(lines.values()))
+    sums["twins"] += sum(pairs[line["pair"]] > 1 for line in lines.values())
     # The box of a topic names the lines to it.
     topics = {group.get("data-name") for group in root.iter(SVG + "g") if group.get("class", "").startswith("topic ")}
     new = [line for line in lines.values() if "added" in line["words"] and not topics & set(line["ends"])]
@@ -149,9 +179,9 @@ def main():
     args = sys.argv[1:]
     options = args[args.index("--") + 1 :] if "--" in args else []
     bagreel, *bags = args[: args.index("--")] if "--" in args else args
-    print("| bag | frames | boxes | lines | twins | new without a name | labels over lines | titles crossed "
+    print("| bag | frames | boxes | lines | crossings | twins | new without a name | labels over lines | titles crossed "
           "| badges run over | heads hidden | folded | most coloured | smallest text | filled |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("|---" * 15 + "|")
     for bag in bags:
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([bagreel, "render", "-q", bag, *options, "-o", folder + "/x{n}.svg"], check=True)
@@ -161,7 +191,8 @@ def main():
         many = len(files)
         share = f"{100 * sums['covered'] / max(sums['labels'], 1):.0f} %"
         print(
-            f"| {pathlib.Path(bag).name} | {many} | {sums['boxes'] / many:.0f} | {sums['lines'] / many:.0f} | {sums['twins']} "
+            f"| {pathlib.Path(bag).name} | {many} | {sums['boxes'] / many:.0f} | {sums['lines'] / many:.0f} "
+            f"| {sums['crossings'] / many:.1f} | {sums['twins']} "
             f"| {sums['nameless']} of {sums['new']} | {share} | {sums['crossed']} of {sums['titles']} "
             f"| {sums['run over']} of {sums['badges']} | {sums['hidden']} | {sums['folded']} | {sums['colours']} | {smallest:.1f} px "
             f"| {100 * sums['filled'] / many:.0f} % |"

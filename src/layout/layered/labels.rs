@@ -106,8 +106,15 @@ impl Segments {
         let mut points = vec![route.start];
         for &[a, b, to] in &route.curves {
             let from = points[points.len() - 1];
-            let level = (from.y - to.y).abs() < 0.1 || (from.x - to.x).abs() < 0.1;
-            let steps = if level { 1 } else { 8 };
+            let is_level = |along: fn(&Point) -> f64| {
+                let apart = |p: &Point| (along(p) - along(&from)).abs();
+                [a, b, to].iter().all(|p| apart(p) < 0.1)
+            };
+            let steps = if is_level(|p| p.x) || is_level(|p| p.y) {
+                1
+            } else {
+                8
+            };
             points.extend(
                 (1..=steps)
                     .map(|step| on_cubic([from, a, b, to], f64::from(step) / f64::from(steps))),
@@ -314,6 +321,29 @@ mod tests {
         assert!(!a.overlaps(&b));
         let free = |boxed: &Rect| !boxed.overlaps(&a) && !boxed.overlaps(&b);
         assert!(layout.boxes.iter().all(free));
+    }
+
+    #[test]
+    fn labels_do_not_overlap_an_edge_that_bulges_between_ends_above_each_other() {
+        let plan = plan(vec![labelled(20.0, 13.0), link(0, 1)]);
+        let across = straight(Point::new(80.0, 95.0), Point::new(130.0, 95.0));
+        let [top, bottom] = [30.0, 160.0].map(|y| Point::new(40.0, y));
+        let bulge = [Point::new(130.0, 95.0); 2];
+        let bulging = Route {
+            start: top,
+            curves: vec![[bulge[0], bulge[1], bottom]],
+            label: None,
+        };
+        let curve = [top, bulge[0], bulge[1], bottom];
+        let routes = vec![across, bulging];
+        let mut layout = layout(Orientation::TopBottom, Point::new(0.0, 160.0), routes);
+        place(&plan, &mut layout);
+        let label = layout.labels(&plan).next().unwrap();
+        let covered = (0..=100).any(|k| {
+            let point = on_cubic(curve, f64::from(k) / 100.0);
+            label.overlaps(&Rect::around(point, Size::new(1.0, 1.0)))
+        });
+        assert!(!covered, "{label:?}");
     }
 
     #[test]
