@@ -350,9 +350,12 @@ fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), event: EventId) {
         ..phrase
     });
     for name in names {
-        if !all.names.contains(&name) {
-            all.names.push(name);
-            all.events.push(event);
+        match all.names.iter().position(|other| *other == name) {
+            Some(at) => all.events[at].push(event),
+            None => {
+                all.names.push(name);
+                all.events.push(vec![event]);
+            }
         }
     }
 }

@@ -1,23 +1,21 @@
 //! Windows with more changes than a reader can follow: changes of one kind in one namespace become one
 //! coloured frame with their number, and a short phrase in the headline.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::{Frame, Mark, Phrase, SeenWindow, Shown, View};
 use crate::base::name::lies_in;
+use crate::base::words;
 use crate::graph::Element;
 use crate::mission::Mission;
-use crate::mission::event_log::{EventId, Kind};
+use crate::mission::event_log::{Event, EventId, Kind};
 
 /// The most changes that have their own colour and their own words in the headline.
 const MOST: usize = 5;
-/// The event of a phrase that describes several.
-const FOLDED: EventId = EventId::MAX;
-/// The word for publications and subscriptions.
-const EDGES: &str = "edges";
-
-/// The indices of a phrase in the headline and of a name in it.
-type NamePlace = (usize, usize);
+/// The words for the numbers of a crowd, in this order.
+const NOUNS: [&str; 4] = ["node", "topic", "edge", "rate"];
+const EDGE: usize = 2;
 
 /// Changes of one kind in one namespace that are one coloured frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,137 +34,193 @@ pub struct Crowd {
 pub(super) fn gather(view: &mut View, mission: &Mission) {
     let mut frames = std::mem::take(&mut view.frames);
     for frame in &mut frames {
-        let words = |frame: &Frame| frame.caption.iter().map(|p| p.names.len()).sum::<usize>();
-        while words(frame) > MOST {
-            let Some((names, space)) = largest(frame, view, mission) else {
-                break;
-            };
-            fold(frame, &names, space, view, mission);
+        let mut changes = changes(frame, view, mission);
+        while changes.len() > MOST
+            && let Some(group) = largest(&changes)
+        {
+            join(&mut changes, &group);
+        }
+        if changes.iter().any(Change::is_crowd) {
+            tell(frame, &changes, view);
         }
     }
     view.frames = frames;
 }
 
-/// The largest group of names of one kind in one namespace, or anywhere, and the innermost namespace around all of them.
-fn largest(
-    frame: &Frame,
-    view: &View,
-    mission: &Mission,
-) -> Option<(Vec<NamePlace>, Option<usize>)> {
-    let mut groups: BTreeMap<(bool, usize, usize), Vec<NamePlace>> = BTreeMap::new();
-    // The first phrase about edges that appear, and about those that vanish.
-    let mut edges: BTreeMap<char, usize> = BTreeMap::new();
-    let phrases = frame.caption.iter().zip(0..);
-    let names =
-        phrases.flat_map(|(phrase, at)| phrase.events.iter().zip(0..).map(move |e| (at, e)));
-    for (at, (event, name)) in names.filter(|(_, (event, _))| **event != FOLDED) {
-        let kind = match noun(mission, *event) {
-            EDGES => *edges.entry(frame.caption[at].sign).or_insert(at),
-            _ => at,
-        };
-        let outermost = around(view, subject(mission, *event)).first().copied();
-        // The whole graph comes after all namespaces.
-        let framed = outermost.map(|space| (true, kind, space));
-        for key in framed.into_iter().chain([(false, kind, usize::MAX)]) {
-            groups.entry(key).or_default().push((at, name));
+/// A name in the headline, or several that are combined.
+#[derive(Clone, Default)]
+struct Change {
+    /// The index of its phrase, and the words of this phrase around it.
+    at: usize,
+    phrase: Phrase,
+    name: String,
+    /// The number of names for each of [`NOUNS`].
+    counts: [usize; 4],
+    events: Vec<EventId>,
+    /// The namespaces with a frame around it, the outermost first.
+    around: Vec<usize>,
+}
+
+impl Change {
+    fn size(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    fn is_crowd(&self) -> bool {
+        self.size() > 1
+    }
+
+    /// Its kind: edges that appear or end have different words, and are of one kind.
+    fn kind(&self) -> (Option<char>, usize) {
+        if self.counts[EDGE] == self.size() {
+            (Some(self.phrase.sign), 0)
+        } else {
+            (None, self.at)
         }
     }
-    groups.retain(|_, names| names.len() > 1);
-    let all: usize = frame.caption.iter().map(|p| p.names.len()).sum();
+
+    /// `+4 nodes, 1 edge`
+    fn words(&self) -> String {
+        let counts = self.counts.iter().zip(NOUNS).filter(|(n, _)| **n > 0);
+        let words: Vec<String> = counts.map(|(n, noun)| words::count(*n, noun)).collect();
+        words.join(", ")
+    }
+}
+
+/// Every name in the headline of a window.
+fn changes(frame: &Frame, view: &View, mission: &Mission) -> Vec<Change> {
+    let phrases = frame.caption.iter().enumerate();
+    let named = phrases.flat_map(|(at, phrase)| {
+        let names = phrase.names.iter().zip(&phrase.events);
+        names.map(move |(name, events)| (at, phrase, name, events))
+    });
+    let change = |(at, phrase, name, events): (usize, &Phrase, &String, &Vec<EventId>)| {
+        let event = mission.log.events.get(*events.first()? as usize)?;
+        let mut counts = [0; 4];
+        counts[noun(event)] = 1;
+        let (node, topic) = mission.elements.names(event.what);
+        let subject = node.or(topic).unwrap_or_default();
+        let spaces = view.namespaces.iter().enumerate();
+        let around = spaces.filter(|(_, space)| lies_in(subject, &space.name));
+        Some(Change {
+            at,
+            phrase: Phrase {
+                names: Vec::new(),
+                events: Vec::new(),
+                ..phrase.clone()
+            },
+            name: name.clone(),
+            counts,
+            events: events.clone(),
+            around: around.map(|(at, _)| at).collect(),
+        })
+    };
+    named.filter_map(change).collect()
+}
+
+/// The kind of element that an event is about: an index into [`NOUNS`].
+fn noun(event: &Event) -> usize {
+    match (event.kind, event.what) {
+        (Kind::Rate, _) => 3,
+        (_, Element::Node(_)) => 0,
+        (Kind::Appeared | Kind::Vanished, Element::Publish(_) | Element::Subscribe(_)) => EDGE,
+        _ => 1,
+    }
+}
+
+/// The largest group of changes of one kind in one namespace; if there is none, of one kind anywhere, or else with one
+/// sign.
+fn largest(changes: &[Change]) -> Option<Vec<usize>> {
+    let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    for (at, change) in changes.iter().enumerate() {
+        let (kind, sign) = (Some(change.kind()), change.phrase.sign);
+        let outermost = change.around.first().copied();
+        let framed = outermost.map(|space| (2, sign, kind, space));
+        // The whole graph comes after all namespaces.
+        let anywhere = [(1, sign, kind, usize::MAX), (0, sign, None, usize::MAX)];
+        for key in framed.into_iter().chain(anywhere) {
+            groups.entry(key).or_default().push(at);
+        }
+    }
+    groups.retain(|_, group| group.len() > 1);
     let best = groups
         .into_iter()
-        .max_by_key(|((is_framed, at, space), names)| {
-            // New elements are still visible in the next window; elements that ended are visible in this one
-            // only.
-            let stays = frame.caption[*at].sign == '+' && all - names.len() < MOST;
-            let order = (usize::MAX - at, usize::MAX - space);
-            (*is_framed, stays, names.len(), order)
+        .max_by_key(|((level, sign, _, space), group)| {
+            // New elements are still visible in the next window; elements that ended are visible in this one only.
+            let stays = *sign == '+' && changes.len() - group.len() < MOST;
+            let is_other = *level == 0 && *sign == ' ';
+            let order = (Reverse(changes[group[0]].at), Reverse(*space));
+            (*level, !is_other, stays, group.len(), order)
         });
-    let (_, names) = best?;
-    let spaces = names
-        .iter()
-        .map(|(at, name)| around(view, subject(mission, frame.caption[*at].events[*name])));
-    let common = spaces.reduce(|a, b| {
-        let same = a.into_iter().zip(b).take_while(|(a, b)| a == b);
-        same.map(|(a, _)| a).collect()
-    });
-    Some((names, common.and_then(|all| all.last().copied())))
+    best.map(|(_, group)| group)
 }
 
-/// The namespaces with a frame around a name, the outermost first.
-fn around(view: &View, name: &str) -> Vec<usize> {
-    let spaces = view.namespaces.iter().enumerate();
-    spaces
-        .filter(|(_, space)| lies_in(name, &space.name))
-        .map(|(at, _)| at)
-        .collect()
-}
-
-/// The node that an event is about, or else the topic.
-fn subject(mission: &Mission, event: EventId) -> &str {
-    let event = mission.log.events.get(event as usize);
-    let names = event.map(|event| mission.elements.names(event.what));
-    names
-        .and_then(|(node, topic)| node.or(topic))
-        .unwrap_or_default()
-}
-
-/// The kind of element that an event is about, in the plural.
-fn noun(mission: &Mission, event: EventId) -> &'static str {
-    let event = mission.log.events.get(event as usize);
-    event.map_or("changes", |event| match (event.kind, event.what) {
-        (Kind::Rate, _) => "rates",
-        (_, Element::Node(_)) => "nodes",
-        (Kind::Appeared | Kind::Vanished, Element::Publish(_) | Element::Subscribe(_)) => EDGES,
-        _ => "topics",
-    })
-}
-
-/// Combines some names into one.
-fn fold(
-    frame: &mut Frame,
-    names: &[NamePlace],
-    space: Option<usize>,
-    view: &View,
-    mission: &Mission,
-) {
-    let event = |(at, name): &NamePlace| frame.caption[*at].events[*name];
-    let mut events: Vec<EventId> = names.iter().map(event).collect();
-    let (count, noun, at) = (names.len(), noun(mission, events[0]), names[0].0);
-    events.sort_unstable();
-    let space_name = space.map(|at| &*view.namespaces[at].name);
-    let place = space_name.filter(|space| !frame.note.starts_with(space));
-    let place = place.map_or_else(String::new, |space| format!(" in {space}"));
-    for (at, name) in names.iter().rev() {
-        frame.caption[*at].names.remove(*name);
-        frame.caption[*at].events.remove(*name);
+/// Combines some changes into one, at the place of the first.
+fn join(changes: &mut Vec<Change>, group: &[usize]) {
+    let mut all = changes[group[0]].clone();
+    for other in group[1..].iter().map(|at| &changes[*at]) {
+        all.events.extend(&other.events);
+        for (sum, n) in all.counts.iter_mut().zip(other.counts) {
+            *sum += n;
+        }
+        let same = all.around.iter().zip(&other.around);
+        let same = same.take_while(|(a, b)| a == b).count();
+        all.around.truncate(same);
+        if other.phrase != all.phrase {
+            // Their phrases have different words.
+            all.phrase.lead.clear();
+            all.phrase.tail = match all.phrase.sign {
+                '+' => "appear",
+                '−' => "end",
+                _ => "change",
+            }
+            .to_owned();
+        }
     }
-    let sign = frame.caption[at].sign;
-    if noun == EDGES {
-        // Their phrases have different words.
-        let tail = if sign == '+' { "appear" } else { "end" };
-        let phrase = Phrase {
-            sign,
-            tail: tail.to_owned(),
-            ..Phrase::default()
+    all.events.sort_unstable();
+    all.events.dedup();
+    for at in group.iter().rev() {
+        changes.remove(*at);
+    }
+    changes.insert(group[0], all);
+    changes.sort_by_key(|change| (change.at, !change.is_crowd()));
+}
+
+/// Writes the headline again, and adds the frames of crowds.
+fn tell(frame: &mut Frame, changes: &[Change], view: &View) {
+    frame.caption.clear();
+    for change in changes {
+        let mut name = change.name.clone();
+        if change.is_crowd() {
+            let (space, sign) = (change.around.last().copied(), change.phrase.sign);
+            let place = space.map(|at| &*view.namespaces[at].name);
+            let place = place.filter(|space| !frame.note.starts_with(space));
+            let place = place.map_or_else(String::new, |space| format!(" in {space}"));
+            name = change.words() + &place;
+            let (mark, sign) = match sign {
+                '+' => (Mark::Added, "+"),
+                '−' => (Mark::Removed, "−"),
+                _ => (Mark::Changed, ""),
+            };
+            frame.crowds.push(Crowd {
+                space,
+                mark,
+                words: format!("{sign}{}", change.words()),
+                events: change.events.clone(),
+            });
+        }
+        let is_same = |last: &&mut Phrase| {
+            let [last, new] = [&**last, &change.phrase].map(|p| (p.sign, &p.lead, &p.tail));
+            last == new
         };
-        frame.caption.insert(at, phrase);
+        if frame.caption.last_mut().filter(is_same).is_none() {
+            frame.caption.push(change.phrase.clone());
+        }
+        if let Some(phrase) = frame.caption.last_mut() {
+            phrase.names.push(name);
+            phrase.events.push(change.events.clone());
+        }
     }
-    let phrase = &mut frame.caption[at];
-    phrase.names.insert(0, format!("{count} {noun}{place}"));
-    phrase.events.insert(0, FOLDED);
-    frame.caption.retain(|phrase| !phrase.names.is_empty());
-    let (mark, sign) = match sign {
-        '+' => (Mark::Added, "+"),
-        '−' => (Mark::Removed, "−"),
-        _ => (Mark::Changed, ""),
-    };
-    frame.crowds.push(Crowd {
-        space,
-        mark,
-        words: format!("{sign}{count} {noun}"),
-        events,
-    });
 }
 
 impl View {
@@ -183,17 +237,18 @@ impl View {
 }
 
 impl Frame {
-    /// Removes the colour from a look whose events are those of a crowd: it is drawn as unchanged, or as
-    /// ended; a collapsed namespace keeps its words.
+    /// Removes the events of a crowd from a look with others, and the colour from one without: it is drawn as
+    /// unchanged, or as ended; a collapsed namespace keeps its words.
     pub(crate) fn calm(&self, shown: &mut Shown) {
         let in_crowd = |event: &EventId| {
             let mut crowds = self.crowds.iter();
             crowds.any(|crowd| crowd.events.binary_search(event).is_ok())
         };
-        if matches!(shown.mark, None | Some(Mark::Away))
-            || shown.events.is_empty()
-            || !shown.events.iter().all(in_crowd)
-        {
+        if matches!(shown.mark, None | Some(Mark::Away)) || shown.events.is_empty() {
+            return;
+        }
+        if !shown.events.iter().all(in_crowd) {
+            shown.events.retain(|event| !in_crowd(event));
             return;
         }
         let is_ghost = shown.is_ghost();
@@ -276,6 +331,40 @@ mod tests {
         let (words, crowds, _) = last(&[&format!("/a>/t {before}"), &format!("/a>/t {after}")]);
         assert_eq!(words, "+ 6 edges appear");
         assert_eq!(crowds, ["page: +6 edges"]);
+    }
+
+    #[test]
+    fn more_than_five_kinds_of_changes_are_at_most_five_frames_and_colours() {
+        let before = "/a /b /c>/p /c>/q@5 /d>/r@5 /e";
+        let after = "/a /f /c /e</q /c>/q@50 /d>/r@1 /g =/new";
+        let (words, crowds, _) = last(&[before, after]);
+        let want =
+            "− /b stops; − /c no longer publishes /p; + 2 nodes, 1 topic, 1 edge appear; 2 rates";
+        assert_eq!(words, want);
+        assert_eq!(crowds, ["page: +2 nodes, 1 topic, 1 edge", "page: 2 rates"]);
+    }
+
+    #[test]
+    fn a_collapsed_namespace_has_the_colour_of_changes_that_are_in_no_crowd() {
+        let options = ViewOptions {
+            is_picture: true,
+            collapse: vec!["/n".into()],
+            ..ViewOptions::default()
+        };
+        let before = "/n/a>/n/t@5 /n/k";
+        let after = "/n/a>/n/t@50 /b /c /d /e /n/f";
+        let (view, _) = view(&mission(&[before, after]), &options);
+        let seen = view.calm(1);
+        let of = |name: &str| {
+            let item = seen
+                .items
+                .iter()
+                .find(|s| &*view.items[s.id as usize].name == name);
+            item.map(|shown| (shown.mark, shown.events.len()))
+        };
+        assert_eq!(view.frames[1].crowds.len(), 1);
+        assert_eq!(of("/n"), Some((Some(Mark::Inside), 2)));
+        assert_eq!(of("/b").map(|(mark, _)| mark), Some(None));
     }
 
     #[test]

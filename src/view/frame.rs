@@ -38,10 +38,10 @@ pub struct Phrase {
     pub sign: char,
     /// The words before the names: `controller subscribes to`.
     pub lead: String,
-    /// The names, one per event.
+    /// The names.
     pub names: Vec<String>,
-    /// The event of each name: indices in the event log.
-    pub events: Vec<EventId>,
+    /// The events of each name: indices in the event log.
+    pub events: Vec<Vec<EventId>>,
     /// The words after the names: `start`.
     pub tail: String,
 }
