@@ -181,8 +181,8 @@ pub struct Picture<'a> {
     tracks: Vec<ArrowPath>,
     /// The lines of namespaces that are drawn as one.
     gates: Vec<(Gate, ArrowPath)>,
-    /// The distance of each namespace's title from the left of its frame, so that no line crosses it.
-    shifts: Vec<f64>,
+    /// The distance of each namespace's title from the top left of its frame, so that no line crosses it.
+    shifts: Vec<Point>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
     title: Title<'a>,
@@ -397,14 +397,18 @@ fn places(
     measured: &Measured<'_>,
     layout: &Layout,
     fit: GraphFit,
-) -> (Vec<ItemBox>, Vec<ArrowPath>, Vec<f64>) {
+) -> (Vec<ItemBox>, Vec<ArrowPath>, Vec<Point>) {
     let mut cards = cards(measured, layout, fit);
     let mut tracks = tracks(measured, layout, fit);
     // Slightly beyond the badge's edge.
     let radius = measured.style.badge.radius * fit.pen + 1.0;
     let frames = layout.clusters.iter().zip(&measured.graph.plan.clusters);
-    let titles = frames.map(|(frame, cluster)| (fit.rect(*frame), cluster.title.scaled(fit.scale)));
-    let (shifts, titles) = room::place_titles(titles, &tracks, fit.scale)
+    let titles = frames.map(|(frame, cluster)| {
+        let (title, has_footer) = (cluster.title.scaled(fit.scale), cluster.footer.h > 0.0);
+        (fit.rect(*frame), title, has_footer)
+    });
+    let titles: Vec<_> = titles.collect();
+    let (shifts, titles) = room::place_titles(&titles, &cards, &tracks, fit.scale)
         .into_iter()
         .unzip();
     room::place_badges(&mut cards, &mut tracks, titles, (radius, fit.scale));

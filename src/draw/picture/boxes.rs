@@ -139,8 +139,8 @@ impl Boxes<'_> {
         [frame, words]
     }
 
-    /// Takes the title out of a namespace's box, to be painted over the lines that cross it, and moves it along the top.
-    pub(crate) fn title_of(&self, space: &mut Group, by: f64) -> Group {
+    /// Takes the title out of a namespace's box, to be painted over the lines that cross it, and moves it.
+    pub(crate) fn title_of(&self, space: &mut Group, by: Point) -> Group {
         let mut title = Group {
             id: format!("{}..title", space.id),
             class: "namespace-title".to_owned(),
@@ -158,7 +158,7 @@ impl Boxes<'_> {
             let halo = self.style.edge.halo_width * self.fit.scale * 1.5;
             title.text(Text {
                 halo: Some((plate, halo)),
-                at: Point::new(text.at.x + by, text.at.y),
+                at: Point::new(text.at.x + by.x, text.at.y + by.y),
                 ..text
             });
         }

@@ -91,15 +91,12 @@ impl Boxes<'_> {
     pub(crate) fn member_list(
         &self,
         space: &Space,
-        (place, by): (Rect, f64),
+        (place, by): (Rect, Point),
         id: &str,
         (now, who): (f64, &[MemberState]),
     ) -> Group {
         let size = self.style.cluster.size;
-        let (place, scale) = (
-            self.fit.rect(place).moved(Point::new(by, 0.0)),
-            self.fit.scale,
-        );
+        let (place, scale) = (self.fit.rect(place).moved(by), self.fit.scale);
         let area = |(x, width): (f64, f64)| {
             Rect::new(
                 place.x + (8.0 + x) * scale,

@@ -13,39 +13,64 @@ const MOST: usize = 3000;
 const INSET: f64 = 8.0;
 const CLEAR: f64 = 3.0;
 
-/// The distance by which each title moves along the top of its frame until no line and no label is below it,
-/// and its position; a title without free space does not move.
+/// The distance by which each title moves from the top left of its frame so that it covers no line, label, box or
+/// border, and its position: along the top or, if the frame has no words there, along the bottom. A title without free
+/// space does not move.
 pub(super) fn place_titles(
-    titles: impl Iterator<Item = (Rect, Size)>,
+    titles: &[(Rect, Size, bool)],
+    cards: &[ItemBox],
     tracks: &[ArrowPath],
     scale: f64,
-) -> Vec<(f64, Rect)> {
+) -> Vec<(Point, Rect)> {
     let few = if tracks.len() > MOST { &[] } else { tracks };
-    let lines: Vec<Vec<Point>> = few.iter().map(ArrowPath::points).collect();
+    let mut lines: Vec<Vec<Point>> = few.iter().map(ArrowPath::points).collect();
+    lines.extend(titles.iter().map(|(frame, ..)| border(frame)));
     let pieces = lines.iter().flat_map(|line| line.windows(2));
     let pieces = pieces.filter_map(|ends| Rect::of_points(ends.iter().copied()));
     let taken: Vec<Rect> = pieces
         .chain(few.iter().filter_map(ArrowPath::label_area))
+        .chain(cards.iter().map(|card| card.place))
         .collect();
-    let placed = titles.map(|(frame, size)| {
+    let placed = titles.iter().map(|&(frame, size, has_footer)| {
         let (left, right) = (frame.x + INSET * scale, frame.right() - INSET * scale);
-        let strip = Rect::new(frame.x, frame.y, frame.w, size.h + CLEAR * scale);
-        let below = taken.iter().filter(|rect| {
-            rect.y < strip.bottom() && rect.bottom() > strip.y && rect.x < strip.right()
-        });
-        let mut below: Vec<&Rect> = below.collect();
-        below.sort_by(|a, b| a.x.total_cmp(&b.x));
-        let mut x = left;
-        for rect in below {
-            if rect.x > x + size.w + CLEAR * scale {
-                break;
+        let top = Rect::new(frame.x, frame.y, frame.w, size.h + CLEAR * scale);
+        let bottom = top.moved(Point::new(0.0, frame.h - top.h - CLEAR * scale));
+        let free = |strip: &Rect| {
+            let below = taken.iter().filter(|rect| {
+                rect.y < strip.bottom() && rect.bottom() > strip.y && rect.x < strip.right()
+            });
+            let mut below: Vec<&Rect> = below.collect();
+            below.sort_by(|a, b| a.x.total_cmp(&b.x));
+            let mut x = left;
+            for rect in below {
+                if rect.x > x + size.w + CLEAR * scale {
+                    break;
+                }
+                x = x.max(rect.right() + CLEAR * scale);
             }
-            x = x.max(rect.right() + CLEAR * scale);
-        }
-        let x = if x + size.w > right { left } else { x };
-        (x - left, Rect::new(x, frame.y, size.w, size.h))
+            (x + size.w <= right).then_some(Point::new(x, strip.y))
+        };
+        let at =
+            free(&top).or_else(|| Some(bottom).filter(|_| !has_footer).as_ref().and_then(free));
+        let at = at.unwrap_or(Point::new(left, frame.y));
+        let by = Point::new(at.x - left, at.y - frame.y);
+        (by, Rect::new(at.x, at.y, size.w, size.h))
     });
     placed.collect()
+}
+
+/// The border of a frame.
+fn border(frame: &Rect) -> Vec<Point> {
+    let (left, right) = (frame.x, frame.right());
+    let (top, bottom) = (frame.y, frame.bottom());
+    let corners = [
+        (left, top),
+        (right, top),
+        (right, bottom),
+        (left, bottom),
+        (left, top),
+    ];
+    corners.map(|(x, y)| Point::new(x, y)).to_vec()
 }
 
 /// Moves all badges of this radius to positions at which they cover no line, title or other box, if possible;
@@ -185,13 +210,34 @@ mod tests {
         let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
         let title = |width: f64, lines: &[ArrowPath]| {
             let frame = Rect::new(0.0, 0.0, 200.0, 80.0);
-            let titles = std::iter::once((frame, Size::new(width, 14.0)));
-            place_titles(titles, lines, 1.0)[0].0
+            let titles = [(frame, Size::new(width, 14.0), false)];
+            place_titles(&titles, &[], lines, 1.0)[0].0
         };
-        assert!(title(50.0, &[along(70.0)]) < 0.1);
-        assert!((title(50.0, &[along(20.0), along(60.0)]) - 55.0).abs() < 0.1);
+        assert!(title(50.0, &[along(70.0)]).x < 0.1);
+        assert!((title(50.0, &[along(20.0), along(60.0)]).x - 55.0).abs() < 0.1);
         // There is no free space.
-        assert!(title(150.0, &[along(100.0)]) < 0.1);
+        assert_eq!(title(150.0, &[along(100.0)]), Point::default());
+    }
+
+    #[test]
+    fn a_title_is_at_the_bottom_of_its_frame_if_lines_run_along_the_top() {
+        let over = line(Point::new(-50.0, 8.0), Point::new(190.0, 8.0));
+        let place = |has_footer: bool, place: Rect| {
+            let titles = [(
+                Rect::new(0.0, 0.0, 200.0, 80.0),
+                Size::new(50.0, 14.0),
+                has_footer,
+            )];
+            place_titles(&titles, &[card(place)], std::slice::from_ref(&over), 1.0)[0].0
+        };
+        let above = Rect::new(20.0, 20.0, 90.0, 30.0);
+        assert_eq!(place(false, above), Point::new(0.0, 60.0));
+        assert_eq!(place(true, above), Point::default());
+        // Beside a box.
+        assert_eq!(
+            place(false, above.moved(Point::new(0.0, 20.0))),
+            Point::new(105.0, 60.0)
+        );
     }
 
     #[test]
