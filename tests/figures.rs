@@ -70,7 +70,7 @@ const FIGURES: [(&str, &str, f64); 6] = [
     ("map", "88mm", 121.0),
     ("map", "181mm", 99.0),
     ("steps", "88mm", 225.0),
-    ("steps", "181mm", 110.0),
+    ("steps", "181mm", 80.0),
 ];
 
 #[test]
@@ -182,6 +182,28 @@ fn texts_do_not_overlap() {
                 assert!(apart, "{kind} {width}: `{}` and `{}`", a.4, b.4);
             }
         }
+    }
+}
+
+#[test]
+fn texts_do_not_cover_arrowheads() {
+    for ((kind, width, _), svg) in FIGURES.iter().zip(drawn()).skip(2) {
+        let texts = boxes(svg);
+        let mut heads = 0;
+        for points in svg.split("<polygon points=\"").skip(1) {
+            let points = points.split('"').next().unwrap().split([' ', ',']);
+            let points: Vec<f64> = points.map(|n| n.parse().unwrap()).collect();
+            let [tip, y, ax, ay, bx, by] = points[..] else {
+                continue;
+            };
+            let (x, y) = ((tip + ax + bx) / 3.0, (y + ay + by) / 3.0);
+            let covers =
+                |t: &&(f64, f64, f64, f64, String)| t.0 < x && x < t.2 && t.1 < y && y < t.3;
+            let text = texts.iter().find(covers);
+            assert!(text.is_none(), "{kind} {width}: {text:?} at {x}, {y}");
+            heads += 1;
+        }
+        assert!(heads > 10, "{kind} {width}: {heads} arrowheads");
     }
 }
 

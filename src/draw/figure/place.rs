@@ -26,6 +26,8 @@ const ASPECT: f64 = 0.45;
 const PARTED: (f64, f64) = (3.0, 3.0 * 0.7);
 /// The number of pieces in which a curve is measured.
 const PIECES: u32 = 8;
+/// The length of an arrowhead in millimetres, on a line without width.
+const HEAD: f64 = 1.2;
 /// A drawing in millimetres, its top left corner at (0, 0).
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedPanel {
@@ -316,8 +318,12 @@ impl PlacedPanel {
     fn set_labels(&mut self, labels: &[Vec<Size>], titles: Vec<Rect>, width: f64) {
         let mut fixed: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
         fixed.extend(titles);
-        let tips = self.routes.iter().filter_map(|r| r.last());
-        fixed.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
+        fixed.extend(self.routes.iter().filter_map(|route| {
+            let tip = *route.last()?;
+            let start = behind(route, tip);
+            let base = tip.towards(start, HEAD / start.distance(tip).max(HEAD));
+            Some(Rect::of_points([tip, base])?.grown(HEAD / 3.0))
+        }));
         let room = Room {
             routes: &self.routes,
             labels,
@@ -371,8 +377,7 @@ impl PlacedPanel {
         canvas.path(&steps, Color::NONE, &stroke);
         let points = &self.routes[at];
         if let Some(tip) = points.last() {
-            let behind = points.iter().rev().find(|p| p.distance(*tip) > 0.8);
-            canvas.head(*behind.unwrap_or(&route.start), *tip, 1.2 + width, color);
+            canvas.head(behind(points, *tip), *tip, HEAD + width, color);
         }
     }
 
@@ -394,6 +399,12 @@ impl PlacedPanel {
             canvas.label(centre.x, y, Type::Small, ink::TEXT, text);
         }
     }
+}
+
+/// A point of a route from which it runs almost straight to its tip.
+fn behind(route: &[Point], tip: Point) -> Point {
+    let far = route.iter().rev().find(|p| p.distance(tip) > 0.8);
+    far.or(route.first()).copied().unwrap_or(tip)
 }
 
 /// The size of each alternative of a label.

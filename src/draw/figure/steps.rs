@@ -449,22 +449,22 @@ impl<'s> StepSource<'s> {
         place(canvas, &plan, labels, width)
     }
 
-    /// All panels in rows, in order of time, with notes of repetitions and omissions.
+    /// All panels in order of time, from left to right and each directly below another, with notes of repetitions and
+    /// omissions.
     fn page(&self, panels: &[Panel], repeated: &[String], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();
         let (columns, wide) = (self.columns, self.panel_width());
-        let (mut y, mut number) = (0.1, 0);
-        for row in panels.chunks(columns) {
-            let high = row.iter().map(|p| p.height).fold(0.0, f64::max);
-            for (column, panel) in row.iter().enumerate() {
-                number += 1;
-                canvas.begin_step(number, &panel.events);
-                let x = (wide + BETWEEN) * column as f64;
-                paint(&mut canvas, panel, Rect::new(x + 0.1, y, wide - 0.2, high));
-            }
-            y += high + 1.2;
+        let mut ends = vec![0.1; columns];
+        for (at, panel) in panels.iter().enumerate() {
+            let column = at % columns;
+            canvas.begin_step(at + 1, &panel.events);
+            let x = (wide + BETWEEN) * column as f64;
+            let place = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
+            paint(&mut canvas, panel, place);
+            ends[column] += panel.height + 1.2;
         }
+        let y = ends.into_iter().fold(0.0, f64::max);
         canvas.begin("notes");
         let again = repeated
             .iter()
