@@ -27,6 +27,9 @@ const SMALLEST_PX: f64 = 9.0;
 const CAPTION: (f64, f64) = (9.0, 14.0);
 /// Space between panels, in pixels.
 const GAP: f64 = 10.0;
+/// The factor by which small graphs are enlarged, and the narrowest panel, for the words below it.
+const ENLARGED: f64 = 1.2;
+const NARROWEST: f64 = 480.0;
 /// Shapes of panels that are tried on paper: height over width.
 const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
 /// The largest height of a strip over its width, if there is a choice.
@@ -58,22 +61,31 @@ pub struct StripSource<'a> {
     pub engine: &'a dyn Engine,
 }
 
-/// The strip of `choice`. With `width_mm` the page has that width on paper; otherwise the width for a legible
-/// page on a screen, at least `width` pixels.
+/// The width of a strip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StripWidth {
+    /// Exactly this many millimetres on paper.
+    Paper(f64),
+    /// At least this many pixels on a screen, and as many as legible text needs.
+    AtLeast(f64),
+    /// The same, but less if the graphs are small.
+    About(f64),
+}
+
+/// The strip of `choice`.
 ///
 /// # Errors
 /// [`Error::Usage`] for a window that does not exist, and for more than 200,000 boxes and arrows on all panels together.
-pub fn strip(
-    source: StripSource<'_>,
-    choice: &Choice,
-    width_mm: Option<f64>,
-    width: f64,
-) -> Result<Strip> {
+pub fn strip(source: StripSource<'_>, choice: &Choice, width: StripWidth) -> Result<Strip> {
+    let width_mm = match width {
+        StripWidth::Paper(mm) => Some(mm),
+        StripWidth::AtLeast(_) | StripWidth::About(_) => None,
+    };
     let windows = choice.places(source.view)?;
     let mut best: Option<(f64, PanelGrid, Picture<'_>)> = None;
     for layout in source.layouts(width_mm.is_some()) {
         let bare = source.bare(&layout);
-        let page = PanelGrid::new(choice, windows.len(), &bare, width_mm, width);
+        let page = PanelGrid::new(choice, windows.len(), &bare, width);
         // A page that is too high is rated as if it were shrunk to fit.
         let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
         let text = page.text / (high / page.width / HIGHEST).max(1.0);
@@ -146,8 +158,10 @@ const LARGEST_STRIP: f64 = 24e6;
 struct PanelGrid {
     columns: usize,
     width: f64,
-    /// The size of a graph on it.
+    /// The size of a panel.
     panel: Size,
+    /// The scale of the graph in its middle.
+    scale: f64,
     /// The font size of text outside the graphs.
     caption: f64,
     /// The smallest font size in the graphs.
@@ -155,31 +169,36 @@ struct PanelGrid {
 }
 
 impl PanelGrid {
-    fn new(
-        choice: &Choice,
-        panels: usize,
-        bare: &Picture<'_>,
-        width_mm: Option<f64>,
-        width: f64,
-    ) -> Self {
+    fn new(choice: &Choice, panels: usize, bare: &Picture<'_>, width: StripWidth) -> Self {
         let natural = bare.scene(0).size;
         let columns = columns(choice, panels, natural);
-        let (mut width, mut caption) = (width, CAPTION.1);
-        if let Some(mm) = width_mm {
-            (width, caption) = (mm * PX_PER_MM, CAPTION.0);
-        } else {
+        let all = |panel: f64| (panel + GAP) * columns as f64 + GAP;
+        let on_screen = |least: f64| {
             let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
             let rows = panels.div_ceil(columns) as f64;
             let square = natural.h / natural.w.max(1.0) / columns as f64 * rows;
             let widest = (LARGEST_STRIP / square.max(0.01)).sqrt();
-            width = width.max(((legible + GAP) * columns as f64 + GAP).min(widest));
-        }
-        let wide = ((width - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
+            least.max(all(legible).min(widest))
+        };
+        let (page, caption) = match width {
+            StripWidth::Paper(mm) => (mm * PX_PER_MM, CAPTION.0),
+            StripWidth::AtLeast(width) => (on_screen(width), CAPTION.1),
+            StripWidth::About(width) => {
+                let most = all((natural.w * ENLARGED).max(NARROWEST));
+                (on_screen(width.min(most)), CAPTION.1)
+            }
+        };
+        let wide = ((page - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
         let scale = wide / natural.w.max(1.0);
+        let scale = match width {
+            StripWidth::About(_) => scale.min(ENLARGED),
+            StripWidth::Paper(_) | StripWidth::AtLeast(_) => scale,
+        };
         Self {
             columns,
-            width,
+            width: page,
             panel: Size::new(wide, natural.h * scale),
+            scale,
             caption,
             text: bare.text_px() * scale,
         }
@@ -249,9 +268,11 @@ impl<'a> StripSource<'a> {
         if let Some(phase) = self.picture.phase(window) {
             times = format!("{times} {phase}");
         }
+        let fits =
+            |text: &str| self.fonts.width(text, page.caption, Weight::Regular) <= page.panel.w;
         let lines = [
             (times, Weight::SemiBold),
-            (self.caption(frame, page), Weight::Regular),
+            (frame.fitting(fits), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {
             let most = page.panel.w;
@@ -272,23 +293,13 @@ impl<'a> StripSource<'a> {
             });
         }
         groups.push(panel);
-        let by = page.panel.w / scene.size.w.max(1.0);
+        let aside = (page.panel.w - scene.size.w * page.scale).max(0.0) / 2.0;
+        let corner = Point::new(corner.x + aside, corner.y);
         for group in &scene.groups {
-            let mut group = moved(group, by, corner);
+            let mut group = moved(group, page.scale, corner);
             group.id = format!("w{}-{}", frame.index, group.id);
             groups.push(group);
         }
-    }
-
-    /// As many of the changes, the most important first, as fit under a panel; the first in any case.
-    fn caption(&self, frame: &Frame, page: &PanelGrid) -> String {
-        let texts = (1..=frame.caption.len())
-            .rev()
-            .map(|keep| frame.words(keep));
-        let fits =
-            |text: &String| self.fonts.width(text, page.caption, Weight::Regular) <= page.panel.w;
-        let mut fitting = texts.filter(fits);
-        fitting.next().unwrap_or_else(|| frame.words(1))
     }
 
     /// Draws the shared legend from `y` on; returns its height.

@@ -16,7 +16,7 @@ use crate::draw::figure::lives::LivesFigure;
 use crate::draw::figure::source::FigureSource;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
-use crate::draw::strip::{Strip, StripSource, strip};
+use crate::draw::strip::{Strip, StripSource, StripWidth, strip};
 use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
@@ -452,5 +452,10 @@ fn side_by_side(
         engine: job.drawing.engine,
     };
     let choice = asked.unwrap_or(&Choice::Changes);
-    strip(source, choice, page.width_mm, page.size.w).map(Some)
+    let width = match page.width_mm {
+        Some(mm) => StripWidth::Paper(mm),
+        None if job.drawing.is_sized => StripWidth::AtLeast(page.size.w),
+        None => StripWidth::About(page.size.w),
+    };
+    strip(source, choice, width).map(Some)
 }

@@ -83,7 +83,8 @@ fn strip_of(choice: &str, width_mm: Option<f64>) -> Strip {
         fonts: &fonts,
         engine: layout::engine("layered").unwrap(),
     };
-    strip(source, &Choice::parse(choice).unwrap(), width_mm, 1280.0).unwrap()
+    let width = width_mm.map_or(StripWidth::About(1280.0), StripWidth::Paper);
+    strip(source, &Choice::parse(choice).unwrap(), width).unwrap()
 }
 
 fn texts(strip: &Strip) -> Vec<&Text> {
@@ -136,6 +137,17 @@ fn on_paper_the_width_is_exact_and_captions_are_legible() {
 fn too_small_text_is_reported_with_advice() {
     let strip = strip_of("2x2", Some(20.0));
     assert!(strip.remarks[0].contains("mm`"), "{:?}", strip.remarks);
+}
+
+#[test]
+fn small_graphs_are_not_enlarged_to_the_width_of_the_page() {
+    let strip = strip_of("0", None);
+    let names = texts(&strip)
+        .into_iter()
+        .filter(|t| t.text.starts_with('/'));
+    let largest = names.map(|t| t.size).fold(0.0, f64::max);
+    assert!(largest > 14.0 && largest < 22.0, "{largest} px");
+    assert!(strip.scene.size.w < 1000.0, "{} px", strip.scene.size.w);
 }
 
 #[test]
