@@ -70,7 +70,7 @@ const FIGURES: [(&str, &str, f64); 6] = [
     ("map", "88mm", 121.0),
     ("map", "181mm", 99.0),
     ("steps", "88mm", 225.0),
-    ("steps", "181mm", 80.0),
+    ("steps", "181mm", 85.0),
 ];
 
 #[test]

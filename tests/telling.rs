@@ -45,7 +45,7 @@ fn every_headline_is_counted_captioned_and_marked() {
             assert_eq!(reported.len(), frame.counts.total(), "{at}");
             let reported: BTreeSet<u32> = frame.events().collect();
             let phrases = frame.caption.iter();
-            let said: BTreeSet<u32> = phrases.flat_map(|one| one.events.clone()).collect();
+            let said: BTreeSet<u32> = phrases.flat_map(|one| one.events.concat()).collect();
             assert_eq!(reported, said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
             let marked: BTreeSet<u32> = marked.flat_map(|s| s.events.clone()).collect();

@@ -12,7 +12,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::{self, Engine, Layout};
 use crate::mission::Mission;
-use crate::view::{Frame, View};
+use crate::view::View;
 pub use choice::Choice;
 
 /// The smallest legible text on paper, in points.

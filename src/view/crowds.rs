@@ -128,17 +128,19 @@ fn noun(event: &Event) -> usize {
     }
 }
 
-/// The largest group of changes of one kind in one namespace; if there is none, of one kind anywhere, or else with one
-/// sign.
+/// The largest group of changes of one kind in one namespace; if there is none, of one kind anywhere, then of one noun,
+/// or else with one sign.
 fn largest(changes: &[Change]) -> Option<Vec<usize>> {
     let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
     for (at, change) in changes.iter().enumerate() {
         let (kind, sign) = (Some(change.kind()), change.phrase.sign);
         let outermost = change.around.first().copied();
-        let framed = outermost.map(|space| (2, sign, kind, space));
+        let framed = outermost.map(|space| (3, sign, kind, space));
+        let noun = change.counts.iter().position(|n| *n == change.size());
+        let alike = noun.map(|noun| (1, sign, None, noun));
         // The whole graph comes after all namespaces.
-        let anywhere = [(1, sign, kind, usize::MAX), (0, sign, None, usize::MAX)];
-        for key in framed.into_iter().chain(anywhere) {
+        let anywhere = [(2, sign, kind, usize::MAX), (0, sign, None, usize::MAX)];
+        for key in framed.into_iter().chain(alike).chain(anywhere) {
             groups.entry(key).or_default().push(at);
         }
     }
@@ -237,6 +239,15 @@ impl View {
 }
 
 impl Frame {
+    /// Whether an event is a reason for a mark: elements begin and end only by events about this.
+    fn gives(&self, event: EventId, mark: Option<Mark>) -> bool {
+        use Kind::{Appeared, Restarted, Started, Stopped, Vanished};
+        let headline = self.headlines.iter().find(|h| h.event == event);
+        let of_life = [Appeared, Restarted, Started, Stopped, Vanished];
+        !matches!(mark, Some(Mark::Added | Mark::Removed))
+            || headline.is_none_or(|h| of_life.contains(&h.kind))
+    }
+
     /// Removes the events of a crowd from a look with others, and the colour from one without: it is drawn as
     /// unchanged, or as ended; a collapsed namespace keeps its words.
     pub(crate) fn calm(&self, shown: &mut Shown) {
@@ -247,8 +258,14 @@ impl Frame {
         if matches!(shown.mark, None | Some(Mark::Away)) || shown.events.is_empty() {
             return;
         }
-        if !shown.events.iter().all(in_crowd) {
-            shown.events.retain(|event| !in_crowd(event));
+        let others = shown
+            .events
+            .iter()
+            .copied()
+            .filter(|event| !in_crowd(event));
+        let others: Vec<EventId> = others.collect();
+        if others.iter().any(|event| self.gives(*event, shown.mark)) {
+            shown.events = others;
             return;
         }
         let is_ghost = shown.is_ghost();
@@ -267,7 +284,7 @@ impl Frame {
 mod tests {
     use super::*;
     use crate::view::testing::mission;
-    use crate::view::{ViewOptions, view};
+    use crate::view::{Headline, ViewOptions, view};
 
     /// The last window of a picture: its headline, its crowds, and the boxes that have a colour.
     fn last(windows: &[&str]) -> (String, Vec<String>, Vec<String>) {
@@ -365,6 +382,37 @@ mod tests {
         assert_eq!(view.frames[1].crowds.len(), 1);
         assert_eq!(of("/n"), Some((Some(Mark::Inside), 2)));
         assert_eq!(of("/b").map(|(mark, _)| mark), Some(None));
+    }
+
+    #[test]
+    fn what_ends_in_a_crowd_is_grey_even_if_its_rate_changed_too() {
+        let headline = |(event, kind)| Headline {
+            event,
+            kind,
+            ..Headline::started()
+        };
+        let crowd = Crowd {
+            space: None,
+            mark: Mark::Removed,
+            words: String::new(),
+            events: vec![0],
+        };
+        let calm = |second: Kind| {
+            let frame = Frame {
+                headlines: [(0, Kind::Stopped), (1, second)].map(headline).to_vec(),
+                crowds: vec![crowd.clone()],
+                ..Frame::default()
+            };
+            let mut shown = Shown {
+                mark: Some(Mark::Removed),
+                events: vec![0, 1],
+                ..Shown::default()
+            };
+            frame.calm(&mut shown);
+            shown.mark
+        };
+        assert_eq!(calm(Kind::Rate), Some(Mark::Gone));
+        assert_eq!(calm(Kind::Vanished), Some(Mark::Removed));
     }
 
     #[test]

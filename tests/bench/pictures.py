@@ -4,9 +4,9 @@
     tests/bench/pictures.py BAGREEL BAG... [-- OPTION...]
 
 Prints per bag, over all frames: boxes and lines per frame; crossings of lines per frame; lines with a twin between the same
-two boxes; new lines without a name; labels with a line of others under them; titles of namespaces with a line under them; badges on a line of others;
-heads of lines below words; changes that are folded away; most things with a colour in a frame; the smallest text in pixels;
-the part of the graph's page that boxes fill.
+two boxes; new lines without a name; labels with a line of others under them; titles of namespaces with a line under them;
+badges on a line of others; heads of lines below words; changes that are folded away; most things with a colour in a frame; the
+smallest text in pixels; the part of the graph's page that boxes fill.
 """
 
 import collections
@@ -120,7 +120,10 @@ def frame(root, sums):
         if kind == "edge":
             name = group.get("id").split("..over")[0]
             ends = group.get("data-from"), group.get("data-to")
-            line = lines.setdefault(name, {"ends": ends, "pair": frozenset(ends), "points": [], "ways": [], "words": words, "label": False})
+            line = lines.setdefault(
+                name,
+                {"ends": ends, "pair": frozenset(ends), "points": [], "ways": [], "words": words, "label": False},
+            )
             line["label"] |= any(re.search("[a-z]{2}", "".join(t.itertext()).replace("Hz", "")) for t in texts)
             labels += [(name, box(text)) for text in texts]
             for path in group.iter(SVG + "path"):

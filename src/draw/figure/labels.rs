@@ -6,9 +6,11 @@ use crate::base::geometry::{Point, Rect, Size};
 /// The number of positions along an arrow that are tried on each side of its middle, and their distance as a
 /// fraction of its length.
 const STATIONS: (usize, f64) = (15, 0.028);
-/// The cost of a label on another arrow, of one beside its own, and of one that is an arrow's length off its middle.
+/// The cost of a label on another arrow, of one beside its own, of one with its own between two rows, and of one that is
+/// an arrow's length off its middle.
 const ON_ARROW: f64 = 2.0;
 const ASIDE: f64 = 0.8;
+const BETWEEN: f64 = 1.2;
 const OFF_MIDDLE: f64 = 1.25;
 /// The distance in millimetres that a label keeps from other arrows, so that it is clear which one it belongs
 /// to.
@@ -20,6 +22,8 @@ pub(crate) struct Room<'a> {
     pub(crate) routes: &'a [Vec<Point>],
     /// Per arrow the sizes of the texts that may be written on it, the best first.
     pub(crate) labels: &'a [Vec<Size>],
+    /// The height of a row of text.
+    pub(crate) row: f64,
     /// The width of the page.
     pub(crate) width: f64,
     /// The rectangles that no label may cover.
@@ -82,9 +86,14 @@ impl Room<'_> {
                 continue;
             };
             let reach = f64::midpoint(normal.x.abs() * size.w, normal.y.abs() * size.h) + 0.35;
-            for (aside, penalty, near) in
-                [(0.0, 0.0, 0.0), (reach, ASIDE, NEAR), (-reach, ASIDE, NEAR)]
-            {
+            // A level arrow would run between two rows.
+            let is_between = size.h > 1.5 * self.row && normal.y.abs() > normal.x.abs();
+            let between = if is_between { BETWEEN } else { 0.0 };
+            for (aside, penalty, near) in [
+                (0.0, between, 0.0),
+                (reach, ASIDE, NEAR),
+                (-reach, ASIDE, NEAR),
+            ] {
                 let middle = Point::new(on.x + normal.x * aside, on.y + normal.y * aside);
                 let rect = Rect::around(middle, size);
                 let outside = rect.x < 0.0 || rect.y < 0.0 || rect.right() > self.width;

@@ -324,9 +324,11 @@ impl PlacedPanel {
             let base = tip.towards(start, HEAD / start.distance(tip).max(HEAD));
             Some(Rect::of_points([tip, base])?.grown(HEAD / 3.0))
         }));
+        let heights = labels.iter().flatten().map(|label| label.h);
         let room = Room {
             routes: &self.routes,
             labels,
+            row: heights.fold(f64::INFINITY, f64::min),
             width,
             fixed,
         };

@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{Element, Elements, NodeId, State};
 use crate::layout;
-use crate::view::{Headline, Item, ItemKind, Looks, Mark, Phrase, Shown};
+use crate::view::{Frame, Headline, Item, ItemKind, Looks, Mark, Phrase, Shown};
 
 /// Four minutes in which one node exists and another appears and vanishes.
 fn two_nodes() -> (Mission, View) {

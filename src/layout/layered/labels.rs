@@ -22,8 +22,9 @@ const EFFORT: u64 = 20_000_000;
 const CELLS: usize = 2_000_000;
 /// The space between an edge and a label beside it.
 const ASIDE: f64 = 2.0;
-/// The cost of a label that hides most of its own edge.
+/// The cost of a label that hides most of its own edge, and of one beside it that touches it.
 const HIDING: f64 = 4.0;
+const TOUCHING: f64 = 0.5;
 
 /// Places the labels of all routes, those of short edges first; a label without any free position is omitted.
 pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
@@ -159,10 +160,20 @@ impl Segments {
                     continue;
                 }
                 // A label on another edge would be taken for that edge's label.
-                let is_free = !edges
-                    .hits(&Rect::around(spot, size))
-                    .any(|edge| edge != own);
-                if is_free {
+                let place = Rect::around(spot, size);
+                let hits: Vec<usize> = edges.hits(&place).collect();
+                if hits.iter().any(|edge| *edge != own) {
+                    continue;
+                }
+                // One beside its own edge should not hide parts of it.
+                let is_beside = spot != point;
+                let cost = cost
+                    + if is_beside && !hits.is_empty() {
+                        TOUCHING
+                    } else {
+                        0.0
+                    };
+                if best.is_none_or(|(least, _)| cost < least) {
                     best = Some((cost, spot));
                 }
             }
@@ -321,6 +332,27 @@ mod tests {
         assert!(!a.overlaps(&b));
         let free = |boxed: &Rect| !boxed.overlaps(&a) && !boxed.overlaps(&b);
         assert!(layout.boxes.iter().all(free));
+    }
+
+    #[test]
+    fn a_label_beside_its_edge_does_not_touch_it_if_there_is_space() {
+        let plan = plan(vec![labelled(60.0, 13.0)]);
+        let [from, to] = [Point::new(80.0, 60.0), Point::new(180.0, 60.0)];
+        let bend = [Point::new(110.0, 90.0), Point::new(150.0, 90.0)];
+        let route = Route {
+            start: from,
+            curves: vec![[bend[0], bend[1], to]],
+            label: None,
+        };
+        let end = Point::new(180.0, 45.0);
+        let mut layout = layout(Orientation::LeftRight, end, vec![route]);
+        place(&plan, &mut layout);
+        let label = layout.labels(&plan).next().unwrap();
+        let touched = (0..=100).any(|k| {
+            let point = on_cubic([from, bend[0], bend[1], to], f64::from(k) / 100.0);
+            label.overlaps(&Rect::around(point, Size::new(1.0, 1.0)))
+        });
+        assert!(!touched, "{label:?}");
     }
 
     #[test]
