@@ -350,12 +350,11 @@ fn add(groups: &mut Groups, (place, phrase): (u8, Phrase), event: EventId) {
         ..phrase
     });
     for name in names {
-        match all.names.iter().position(|other| *other == name) {
-            Some(at) => all.events[at].push(event),
-            None => {
-                all.names.push(name);
-                all.events.push(vec![event]);
-            }
+        if let Some(at) = all.names.iter().position(|other| *other == name) {
+            all.events[at].push(event);
+        } else {
+            all.names.push(name);
+            all.events.push(vec![event]);
         }
     }
 }

@@ -171,12 +171,12 @@ fn join(changes: &mut Vec<Change>, group: &[usize]) {
         if other.phrase != all.phrase {
             // Their phrases have different words.
             all.phrase.lead.clear();
-            all.phrase.tail = match all.phrase.sign {
+            let tail = match all.phrase.sign {
                 '+' => "appear",
                 '−' => "end",
                 _ => "change",
-            }
-            .to_owned();
+            };
+            tail.clone_into(&mut all.phrase.tail);
         }
     }
     all.events.sort_unstable();
@@ -211,11 +211,11 @@ fn tell(frame: &mut Frame, changes: &[Change], view: &View) {
                 events: change.events.clone(),
             });
         }
-        let is_same = |last: &&mut Phrase| {
-            let [last, new] = [&**last, &change.phrase].map(|p| (p.sign, &p.lead, &p.tail));
-            last == new
+        let is_other = |last: &Phrase| {
+            let [last, new] = [last, &change.phrase].map(|p| (p.sign, &p.lead, &p.tail));
+            last != new
         };
-        if frame.caption.last_mut().filter(is_same).is_none() {
+        if frame.caption.last().is_none_or(is_other) {
             frame.caption.push(change.phrase.clone());
         }
         if let Some(phrase) = frame.caption.last_mut() {
