@@ -61,9 +61,9 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         labels::place(plan, &mut layout);
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
     };
-    let tries = orientations(options).into_par_iter().map(tried);
-    let tries: Vec<(f64, Layout)> = tries.collect();
-    let best = tries
+    let layouts = orientations(options).into_par_iter().map(tried);
+    let layouts: Vec<(f64, Layout)> = layouts.collect();
+    let best = layouts
         .into_iter()
         .reduce(|best, next| if next.0 > best.0 { next } else { best });
     let mut best = best.map_or_else(Layout::default, |best| best.1);
