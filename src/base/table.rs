@@ -257,32 +257,22 @@ impl TableColumn {
 
     /// Adds a cell; a cell of another kind than the column becomes unknown.
     pub(crate) fn push(&mut self, cell: &TableCell<'_>) {
-        let is_known = match (&mut self.values, cell) {
-            (ColumnValues::Flag(to), TableCell::Flag(value)) => {
-                to.push(*value);
-                true
-            }
+        let mut is_known = true;
+        match (&mut self.values, cell) {
+            (ColumnValues::Flag(to), TableCell::Flag(value)) => to.push(*value),
             (ColumnValues::I64(to), TableCell::Int(value) | TableCell::Time(Stamp(value))) => {
                 to.push(*value);
-                true
             }
             (ColumnValues::F64(to), TableCell::Float(value)) if value.is_finite() => {
                 to.push(*value);
-                true
             }
-            (ColumnValues::Texts(to), TableCell::Text(value)) => {
-                to.push(value.as_bytes());
-                true
-            }
-            (ColumnValues::Words(to), TableCell::Word(number)) => {
-                to.numbers.push(*number);
-                true
-            }
+            (ColumnValues::Texts(to), TableCell::Text(value)) => to.push(value.as_bytes()),
+            (ColumnValues::Words(to), TableCell::Word(number)) => to.numbers.push(*number),
             (other, _) => {
                 other.push_blank();
-                false
+                is_known = false;
             }
-        };
+        }
         if let Some(valid) = &mut self.valid {
             valid.push(is_known);
         }

@@ -141,6 +141,20 @@ impl FindingKind {
         row.map(|(kind, ..)| *kind)
     }
 
+    /// Whether it is about a node rather than a topic or several elements.
+    pub(crate) fn is_about_node(self) -> bool {
+        matches!(
+            self,
+            Self::NodeMissing
+                | Self::NodeGone
+                | Self::NodeForbidden
+                | Self::NodeLate
+                | Self::NodeRestarted
+                | Self::NodeLifecycle
+                | Self::UnexpectedNode
+        )
+    }
+
     /// All words.
     pub(crate) fn words() -> impl Iterator<Item = &'static str> + Clone {
         KINDS.iter().map(|(_, word, ..)| *word)

@@ -159,23 +159,26 @@ impl Work<'_> {
     /// Rewrites the fact that a finding is about; `name` is the entry's.
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
         let key = fact(finding.kind);
+        let (section, lines) = if finding.kind.is_about_node() {
+            ("nodes", &self.draft.nodes)
+        } else {
+            ("topics", &self.draft.topics)
+        };
         match finding.kind {
-            FindingKind::UnexpectedNode => {
-                let line = self.draft.nodes.get(name).map(Line::text);
-                self.insert("nodes", name, line)
+            FindingKind::UnexpectedNode | FindingKind::UnexpectedTopic => {
+                match lines.get(name).map(Line::text) {
+                    Some(line) => self.text.insert(section, name, &scalar(name), &line),
+                    None => Ok(()),
+                }
             }
-            FindingKind::UnexpectedTopic => {
-                let line = self.draft.topics.get(name).map(Line::text);
-                self.insert("topics", name, line)
+            // One that is in some of the runs is optional.
+            FindingKind::NodeMissing | FindingKind::TopicMissing if lines.contains_key(name) => {
+                self.text.set(section, name, "optional", "true")
             }
-            FindingKind::NodeMissing => {
-                self.lost("nodes", name, self.draft.nodes.contains_key(name))
-            }
-            FindingKind::TopicMissing => {
-                self.lost("topics", name, self.draft.topics.contains_key(name))
-            }
-            FindingKind::NodeForbidden => self.text.drop_entry("nodes", name),
-            FindingKind::TopicForbidden => self.text.drop_entry("topics", name),
+            FindingKind::NodeMissing
+            | FindingKind::TopicMissing
+            | FindingKind::NodeForbidden
+            | FindingKind::TopicForbidden => self.text.drop_entry(section, name),
             FindingKind::NodeGone
             | FindingKind::NodeLate
             | FindingKind::NodeRestarted
@@ -214,22 +217,6 @@ impl Work<'_> {
                 let value = self.of_topic(name, key);
                 self.write("topics", name, key, value)
             }
-        }
-    }
-
-    fn insert(&mut self, section: &str, name: &str, line: Option<String>) -> Result<(), BadYaml> {
-        match line {
-            Some(line) => self.text.insert(section, name, &scalar(name), &line),
-            None => Ok(()),
-        }
-    }
-
-    /// Removes an entry that is in no run, and makes one optional that is in some.
-    fn lost(&mut self, section: &str, name: &str, is_in_some: bool) -> Result<(), BadYaml> {
-        if is_in_some {
-            self.text.set(section, name, "optional", "true")
-        } else {
-            self.text.drop_entry(section, name)
         }
     }
 

@@ -62,17 +62,7 @@ fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxChange)> {
         }
         _ => BoxChange::Changed,
     };
-    let is_node = matches!(
-        finding.kind,
-        FindingKind::NodeMissing
-            | FindingKind::NodeGone
-            | FindingKind::NodeForbidden
-            | FindingKind::NodeLate
-            | FindingKind::NodeRestarted
-            | FindingKind::NodeLifecycle
-            | FindingKind::UnexpectedNode
-    );
-    Some(((!is_node, &finding.name), class))
+    Some(((!finding.kind.is_about_node(), &finding.name), class))
 }
 
 /// The text after the name in its box: the expected and the observed value.
