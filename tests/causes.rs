@@ -14,7 +14,7 @@ use crate::support::rosbag1::{Pack, write};
 use crate::support::{ORIGIN, Recording};
 
 /// The mission of a recording, with its payloads compared.
-fn mission(bag: &Recording) -> Mission {
+pub(crate) fn mission(bag: &Recording) -> Mission {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.bag");
     std::fs::write(&path, write(bag, Pack::None, 768 * 1024)).unwrap();
@@ -23,12 +23,12 @@ fn mission(bag: &Recording) -> Mission {
     read(&reading).unwrap()
 }
 
-fn shown(bag: &Recording) -> String {
+pub(crate) fn shown(bag: &Recording) -> String {
     log(&mission(bag), LogFormat::Text, LogOptions::default())
 }
 
 /// A minute in which one node sends to the end, and others send ten times a second from one second to another.
-fn minute(senders: &[(&str, &str, i64, i64)]) -> Recording {
+pub(crate) fn minute(senders: &[(&str, &str, i64, i64)]) -> Recording {
     let mut bag = Recording::default();
     let all = [("/base", "/beat", 0, 60)];
     for (node, topic, from, to) in all.iter().chain(senders) {
@@ -38,7 +38,7 @@ fn minute(senders: &[(&str, &str, i64, i64)]) -> Recording {
     bag
 }
 
-fn at(bag: &mut Recording, publisher: usize, second: i64, payload: Vec<u8>) {
+pub(crate) fn at(bag: &mut Recording, publisher: usize, second: i64, payload: Vec<u8>) {
     let time = ORIGIN + second * 1_000_000_000;
     bag.messages.push((publisher, time, payload));
 }

@@ -5,9 +5,10 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::causes::{at, minute, shown};
 use crate::pairs::loaded;
 use crate::support::rosbag1::{Pack, write};
-use crate::support::shared;
+use crate::support::{ORIGIN, shared};
 
 const MILLISECOND: i64 = 1_000_000;
 
@@ -98,4 +99,28 @@ fn a_first_log_record_in_a_rewritten_bag_is_no_start() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("/robot1/planner started"), "{text}");
     assert!(!text.contains("lifecycle_manager started"), "{text}");
+}
+
+#[test]
+fn a_slow_topic_with_the_same_gap_does_not_hide_a_restart() {
+    let mut bag = minute(&[]);
+    let scan = bag.publisher("/lidar", "/scan", "test/Scan");
+    "Header header\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+        .clone_into(&mut bag.publishers[scan].definition);
+    for (from, to) in [(0, 25_000), (49_000, 60_000)] {
+        for (number, millisecond) in (1_u32..).zip((from..to).step_by(100)) {
+            let mut payload = number.to_le_bytes().to_vec();
+            payload.extend([0; 12]);
+            let time = ORIGIN + millisecond * MILLISECOND;
+            bag.messages.push((scan, time, payload));
+        }
+    }
+    // Beside it, an interval of 24 s is only 5 usual ones, those before it; over all, the usual one is 2 s.
+    let rare = bag.publisher("/lidar", "/rare", "std_msgs/Empty");
+    for second in [1, 3, 5, 7, 8, 13, 18, 23, 24, 50, 52, 54, 56, 58, 60] {
+        at(&mut bag, rare, second, Vec::new());
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let text = shown(&bag);
+    assert!(text.contains("/lidar restarted"), "{text}");
 }

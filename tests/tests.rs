@@ -45,6 +45,7 @@ mod remote;
 mod restarts;
 mod ros2_example;
 mod source;
+mod starts;
 mod story;
 mod support;
 mod tables;

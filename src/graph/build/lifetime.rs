@@ -73,8 +73,14 @@ impl Lifetime {
     }
 
     /// Sets the beginning of an edge's first lifetime inside its node's; `absent` is the first moment at
-    /// which it may exist, if known.
-    pub(super) fn begin_within(&mut self, around: &Self, absent: Option<Stamp>, stated: bool) {
+    /// which it may exist, if known. A first message that is not due earlier (`is_due`) is not a beginning.
+    pub(super) fn begin_within(
+        &mut self,
+        around: &Self,
+        absent: Option<Stamp>,
+        stated: bool,
+        is_due: bool,
+    ) {
         let registered = around.from.plus(REGISTRATION_NS);
         match absent {
             Some(absent) => {
@@ -85,7 +91,7 @@ impl Lifetime {
                     began.earliest = absent;
                 }
             }
-            None if stated || self.from.since(around.sign) <= ADVERTISED_NS => {
+            None if stated || is_due || self.from.since(around.sign) <= ADVERTISED_NS => {
                 (self.from, self.began) = (around.from, around.began);
             }
             None => {

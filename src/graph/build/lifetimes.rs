@@ -100,7 +100,7 @@ fn add(all: &mut Vec<Lifetime>, lives: &[Lifetime]) {
     }
 }
 
-/// Gives elements the lifetimes of others, either topics or not.
+/// Gives elements the lifetimes of others, either topics or not; those with signs of their own, the beginnings.
 fn live_like(
     tracks: &mut Tracks,
     likes: &[(ElementKey, ElementKey)],
@@ -111,10 +111,13 @@ fn live_like(
         if matches!(other, ElementKey::Topic(_)) == topics
             && let Some(lives) = tracks.get(other).map(|t| Rc::clone(&t.lives))
             && let Some(track) = tracks.get_mut(what)
-            && track.signs.is_empty()
         {
-            given(*what, &lives);
-            track.lives = lives;
+            if track.signs.is_empty() {
+                track.lives = lives;
+            } else if !track.begin_with(&lives) {
+                continue;
+            }
+            given(*what, &track.lives);
         }
     }
 }

@@ -115,6 +115,8 @@ pub(crate) struct Messages {
     pub(crate) pulses: Vec<Pulse>,
     /// The first and the last moment of their recordings; `None` for the whole mission.
     pub(crate) recording: Option<(Stamp, Stamp)>,
+    /// The time until which the first message is due if they are sent from the start of the recording.
+    pub(crate) due: Option<Stamp>,
     /// The number of their senders, and of those that are latched.
     pub(crate) senders: (u32, u32),
 }
@@ -342,7 +344,9 @@ impl Liveness {
                 let absent = absent.filter(|at| *at > around.from);
                 let stated = self.stated.binary_search(&first.from).is_ok();
                 let dated = absent.is_some() && self.counted.contains(&first.from);
-                first.begin_within(around, absent, stated && !dated);
+                let due = self.messages.as_ref().and_then(|m| m.due);
+                let is_due = around.began.is_none() && due.is_some_and(|due| first.from <= due);
+                first.begin_within(around, absent, stated && !dated, is_due);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
                 let end = self.end(around.to, false).filter(|_| !self.lasts);
@@ -356,6 +360,27 @@ impl Liveness {
             }
         }
         self.lives = Rc::new(own);
+    }
+
+    /// Dates its beginnings back to those of an element without which it does not exist, unless it is known to be absent
+    /// between them: messages may come later. Returns whether there is one.
+    pub(crate) fn begin_with(&mut self, others: &[Lifetime]) -> bool {
+        let mut is_earlier = false;
+        let mut until = Stamp::MIN;
+        for life in Rc::make_mut(&mut self.lives) {
+            let around = |o: &&Lifetime| o.from < life.from && life.from <= o.to;
+            if let Some(other) = others.iter().find(around).filter(|o| until < o.from)
+                && !self
+                    .ends
+                    .iter()
+                    .any(|end| other.from <= *end && *end < life.from)
+            {
+                (life.from, life.began) = (other.from, other.began);
+                is_earlier = true;
+            }
+            until = life.to;
+        }
+        is_earlier
     }
 
     /// The end of the last of several edges: this one, and others that ended at `last`; `None` if nothing

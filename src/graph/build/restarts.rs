@@ -39,6 +39,47 @@ struct Own<'a> {
     streams: Vec<usize>,
 }
 
+/// What a stream shows about a gap in another one.
+enum Pace {
+    /// Nothing: it is too slow, or has no messages on both sides.
+    None,
+    /// Its usual interval is so short that it cannot contain the gap.
+    Fast,
+    /// It has messages on both sides, and perhaps between them.
+    Slow,
+}
+
+impl Own<'_> {
+    /// What this stream shows about a gap.
+    fn pace(&self, (from, to): (Stamp, Stamp)) -> Pace {
+        let middle = middle((from, to));
+        let spans = |s: &&Stretch| s.first < middle && middle < s.last;
+        let mut spanning = self.sender.stretches.iter().filter(spans);
+        let Some(period) = spanning.next().map(|s| s.period) else {
+            return Pace::None;
+        };
+        let is_below = |times: i64| period.saturating_mul(times) < to.since(from);
+        match () {
+            () if is_below(GAP * GAP) => Pace::Fast,
+            () if is_below(GAP) => Pace::Slow,
+            () => Pace::None,
+        }
+    }
+
+    /// The times of its messages, sorted.
+    fn times(&self, recorded: &Recorded) -> io::Result<Vec<Stamp>> {
+        let of = |at: &usize| recorded.messages.times(recorded.streams[*at].times);
+        let mut times = self
+            .streams
+            .iter()
+            .map(of)
+            .collect::<io::Result<Vec<_>>>()?
+            .concat();
+        times.sort_unstable();
+        Ok(times)
+    }
+}
+
 /// The streams of each publisher with a reliable name.
 fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, Vec<Own<'a>>> {
     let mut of: BTreeMap<Name, Vec<Own<'a>>> = BTreeMap::new();
@@ -62,20 +103,40 @@ fn own_streams<'a>(findings: &Findings, traffic: &'a Traffic) -> BTreeMap<Name, 
 }
 
 /// The gaps in any of a node's streams during which none of its other streams continued.
-fn gaps(own: &[Own<'_>]) -> BTreeSet<(Stamp, Stamp)> {
-    let went_on = |(from, to): (Stamp, Stamp)| {
-        let middle = middle((from, to));
-        // The messages of a slow one may lie on both sides.
-        let is_fast = |s: &Stretch| s.period.saturating_mul(GAP) < to.since(from);
-        let is_in_it = |s: &Stretch| s.first < middle && middle < s.last && is_fast(s);
-        let all = own.iter().map(|own| own.sender);
-        all.flat_map(|sender| &sender.stretches).any(is_in_it)
-    };
+fn gaps(recorded: &Recorded, own: &[Own<'_>]) -> io::Result<BTreeSet<(Stamp, Stamp)>> {
     let steady = own.iter().filter(|own| !own.sender.latched);
     let pairs = steady.flat_map(|own| own.sender.stretches.windows(2));
     let apart = pairs.filter(|pair| !pair[1].is_joined);
-    let gaps = apart.map(|pair| (pair[0].last, pair[1].first));
-    gaps.filter(|gap| !went_on(*gap)).collect()
+    let mut gaps: BTreeSet<_> = apart.map(|pair| (pair[0].last, pair[1].first)).collect();
+    for one in own {
+        // Read on demand, and only for streams with few messages.
+        let mut times = None;
+        let mut open = BTreeSet::new();
+        for gap in gaps {
+            let went_on = match one.pace(gap) {
+                Pace::None => false,
+                Pace::Fast => true,
+                Pace::Slow => {
+                    if times.is_none() {
+                        times = Some(one.times(recorded)?);
+                    }
+                    is_in_middle(times.as_deref().unwrap_or_default(), gap)
+                }
+            };
+            if !went_on {
+                open.insert(gap);
+            }
+        }
+        gaps = open;
+    }
+    Ok(gaps)
+}
+
+/// Whether one of these times lies in the middle half of a gap.
+fn is_in_middle(times: &[Stamp], (from, to): (Stamp, Stamp)) -> bool {
+    let edge = to.since(from) / 4;
+    let next = times.partition_point(|time| *time < from.plus(edge));
+    times.get(next).is_some_and(|time| *time <= to.plus(-edge))
 }
 
 fn middle((from, to): (Stamp, Stamp)) -> Stamp {
@@ -127,7 +188,7 @@ pub(crate) fn unread(
         if own.iter().all(is_known) {
             continue;
         }
-        let gaps = gaps(own);
+        let gaps = gaps(recorded, own).map_err(spool_error)?;
         for one in own.iter().filter(|one| !gaps.is_empty() && !is_known(one)) {
             let streams = numbered(recorded, one).map_err(spool_error)?;
             let around = gaps.iter().filter_map(|gap| around_all(&streams, *gap));
@@ -246,7 +307,7 @@ fn falls_of(
     own: &[Own<'_>],
 ) -> io::Result<Vec<Fall>> {
     let mut falls = Vec::new();
-    let gaps = gaps(own);
+    let gaps = gaps(recorded, own)?;
     for one in own {
         if findings.copies.contains(&(node, one.topic)) {
             continue;

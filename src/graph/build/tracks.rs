@@ -6,7 +6,8 @@ use std::io;
 use super::liveness::{Extent, Liveness, Pulse};
 use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
-use crate::base::rhythm::broken_after;
+use crate::base::name::lies_in;
+use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
@@ -40,7 +41,8 @@ pub(crate) fn tracks(
         .iter()
         .filter(|s| s.connection.topic.as_str() != "/rosout");
     let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
-    let starved = starved(findings, traffic);
+    let forwarded = forwarded(findings, traffic);
+    let asked = asked(findings, traffic);
     let inferences = std::mem::take(&mut findings.inferences);
     let findings = &*findings;
     for inference in inferences {
@@ -61,10 +63,14 @@ pub(crate) fn tracks(
                     continue;
                 };
                 let place = senders.streams.iter().position(|s| s == at).unwrap_or(0);
+                let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
+                let (with_start, with_end) = with.copied().unwrap_or_default();
+                let is_log = stream.connection.topic.as_str() == "/rosout";
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
-                    beats: stream.connection.topic.as_str() != "/rosout"
-                        && node.is_none_or(|node| !starved.contains(&(node, stream.topic))),
+                    begins: !is_log && !with_start,
+                    beats: !is_log && !with_end,
+                    asked: node.and_then(|node| asked.get(&node)).copied(),
                     restarts: own,
                 };
                 follow(track, senders, place, &what);
@@ -118,38 +124,64 @@ pub(crate) fn tracks(
     Ok((tracks, likes))
 }
 
-/// The publications, as node and topic, that forward the messages of others and end with these: their end
-/// says nothing about the node.
-fn starved(findings: &Findings, traffic: &Traffic) -> BTreeSet<(Name, Name)> {
-    let last = |topic: &Name, node: Option<Name>| {
+/// The publications, as node and topic, that forward the messages of others, and whether they begin and end with
+/// these: then that says nothing about the node.
+fn forwarded(findings: &Findings, traffic: &Traffic) -> BTreeMap<(Name, Name), (bool, bool)> {
+    let bounds = |topic: &Name, node: Option<Name>| {
         let senders = traffic.get(topic).into_iter().flat_map(|of| &of.list);
         let own = senders.filter(|s| node.is_none() || s.node == node);
-        own.filter_map(|s| s.stretches.last().map(|s| (s.last, s.period)))
-            .max()
+        let stretches = || own.clone().flat_map(|s| &s.stretches);
+        let first = stretches().map(|s| (s.first, s.period)).min();
+        first.zip(stretches().map(|s| (s.last, s.period)).max())
     };
     let kind = |topic: Name| {
         let stream = findings.streams.iter().find(|s| s.topic == topic);
         stream.map(|s| &s.connection.type_name)
     };
-    let is_starved = |(node, topic): &&(Name, Name)| {
+    let ends = |&(node, topic): &(Name, Name)| {
         let inputs = findings
             .inferences
             .iter()
             .filter_map(|inference| match inference.what {
-                ElementKey::Subscribe(input, of) if of == *node && input != *topic => Some(input),
+                ElementKey::Subscribe(input, of) if of == node && input != topic => Some(input),
                 _ => None,
             });
-        let inputs: BTreeSet<Name> = inputs
-            .filter(|input| kind(*input) == kind(*topic))
-            .collect();
-        let own = last(topic, Some(*node));
-        let goes_on = |input: &Name| {
-            let sent = last(input, None).zip(own);
-            sent.is_some_and(|((input, _), (own, period))| input.since(own) > broken_after(period))
-        };
-        !inputs.is_empty() && !inputs.iter().any(goes_on)
+        let inputs: BTreeSet<Name> = inputs.filter(|input| kind(*input) == kind(topic)).collect();
+        let inputs = || inputs.iter().filter_map(|input| bounds(input, None));
+        let ((first, early), (last, late)) = bounds(&topic, Some(node))?;
+        inputs().next()?;
+        let began = inputs().any(|((input, _), _)| first.since(input) > broken_after(early));
+        let goes_on = inputs().any(|(_, (input, _))| input.since(last) > broken_after(late));
+        Some(((node, topic), (!began, !goes_on)))
     };
-    findings.copies.iter().filter(is_starved).copied().collect()
+    findings.copies.iter().filter_map(ends).collect()
+}
+
+/// When others sent the first message to each node, on a topic below its name: what it sends at once is the answer
+/// of a node that was there.
+fn asked(findings: &Findings, traffic: &Traffic) -> BTreeMap<Name, Stamp> {
+    let senders = || traffic.values().flat_map(|of| &of.list);
+    let nodes: BTreeMap<_, Name> = senders()
+        .filter_map(|sender| sender.node)
+        .map(|node| (findings.text(node), node))
+        .collect();
+    let mut asked = BTreeMap::new();
+    for (topic, of) in traffic {
+        let name = format!("/{}", findings.text(*topic).trim_start_matches('/'));
+        let Some((space, _)) = name.rsplit_once('/') else {
+            continue;
+        };
+        let owner = nodes.get(space).filter(|_| lies_in(&name, space));
+        let others = of.list.iter().filter(|s| s.node.as_ref() != owner);
+        let first = others
+            .filter_map(|s| Some(s.stretches.first()?.first))
+            .min();
+        if let Some((owner, first)) = owner.zip(first) {
+            let known = asked.entry(*owner).or_insert(first);
+            *known = first.min(*known);
+        }
+    }
+    asked
 }
 
 /// The confidence of an inference: a connection without messages in the time that is read is only declared by
@@ -208,8 +240,11 @@ const LATCHED: u64 = 20;
 struct Followed<'a> {
     /// Whether it belongs to a topic with known senders: the topic exists as long as its publications.
     known: bool,
-    /// Whether its rhythm shows that its sender exists, which has no log records.
+    /// Whether its beginning and its rhythm show when its sender exists, which has no log records.
+    begins: bool,
     beats: bool,
+    /// When its sender got the first message of its own.
+    asked: Option<Stamp>,
     restarts: &'a [Restart],
 }
 
@@ -231,13 +266,19 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
         return;
     }
     track.signs.extend([first, last]);
-    // A recorder receives a latched message as soon as it finds the topic, so the sender began about then.
-    if what.beats && (latched || begins_steadily(&sender.stretches)) {
+    // A recorder receives a latched message as soon as it finds the topic, so the sender began about then, unless the
+    // first one recorded may be a repetition.
+    let period = sender.stretches.first().map_or(0, |s| s.period);
+    let due = sender.recording.0.plus(FOUND_NS.saturating_add(period));
+    let answers = |asked: Stamp| (0..=CROWD_NS).contains(&first.since(asked));
+    let is_proof = what.begins && first > due && !what.asked.is_some_and(answers);
+    if is_proof && (latched || begins_steadily(&sender.stretches)) {
         track.begins.push(first);
     }
     track.last_sign = track.last_sign.max(Some(last));
     let messages = track.messages();
     messages.reach(Some(sender.recording));
+    messages.due = messages.due.max(Some(due));
     let pulse = Pulse::of(&sender.stretches, what.restarts);
     let pulse = pulse.filter(|_| what.beats && !latched);
     messages.pulses.extend(pulse);

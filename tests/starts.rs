@@ -1,0 +1,90 @@
+//! Tests that only what proves an earlier absence is a start.
+
+use crate::causes::{at, minute, shown};
+use crate::support::{ORIGIN, Recording};
+
+fn sorted(mut bag: Recording) -> String {
+    bag.messages.sort_by_key(|m| m.1);
+    shown(&bag)
+}
+
+/// A minute in which a node publishes a latched message at these seconds.
+fn latched(seconds: impl IntoIterator<Item = i64>) -> String {
+    let mut bag = minute(&[]);
+    let map = bag.publisher("/map_server", "/map", "std_msgs/String");
+    bag.publishers[map].latching = true;
+    for second in seconds {
+        at(&mut bag, map, second, vec![7; 30]);
+    }
+    sorted(bag)
+}
+
+#[test]
+fn a_latched_message_that_may_be_a_repetition_is_no_start() {
+    assert!(latched([8]).contains("/map_server started"));
+    assert_eq!(latched((4..60).step_by(5)), "");
+    assert!(latched((14..60).step_by(5)).contains("/map_server started"));
+}
+
+#[test]
+fn a_first_message_within_its_period_is_no_beginning() {
+    let text = |late: i64| {
+        let mut bag = minute(&[]);
+        for (topic, first) in [("/wake", 0), ("/sleep", late)] {
+            let place = bag.publisher("/cycle", topic, "std_msgs/Empty");
+            bag.send(place, (first, 60_000), 7_000, &[]);
+        }
+        sorted(bag)
+    };
+    assert_eq!(text(6_900), "");
+    assert!(text(20_900).contains("/cycle → /sleep appeared"));
+}
+
+#[test]
+fn the_start_of_an_input_is_not_that_of_its_relay() {
+    let text = |camera: i64, relay: i64| {
+        let mut bag = minute(&[]);
+        let image = bag.publisher("/camera", "/image", "std_msgs/String");
+        let again = bag.publisher("/relay", "/again", "std_msgs/String");
+        for tenth in camera * 10..600 {
+            let payload = (1000 + tenth).to_string().into_bytes();
+            let time = ORIGIN + tenth * 100_000_000;
+            bag.messages.push((image, time, payload.clone()));
+            if tenth >= relay * 10 {
+                bag.messages.push((again, time + 1_000_000, payload));
+            }
+        }
+        sorted(bag)
+    };
+    let both = text(20, 20);
+    assert!(both.contains("/camera started"), "{both}");
+    assert!(!both.contains("/relay started"), "{both}");
+    let later = text(0, 20);
+    assert!(later.contains("/relay started"), "{later}");
+}
+
+#[test]
+fn a_node_that_answers_at_once_was_there() {
+    let text = |topic: &str| {
+        let mut bag = minute(&[]);
+        let goal = bag.publisher("/client", topic, "std_msgs/String");
+        at(&mut bag, goal, 20, b"\x02\0\0\0go".to_vec());
+        let speed = bag.publisher("/nav", "/speed", "std_msgs/Empty");
+        bag.send(speed, (20_300, 60_000), 100, &[]);
+        sorted(bag)
+    };
+    assert!(text("/other/goal").contains("/nav started"));
+    for topic in ["/nav/goal", "nav/goal"] {
+        assert!(!text(topic).contains("/nav started"), "{topic}");
+    }
+}
+
+#[test]
+fn an_action_server_offers_its_feedback_from_the_start() {
+    let mut bag = minute(&[]);
+    let status = bag.publisher("/arm", "/lift/status", "actionlib_msgs/GoalStatusArray");
+    bag.send(status, (0, 60_000), 200, &[]);
+    let feedback = bag.publisher("/arm", "/lift/feedback", "std_msgs/Empty");
+    bag.send(feedback, (30_000, 60_000), 1_000, &[]);
+    assert_eq!(sorted(bag), "");
+}
