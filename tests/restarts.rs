@@ -104,10 +104,11 @@ fn a_first_log_record_in_a_rewritten_bag_is_no_start() {
 #[test]
 fn a_slow_topic_with_the_same_gap_does_not_hide_a_restart() {
     let mut bag = minute(&[]);
+    bag.send(0, (60_000, 210_000), 100, &[]);
     let scan = bag.publisher("/lidar", "/scan", "test/Scan");
     "Header header\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
         .clone_into(&mut bag.publishers[scan].definition);
-    for (from, to) in [(0, 25_000), (49_000, 60_000)] {
+    for (from, to) in [(0, 116_000), (143_000, 210_000)] {
         for (number, millisecond) in (1_u32..).zip((from..to).step_by(100)) {
             let mut payload = number.to_le_bytes().to_vec();
             payload.extend([0; 12]);
@@ -115,10 +116,14 @@ fn a_slow_topic_with_the_same_gap_does_not_hide_a_restart() {
             bag.messages.push((scan, time, payload));
         }
     }
-    // Beside it, an interval of 24 s is only 5 usual ones, those before it; over all, the usual one is 2 s.
+    // The interval of 27 s is less than 5 of those before it, but nearly 7 usual ones.
     let rare = bag.publisher("/lidar", "/rare", "std_msgs/Empty");
-    for second in [1, 3, 5, 7, 8, 13, 18, 23, 24, 50, 52, 54, 56, 58, 60] {
+    let mixed = [4, 8, 4, 4, 8, 4, 8, 4, 4, 8, 4];
+    let longer = [8, 4, 8, 4, 8, 8, 4, 8, 4];
+    let mut second = 0;
+    for apart in [&mixed[..], &longer, &[27], &mixed].concat() {
         at(&mut bag, rare, second, Vec::new());
+        second += apart;
     }
     bag.messages.sort_by_key(|m| m.1);
     let text = shown(&bag);
