@@ -266,6 +266,21 @@ fn clock_faults_are_attributed_to_the_recorder() {
 }
 
 #[test]
+fn a_jump_of_years_is_no_silence() {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "std_msgs/Empty");
+    for start in [0, 700 * 86_400_000] {
+        bag.send(scan, (start, start + 20_000), 1_000, &[]);
+    }
+    let text = shown("jump", &[bag]);
+    assert!(
+        text.contains("nothing_recorded at 19 s: 60479981.0 s"),
+        "{text}"
+    );
+    assert!(!text.contains("silent"), "{text}");
+}
+
+#[test]
 fn two_robots_with_the_same_names_are_distinguished_by_a_namespace() {
     let healthy = Healthy::new();
     let alone = mission(&[healthy.copy(|_, at| Some(at))], |_, _| {});

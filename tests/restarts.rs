@@ -129,3 +129,12 @@ fn a_slow_topic_with_the_same_gap_does_not_hide_a_restart() {
     let text = shown(&bag);
     assert!(text.contains("/lidar restarted"), "{text}");
 }
+
+#[test]
+fn the_last_goal_in_a_status_is_no_sign_of_its_client() {
+    if let Some(bag) = shared("data/bags/fibonacci/fibonacci_namespaces.bag") {
+        // The numbers of the clients' log records start over before each goal.
+        let found = restarts(&[bag], Stdio::null());
+        assert_eq!(found.len(), 4, "{found:?}");
+    }
+}

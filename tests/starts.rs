@@ -1,4 +1,4 @@
-//! Tests that only what proves an earlier absence is a start.
+//! Tests of what shows a start or an end, and what does not.
 
 use crate::causes::{at, minute, shown};
 use crate::support::{ORIGIN, Recording};
@@ -87,4 +87,32 @@ fn an_action_server_offers_its_feedback_from_the_start() {
     let feedback = bag.publisher("/arm", "/lift/feedback", "std_msgs/Empty");
     bag.send(feedback, (30_000, 60_000), 1_000, &[]);
     assert_eq!(sorted(bag), "");
+}
+
+#[test]
+fn the_feedback_of_an_action_is_no_rhythm() {
+    let mut bag = minute(&[]);
+    let feedback = bag.publisher("/arm", "/lift/feedback", "std_msgs/Empty");
+    for span in [(10_000, 25_000), (40_000, 45_000)] {
+        bag.send(feedback, span, 500, &[]);
+    }
+    assert_eq!(sorted(bag), "");
+}
+
+#[test]
+fn a_pause_of_the_recorder_does_not_hide_an_end() {
+    let mut bag = Recording::default();
+    for (node, end) in [
+        ("/a", 45_000),
+        ("/b", 60_000),
+        ("/c", 60_000),
+        ("/d", 60_000),
+    ] {
+        let place = bag.publisher(node, &format!("{node}/beat"), "std_msgs/Empty");
+        bag.send(place, (0, 20_000), 100, &[]);
+        bag.send(place, (30_000, end), 100, &[]);
+    }
+    let text = sorted(bag);
+    assert!(text.contains("nothing was recorded for 10.1 s"), "{text}");
+    assert!(text.contains("/a stopped"), "{text}");
 }

@@ -30,6 +30,8 @@ struct Line {
     /// The last time in this run, and in the possible new run.
     last: Option<Stamp>,
     next: Option<Stamp>,
+    /// Whether its time went back where that run may have begun; `None` if that is not known.
+    fell: Option<bool>,
 }
 
 /// A run that may have begun.
@@ -41,6 +43,8 @@ struct Suspect {
     messages: u64,
     /// Whether time has passed the point from which it went back.
     is_past: bool,
+    /// Whether the part of the file is not over in which it began.
+    is_in_part: bool,
 }
 
 /// A sink that detects seams.
@@ -75,16 +79,29 @@ impl<'a> Watched<'a> {
         let line = &mut self.lines[at];
         if let Some(suspect) = &mut self.suspect {
             suspect.messages += 1;
-            if suspect.seam.after.since(time) <= OUT_OF_ORDER_NS {
-                suspect.seam.after = suspect.seam.after.min(time);
-            }
-            if let (Some(last), None) = (line.last, line.next) {
+            let latest = line.last.max(line.next);
+            let falls = latest.is_some_and(|latest| latest.since(time) > OUT_OF_ORDER_NS);
+            if suspect.is_in_part && line.next.is_some() && falls && line.fell != Some(true) {
+                // An index lists one connection after the other: those before were still of the previous run.
+                suspect.went_on -= u64::from(line.fell == Some(false));
+                suspect.fell += 1;
+                suspect.is_past = false;
+                suspect.seam.counts[at] = line.count;
+                suspect.seam.before = suspect.seam.before.max(latest.unwrap_or(Stamp::MIN));
+                (line.last, line.next, line.fell) = (latest, None, Some(true));
+            } else if let (Some(last), None) = (line.last, line.next) {
                 // Connections that were silent recently may continue after the step as if nothing had
                 // happened.
                 let would_fall = last.since(suspect.seam.after) > OUT_OF_ORDER_NS;
                 let fell = last.since(time) > OUT_OF_ORDER_NS;
                 suspect.fell += u64::from(would_fall && fell);
-                suspect.went_on += u64::from(would_fall && !fell);
+                // A rare one may have had a message just before the step.
+                suspect.went_on += u64::from(would_fall && last <= time);
+                line.fell = would_fall.then_some(fell);
+            }
+            let is_behind = !suspect.is_in_part || line.fell == Some(true);
+            if is_behind && suspect.seam.after.since(time) <= OUT_OF_ORDER_NS {
+                suspect.seam.after = suspect.seam.after.min(time);
             }
             line.next = Some(line.next.map_or(time, |next| next.max(time)));
             suspect.is_past |= time >= suspect.seam.before;
@@ -105,6 +122,7 @@ impl<'a> Watched<'a> {
                 went_on: 0,
                 messages: 0,
                 is_past: false,
+                is_in_part: true,
             });
             return self.watch(at, time);
         }
@@ -126,6 +144,7 @@ impl<'a> Watched<'a> {
         let is_run = most && suspect.messages >= RUN_FEWEST;
         for line in &mut self.lines {
             let next = line.next.take();
+            line.fell = None;
             line.last = if is_run { next } else { line.last.max(next) };
         }
         let lasts = self.lines.iter().filter_map(|line| line.last);
@@ -146,6 +165,9 @@ impl Sink for Watched<'_> {
 
     fn part(&mut self) {
         self.decide(false);
+        if let Some(suspect) = &mut self.suspect {
+            suspect.is_in_part = false;
+        }
         for at in self.touched.drain(..) {
             self.lines[at].before_part = self.lines[at].count;
         }
@@ -309,6 +331,37 @@ mod tests {
         feed(parts, &mut moved);
         assert_eq!(kept.0[0], (0..60).chain(59..109).collect::<Vec<_>>());
         assert_eq!(kept.0[1], [0, 30, 77]);
+    }
+
+    #[test]
+    fn a_run_begins_within_a_part_that_lists_one_connection_after_the_other() {
+        let both = |last, again| (0..last).chain(again..90).collect();
+        let parts: Parts<'_> = &[&[(0, both(60, 40)), (1, both(61, 41)), (2, vec![5, 55, 45])]];
+        let found = seams(parts);
+        let mut kept = Kept::default();
+        let mut moved = Straightened::new(&found, &mut kept);
+        moved.counts.resize(3, [0; 2]);
+        feed(parts, &mut moved);
+        assert_eq!(found.len(), 1);
+        assert_eq!(kept.0[0], (0..60).chain(60..110).collect::<Vec<_>>());
+        assert_eq!(kept.0[2], [5, 55, 65]);
+    }
+
+    #[test]
+    fn a_rare_message_just_before_a_step_does_not_hide_it() {
+        let parts: Parts<'_> = &[
+            &[
+                (0, (0..60).collect()),
+                (1, (0..60).collect()),
+                (2, vec![10, 42]),
+            ],
+            &[
+                (0, (40..90).collect()),
+                (1, (40..90).collect()),
+                (2, vec![41]),
+            ],
+        ];
+        assert_eq!(seams(parts).len(), 1);
     }
 
     #[test]

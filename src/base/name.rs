@@ -146,6 +146,12 @@ pub fn is_quiet(name: &str) -> bool {
         || name.starts_with("/events/")
 }
 
+/// Whether a topic is the feedback of an action: its rhythm says nothing about the server, which sends it while there is
+/// a goal.
+pub(crate) fn is_feedback(topic: &str) -> bool {
+    topic.ends_with("/feedback")
+}
+
 fn is_numbered(name: &str, prefix: &str) -> bool {
     let number = name.strip_prefix(prefix);
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))

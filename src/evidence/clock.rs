@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 
-const DAY: i64 = 86_400_000_000_000;
+pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others.
-const FAR_DAYS: i64 = 365;
+pub(crate) const FAR_DAYS: i64 = 365;
 /// The most far messages that are set aside, as one in so many messages.
 const RARE: u64 = 10;
 /// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot

@@ -221,9 +221,21 @@ pub(crate) struct Transition {
     pub(crate) state: Arc<str>,
 }
 
-/// The silences of a sender with a rhythm during its lifetimes (`lives`, half-open): from the last message to
-/// the next, or `None` if there is none. A sender of bursts is never silent.
-pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+/// Whether most of a silence lies in pauses of the recording.
+pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool {
+    let Some(to) = to else { return false };
+    let silence = Span::new(from, to);
+    let shared = pauses.iter().map(|pause| pause.shared(silence).max(0));
+    shared.sum::<i64>() > silence.nanos() / 2
+}
+
+/// The silences of a sender with a rhythm during its lifetimes (`lives`, half-open) and not in pauses of the recording:
+/// from the last message to the next, or `None` if there is none. A sender of bursts is never silent.
+pub(crate) fn silences(
+    stretches: &[Stretch],
+    lives: &[Span],
+    pauses: &[Span],
+) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found = Vec::new();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
@@ -231,6 +243,9 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
         let mut longest = 0;
         for (at, stretch) in own.iter().enumerate() {
             let next = own.get(at + 1).map(|next| next.first);
+            if hide(pauses, (stretch.last, next)) {
+                continue;
+            }
             let silence = next.unwrap_or(life.end).since(stretch.last);
             let usual = broken_after(stretch.period).max(LONGER.saturating_mul(longest));
             let long = silence > usual;
@@ -252,10 +267,14 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
 }
 
 /// The times at which all of several senders are silent, if at least one has a rhythm that stopped.
-pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+pub(crate) fn all_silent(
+    senders: &[&[Stretch]],
+    lives: &[Span],
+    pauses: &[Span],
+) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for sender in senders {
-        found.extend(silences(sender, lives));
+        found.extend(silences(sender, lives, pauses));
     }
     found.sort_unstable();
     let mut all: Vec<(Stamp, Option<Stamp>)> = Vec::new();

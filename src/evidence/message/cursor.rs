@@ -234,11 +234,17 @@ impl<'a> PayloadCursor<'a> {
 
     /// Skips a `std_msgs/Header`, which begins with a sequence number in ROS 1.
     pub(crate) fn header(&mut self) -> PayloadResult<()> {
+        self.stamp().map(|_| ())
+    }
+
+    /// The stamp of a header, which is skipped.
+    pub(crate) fn stamp(&mut self) -> PayloadResult<Stamp> {
         if !self.is_cdr() {
             self.u32()?;
         }
-        self.time()?;
-        self.skip_string()
+        let stamp = self.time()?;
+        self.skip_string()?;
+        Ok(stamp)
     }
 }
 

@@ -22,16 +22,26 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     ],
 };
 
+/// The states of goals that their clients wait for: pending, active, preempting, recalling.
+const OPEN: [u8; 4] = [0, 1, 6, 7];
+/// The time after a goal was sent in which it shows its client in any state, in nanoseconds: a short one is done before
+/// the next status.
+const JUST_NS: i64 = 1_000_000_000;
+
 pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    payload.header()?;
+    let now = payload.stamp()?;
     let mut ids = Vec::new();
     for _ in 0..payload.length(17)? {
-        payload.time()?;
-        ids.push(payload.string()?);
-        payload.u8()?;
+        let sent = payload.time()?;
+        let id = payload.string()?;
+        // The last goal is listed until the next one, perhaps long after its client ended.
+        let is_open = OPEN.contains(&payload.u8()?);
+        if is_open || now.since(sent) <= JUST_NS {
+            ids.push(id);
+        }
         payload.skip_string()?;
     }
     payload.finish()?;

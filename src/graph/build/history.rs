@@ -9,7 +9,7 @@ use super::lifetime::Lifetime;
 use super::lifetimes::compute_lifetimes;
 use super::liveness::Liveness;
 use super::merged::fall_silent;
-use super::recordings::{doubled, hide, pauses, unseen};
+use super::recordings::{doubled, pauses, unseen};
 use super::restarts::restarts;
 use super::senders::{Sender as TopicSender, Traffic};
 use super::tracks::{Tracks, tracks};
@@ -142,11 +142,11 @@ fn of_elements(
 ) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let (mut tracks, likes) = tracks(recorded, findings, traffic, &restarts)?;
-    fall_silent(&mut tracks, traffic, findings);
-    compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);
     let mut pauses = pauses(traffic, &restarts, &findings.streams);
     pauses.extend(unseen(recorded, &findings.streams)?);
+    let (mut tracks, likes) = tracks(recorded, findings, traffic, (&restarts, &pauses))?;
+    fall_silent(&mut tracks, traffic, findings, &pauses);
+    compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);
     Ok(assembled(tracks, traffic, findings, (pauses, doubled)))
 }
 
@@ -409,9 +409,7 @@ impl Assembly<'_> {
     ) -> Vec<(Stamp, Option<Stamp>)> {
         let lives = TopicSender::within(senders.clone(), lives);
         let of: Vec<&[Stretch]> = senders.map(|sender| &sender.stretches[..]).collect();
-        let mut silent = all_silent(&of, &lives);
-        silent.retain(|silence| !hide(&self.history.pauses, *silence));
-        silent
+        all_silent(&of, &lives, &self.history.pauses)
     }
 }
 

@@ -8,9 +8,9 @@ use super::restarts::Restart;
 use crate::base::rhythm::{
     ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, GONE_NS, SHUTDOWN_NS, UNUSUAL,
 };
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::{Bound, Stretch};
+use crate::graph::history::{Bound, Stretch, hide};
 
 /// The extent of a lifetime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,15 +36,20 @@ pub(crate) struct Pulse {
 }
 
 impl Pulse {
-    /// The rhythm of a sender, if it has one.
-    pub(crate) fn of(stretches: &[Stretch], restarts: &[Restart]) -> Option<Self> {
+    /// The rhythm of a sender, if it has one. Its pauses are neither restarts nor the recorder's.
+    pub(crate) fn of(
+        stretches: &[Stretch],
+        restarts: &[Restart],
+        recorder: &[Span],
+    ) -> Option<Self> {
         let last = stretches.last()?;
         let away = |p: &[Stretch]| {
             restarts
                 .iter()
                 .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
         };
-        let pauses = stretches.windows(2).filter(|p| !away(p));
+        let recorded = |p: &&[Stretch]| !hide(recorder, (p[0].last, Some(p[1].first)));
+        let pauses = stretches.windows(2).filter(|p| !away(p)).filter(recorded);
         let pauses = pauses.map(|p| p[1].first.since(p[0].last));
         (last.count >= FEWEST).then(|| Self {
             first: stretches[0].first,

@@ -8,7 +8,7 @@ use super::liveness::Pulse;
 use super::senders::{Sender, Traffic};
 use super::tracks::Tracks;
 use crate::base::role::{role, start};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Reliability};
 use crate::evidence::observation::Name;
@@ -16,7 +16,12 @@ use crate::graph::history::{Stretch, begins_steadily};
 
 /// Adds the rhythms that stopped for good to the tracks of their only publishers. A rhythm that continues
 /// shows nothing: another node may have taken over the topic.
-pub(crate) fn fall_silent(tracks: &mut Tracks, traffic: &Traffic, findings: &Findings) {
+pub(crate) fn fall_silent(
+    tracks: &mut Tracks,
+    traffic: &Traffic,
+    findings: &Findings,
+    pauses: &[Span],
+) {
     for (topic, nodes) in publishers(tracks) {
         let Some(sender) = merged(traffic, findings, topic) else {
             continue;
@@ -29,7 +34,7 @@ pub(crate) fn fall_silent(tracks: &mut Tracks, traffic: &Traffic, findings: &Fin
             if begins_steadily(stretches) {
                 track.begins.push(stretches[0].first);
             }
-            let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
+            let pulse = Pulse::of(stretches, &[], pauses).filter(|pulse| pulse.broke_off(end));
             if let Some(pulse) = pulse {
                 track.signs.push(pulse.last());
                 track.last_sign = track.last_sign.max(Some(pulse.last()));

@@ -10,6 +10,7 @@ use crate::base::rhythm::{
     FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE, UNSEEN_NS,
 };
 use crate::base::time::{Span, Stamp};
+use crate::evidence::clock::{DAY, FAR_DAYS};
 use crate::evidence::collector::Recorded;
 use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
@@ -181,7 +182,30 @@ pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream])
             }
         }
     }
+    found.extend(clock_jumps(traffic));
     found.sort_unstable_by_key(|pause| pause.start);
+    found.dedup_by(|one, before| one.shared(*before) > 0);
+    found
+}
+
+/// The times without any message that are too long for a mission: the clock was set in between.
+fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
+    let senders = traffic.values().flat_map(|of| &of.list);
+    let stretches = senders.flat_map(|sender| &sender.stretches);
+    let mut sending: Vec<Span> = stretches.map(|s| Span::new(s.first, s.last)).collect();
+    sending.sort_unstable_by_key(|span| span.start);
+    let mut until = Stamp::MAX;
+    let mut found = Vec::new();
+    for span in sending {
+        if span.start.since(until) > FAR_DAYS * DAY {
+            found.push(Span::new(until, span.start));
+        }
+        until = if until == Stamp::MAX {
+            span.end
+        } else {
+            until.max(span.end)
+        };
+    }
     found
 }
 
@@ -242,14 +266,6 @@ fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option
     let is_most = silent >= PAUSE_FEWEST && silent * 100 >= should * PAUSE_SHARE;
     let is_one_node = nodes.len() == 1 && !nodes.contains(&None);
     (is_most && !is_one_node && found.nanos() >= GAP_NS).then_some(found)
-}
-
-/// Whether most of a silence lies in pauses of the recording.
-pub(crate) fn hide(pauses: &[Span], (from, to): (Stamp, Option<Stamp>)) -> bool {
-    let Some(to) = to else { return false };
-    let silence = Span::new(from, to);
-    let shared = pauses.iter().map(|pause| pause.shared(silence).max(0));
-    shared.sum::<i64>() > silence.nanos() / 2
 }
 
 impl Sender {

@@ -7,6 +7,7 @@ use std::io;
 use super::recordings::recordings;
 use super::tempo::stretches;
 use crate::base::error::Result;
+use crate::base::name::is_feedback;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
@@ -85,10 +86,16 @@ fn senders(
         pauses.add(timed.time);
         received[of[timed.series]].add(timed.time);
     })?;
+    let mut list: Vec<Sender> = received.into_iter().map(SenderTimes::into_sender).collect();
+    let topic = of_topic.first().map(|stream| &stream.connection.topic);
+    if topic.is_some_and(|topic| is_feedback(topic.as_str())) {
+        let stretches = list.iter_mut().flat_map(|sender| &mut sender.stretches);
+        stretches.for_each(|stretch| stretch.is_even = false);
+    }
     Ok(Senders {
         streams,
         traces,
-        list: received.into_iter().map(SenderTimes::into_sender).collect(),
+        list,
         of,
         pauses: pauses.spans(),
     })

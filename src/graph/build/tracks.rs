@@ -6,9 +6,9 @@ use std::io;
 use super::liveness::{Extent, Liveness, Pulse};
 use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
-use crate::base::name::lies_in;
+use crate::base::name::{is_feedback, lies_in};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::inference::{ElementKey, Inference, Reliability, Validity};
@@ -30,7 +30,7 @@ pub(crate) fn tracks(
     recorded: &Recorded,
     findings: &mut Findings,
     traffic: &Traffic,
-    restarts: &Restarts,
+    (restarts, pauses): (&Restarts, &[Span]),
 ) -> io::Result<(Tracks, Likes)> {
     let mut tracks = Tracks::new();
     let mut likes = Likes::new();
@@ -65,13 +65,15 @@ pub(crate) fn tracks(
                 let place = senders.streams.iter().position(|s| s == at).unwrap_or(0);
                 let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
                 let (with_start, with_end) = with.copied().unwrap_or_default();
-                let is_log = stream.connection.topic.as_str() == "/rosout";
+                let topic = stream.connection.topic.as_str();
+                let is_free = topic == "/rosout" || is_feedback(topic);
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
-                    begins: !is_log && !with_start,
-                    beats: !is_log && !with_end,
+                    begins: !is_free && !with_start,
+                    beats: !is_free && !with_end,
                     asked: node.and_then(|node| asked.get(&node)).copied(),
                     restarts: own,
+                    pauses,
                 };
                 follow(track, senders, place, &what);
                 if !deaths.is_empty() {
@@ -246,6 +248,8 @@ struct Followed<'a> {
     /// When its sender got the first message of its own.
     asked: Option<Stamp>,
     restarts: &'a [Restart],
+    /// The times at which nothing was recorded.
+    pauses: &'a [Span],
 }
 
 /// Adds the messages of one stream to the track of a publication or topic.
@@ -279,7 +283,7 @@ fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed
     let messages = track.messages();
     messages.reach(Some(sender.recording));
     messages.due = messages.due.max(Some(due));
-    let pulse = Pulse::of(&sender.stretches, what.restarts);
+    let pulse = Pulse::of(&sender.stretches, what.restarts, what.pauses);
     let pulse = pulse.filter(|_| what.beats && !latched);
     messages.pulses.extend(pulse);
 }

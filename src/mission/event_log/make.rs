@@ -1,7 +1,7 @@
 //! Makes a mission's events from its lifetimes: each kind in its own file, then sorted and joined.
 
 use super::{Detail, Event, EventId, Kind, causes, hands, incidents, lifetimes, rates, silence};
-use crate::base::name::is_quiet;
+use crate::base::name::{is_feedback, is_quiet};
 use crate::base::time::Stamp;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life};
@@ -147,7 +147,7 @@ impl<'a> LogInput<'a> {
     pub(crate) fn is_by_the_way(&self, topic: TopicId) -> bool {
         let topic = &self.elements.topics[topic];
         let name = topic.name.as_str();
-        is_quiet(name) || name.ends_with("/feedback") || topic.is_shared()
+        is_quiet(name) || is_feedback(name) || topic.is_shared()
     }
 }
 

@@ -117,7 +117,7 @@ fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
     let mut times = Vec::new();
     for life in elements.runs(what) {
         let mut start = life.start;
-        let silent = silences(&sender.stretches, &[*life]);
+        let silent = silences(&sender.stretches, &[*life], &[]);
         for (from, to) in silent.into_iter().filter(|_| !sender.is_latched) {
             times.push(Span::new(start, from.plus(1)));
             start = to.unwrap_or(life.end);
