@@ -94,10 +94,10 @@ impl<'a> Watched<'a> {
                 // happened.
                 let would_fall = last.since(suspect.seam.after) > OUT_OF_ORDER_NS;
                 let fell = last.since(time) > OUT_OF_ORDER_NS;
-                suspect.fell += u64::from(would_fall && fell);
                 // A rare one may have had a message just before the step.
-                suspect.went_on += u64::from(would_fall && last <= time);
-                line.fell = would_fall.then_some(fell);
+                line.fell = (would_fall && (fell || last <= time)).then_some(fell);
+                suspect.fell += u64::from(line.fell == Some(true));
+                suspect.went_on += u64::from(line.fell == Some(false));
             }
             let is_behind = !suspect.is_in_part || line.fell == Some(true);
             if is_behind && suspect.seam.after.since(time) <= OUT_OF_ORDER_NS {

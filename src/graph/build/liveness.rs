@@ -48,8 +48,8 @@ impl Pulse {
                 .iter()
                 .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
         };
-        let recorded = |p: &&[Stretch]| !hide(recorder, (p[0].last, Some(p[1].first)));
-        let pauses = stretches.windows(2).filter(|p| !away(p)).filter(recorded);
+        let is_own = |p: &&[Stretch]| !hide(recorder, (p[0].last, Some(p[1].first)));
+        let pauses = stretches.windows(2).filter(|p| !away(p)).filter(is_own);
         let pauses = pauses.map(|p| p[1].first.since(p[0].last));
         (last.count >= FEWEST).then(|| Self {
             first: stretches[0].first,
