@@ -20,7 +20,7 @@ use std::time::Instant;
 
 use bagreel::internals::draw::paint::raster::Painter;
 use bagreel::internals::draw::picture;
-use bagreel::internals::draw::strip::{StripSource, strip};
+use bagreel::internals::draw::strip::{StripSource, StripWidth, strip};
 use bagreel::internals::draw::style::Style;
 use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::Output;
@@ -65,13 +65,8 @@ fn main() {
         fonts: &fonts,
         engine: layout::engine("layered").unwrap(),
     };
-    let page = strip(
-        source,
-        &choice.clone().unwrap_or(Choice::Changes),
-        mm,
-        1280.0,
-    )
-    .unwrap();
+    let width = mm.map_or(StripWidth::AtLeast(1280.0), StripWidth::Paper);
+    let page = strip(source, &choice.clone().unwrap_or(Choice::Changes), width).unwrap();
     println!("strip: {:?}", page.remarks);
     let options = SequenceOptions {
         tween: number("TWEEN").unwrap_or(0),
