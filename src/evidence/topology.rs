@@ -133,7 +133,7 @@ mod python {
     use std::path::Path;
 
     use super::tree::Tree;
-    use crate::base::error::Result;
+    use crate::base::error::{Error, Result};
 
     pub(super) const UNREAD: &str = "unread";
 
