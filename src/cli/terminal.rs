@@ -112,7 +112,7 @@ impl Terminal {
         }
     }
 
-    /// Prints the files written, what is in them, and the time taken, in one line, as [`Terminal::say`].
+    /// Prints the files written, what is in them, and the time taken, in one line, as [`Terminal::status`].
     pub(crate) fn wrote<'a>(&mut self, files: impl IntoIterator<Item = &'a Path>, what: &str) {
         let names = files.into_iter().map(|file| file.display().to_string());
         let names = names.collect::<Vec<_>>().join(", ");
