@@ -371,14 +371,18 @@ impl<'a> Picture<'a> {
             titles.extend(place.and_then(|place| boxes.footer(footer, also, *place, (view, k))));
         }
         let [lines, labels] = self.lines(seen);
-        // Lines do not cross words.
-        groups.extend(lines.into_iter().chain(titles).chain(labels));
-        for shown in &seen.items {
+        let items = seen.items.iter().filter_map(|shown| {
             let at = shown.id as usize;
-            if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
-                groups.push(boxes.item(item, card, shown));
-                groups.extend(boxes.card_rows(card, view, k));
-            }
+            Some((view.items.get(at)?, self.cards.get(at)?, shown))
+        });
+        let glows = items
+            .clone()
+            .filter_map(|(item, card, shown)| boxes.glow(item, card, shown));
+        // Lines do not cross words.
+        groups.extend(glows.chain(lines).chain(titles).chain(labels));
+        for (item, card, shown) in items {
+            groups.push(boxes.item(item, card, shown));
+            groups.extend(boxes.card_rows(card, view, k));
         }
         groups.extend(numbers);
     }

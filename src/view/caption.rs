@@ -109,9 +109,10 @@ impl<'a> CaptionWriter<'a> {
         if frame.caption.is_empty() {
             return match self.last {
                 Some(last) => format!("no change since {}", self.moment(last)),
-                None if self.is_still => {
-                    format!("no change in {}", words::duration(frame.span.nanos()))
-                }
+                None if self.is_still => match frame.span.nanos() {
+                    0 => "no change".to_owned(),
+                    nanos => format!("no change in {}", words::duration(nanos)),
+                },
                 None => "no change yet".to_owned(),
             };
         }

@@ -168,10 +168,7 @@ impl Boxes<'_> {
     /// One item in one window.
     pub(crate) fn item(&self, item: &Item, card: &ItemBox, shown: &Shown) -> Group {
         let style = self.style;
-        let body = match item.kind {
-            ItemKind::Node | ItemKind::Namespace => &style.node,
-            ItemKind::Topic | ItemKind::Group => &style.topic,
-        };
+        let body = self.body(item);
         let look = options::of_box(style, body, shown);
         let place = card.place;
         let mut group = Group {
@@ -232,44 +229,66 @@ impl Boxes<'_> {
         place: Rect,
         look: &BoxLook,
     ) -> Rect {
-        let scale = self.fit.scale;
         let stroke = look.stroke.scaled(self.fit.pen);
-        let radius = body.radius * scale;
-        let kind = item.kind;
-        let form = match kind {
-            _ if item.is_service => hexagon(place, radius.max(body.pad_x * scale)),
-            ItemKind::Node if body.is_capsule() => Form::Rect(place, place.w.min(place.h) / 2.0),
-            ItemKind::Node => Form::Ellipse(place),
-            _ => Form::Rect(place, radius),
-        };
-        self.glow(group, &form, &stroke, look);
         group.shape(Shape {
-            form,
+            form: self.form(item, body, place),
             fill: look.fill,
             stroke: stroke.clone(),
         });
-        if matches!(kind, ItemKind::Node | ItemKind::Topic) {
+        if matches!(item.kind, ItemKind::Node | ItemKind::Topic) {
             return place;
         }
         // Several in one: a second card behind the first.
         let front = self.front(place);
         group.shape(Shape {
-            form: Form::Rect(front, radius),
+            form: Form::Rect(front, body.radius * self.fit.scale),
             fill: look.fill,
             stroke,
         });
         front
     }
 
-    /// The glow around a box that changed.
-    pub(crate) fn glow(&self, group: &mut Group, form: &Form, stroke: &Stroke, look: &BoxLook) {
-        if look.glow != Color::NONE {
-            let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
-            group.shape(Shape {
-                form: form.clone(),
-                fill: look.glow,
-                stroke: Stroke::solid(look.glow, width),
-            });
+    /// The form of a box without rows.
+    fn form(&self, item: &Item, body: &Body, place: Rect) -> Form {
+        let (scale, radius) = (self.fit.scale, body.radius * self.fit.scale);
+        match item.kind {
+            _ if item.is_service => hexagon(place, radius.max(body.pad_x * scale)),
+            ItemKind::Node if body.is_capsule() => Form::Rect(place, place.w.min(place.h) / 2.0),
+            ItemKind::Node => Form::Ellipse(place),
+            _ => Form::Rect(place, radius),
+        }
+    }
+
+    /// The glow around an item that changed in one window. It belongs below the lines, so that it covers no arrowhead.
+    pub(crate) fn glow(&self, item: &Item, card: &ItemBox, shown: &Shown) -> Option<Group> {
+        let body = self.body(item);
+        let look = options::of_box(self.style, body, shown);
+        if look.glow == Color::NONE {
+            return None;
+        }
+        let stroke = look.stroke.scaled(self.fit.pen);
+        let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
+        let mut group = Group {
+            id: format!("{}..glow", card.id),
+            class: "glow".to_owned(),
+            data: vec![("of", card.id.clone())],
+            ..Group::default()
+        };
+        group.shape(Shape {
+            form: match card.card {
+                Some(_) => Form::Rect(card.place, self.card_radius()),
+                None => self.form(item, body, card.place),
+            },
+            fill: look.glow,
+            stroke: Stroke::solid(look.glow, width),
+        });
+        Some(group)
+    }
+
+    fn body(&self, item: &Item) -> &Body {
+        match item.kind {
+            ItemKind::Node | ItemKind::Namespace => &self.style.node,
+            ItemKind::Topic | ItemKind::Group => &self.style.topic,
         }
     }
 

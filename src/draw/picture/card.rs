@@ -134,8 +134,7 @@ impl Boxes<'_> {
     /// The outline of a card, and its head, which is returned.
     pub(crate) fn card(&self, group: &mut Group, card: &Card, place: Rect, look: &BoxLook) -> Rect {
         let (scale, stroke) = (self.fit.scale, look.stroke.scaled(self.fit.pen));
-        let radius = self.style.node.radius.max(self.style.topic.radius) * scale * 0.7;
-        self.glow(group, &Form::Rect(place, radius), &stroke, look);
+        let radius = self.card_radius();
         group.shape(Shape {
             form: Form::Rect(place, radius),
             fill: self.style.page.background,
@@ -148,6 +147,11 @@ impl Boxes<'_> {
             stroke,
         });
         head
+    }
+
+    /// The radius of a card's corners.
+    pub(crate) fn card_radius(&self) -> f64 {
+        self.style.node.radius.max(self.style.topic.radius) * self.fit.scale * 0.7
     }
 
     /// The rows of a card that exist in window `k`.

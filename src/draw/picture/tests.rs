@@ -46,7 +46,7 @@ fn body(group: &Group) -> Option<Form> {
 
 /// Whether it is a part of the graph, and not a decoration.
 fn is_element(group: &Group) -> bool {
-    let known = |(key, _): &(&str, String)| matches!(*key, "name" | "from");
+    let known = |(key, _): &(&str, String)| matches!(*key, "name" | "from" | "of");
     group.data.first().is_some_and(known)
 }
 
@@ -177,6 +177,21 @@ fn a_bare_picture_contains_only_the_graph() {
     with_picture(&MISSION, "light", options, |p| {
         assert!(p.scene(2).groups.iter().all(is_element));
     });
+}
+
+#[test]
+fn a_glow_is_below_all_lines() {
+    let mut tried = 0;
+    for scene in scenes(&MISSION) {
+        let is = |g: &Group, class: &str| g.class.starts_with(class);
+        let glow = scene.groups.iter().rposition(|g| is(g, "glow"));
+        let line = scene.groups.iter().position(|g| is(g, "edge"));
+        if let (Some(glow), Some(line)) = (glow, line) {
+            assert!(glow < line);
+            tried += 1;
+        }
+    }
+    assert!(tried >= 3);
 }
 
 #[test]
