@@ -25,7 +25,13 @@ use crate::mission::{Mission, Window};
 pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     let hint = "`bagreel render BAG -o x.json` writes a mission";
     let bad = |line: usize, reason: String| Error::bad_file(path, line, reason, hint);
-    let mut raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
+    let unread = |e: serde_json::Error| {
+        let reason = e.to_string();
+        // The error names the place itself.
+        let end = reason.rfind(" at line ").unwrap_or(reason.len());
+        bad(e.line(), reason[..end].to_owned())
+    };
+    let mut raw: Raw = serde_json::from_str(text).map_err(unread)?;
     if raw.schema != SCHEMA && !OLD_SCHEMAS.contains(&&*raw.schema) {
         return Err(bad(0, format!("schema `{}` is not `{SCHEMA}`", raw.schema)));
     }
@@ -258,6 +264,17 @@ mod tests {
             (10, true)
         );
         assert_eq!(mission.windows[1].messages, 3);
+    }
+
+    #[test]
+    fn an_error_names_its_line_once() {
+        let text = "{\"schema\": \"bagreel.mission/3\",\n\"windows\": 3}";
+        let error = read(text).unwrap_err().to_string();
+        assert!(
+            error.starts_with("`x.json` line 2: invalid type"),
+            "{error}"
+        );
+        assert_eq!(error.matches("line").count(), 1, "{error}");
     }
 
     #[test]
