@@ -168,7 +168,7 @@ impl Boxes<'_> {
     /// One item in one window.
     pub(crate) fn item(&self, item: &Item, card: &ItemBox, shown: &Shown) -> Group {
         let style = self.style;
-        let body = self.body(item);
+        let body = options::body(self.style, item.kind);
         let look = options::of_box(style, body, shown);
         let place = card.place;
         let mut group = Group {
@@ -261,7 +261,7 @@ impl Boxes<'_> {
 
     /// The glow around an item that changed in one window. It belongs below the lines, so that it covers no arrowhead.
     pub(crate) fn glow(&self, item: &Item, card: &ItemBox, shown: &Shown) -> Option<Group> {
-        let body = self.body(item);
+        let body = options::body(self.style, item.kind);
         let look = options::of_box(self.style, body, shown);
         if look.glow == Color::NONE {
             return None;
@@ -283,13 +283,6 @@ impl Boxes<'_> {
             stroke: Stroke::solid(look.glow, width),
         });
         Some(group)
-    }
-
-    fn body(&self, item: &Item) -> &Body {
-        match item.kind {
-            ItemKind::Node | ItemKind::Namespace => &self.style.node,
-            ItemKind::Topic | ItemKind::Group => &self.style.topic,
-        }
     }
 
     fn front(&self, place: Rect) -> Rect {

@@ -4,7 +4,7 @@ use super::also::{self, Footer};
 use super::card::{self, Card};
 use super::gates::{self, Gate, larger};
 use super::spaces::{Space, first_seen, spaces};
-use super::{replicas, texts, topics};
+use super::{options, replicas, texts, topics};
 use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
@@ -187,13 +187,6 @@ struct Measurer<'a> {
 }
 
 impl Measurer<'_> {
-    fn body(&self, item: &Item) -> &Body {
-        match item.kind {
-            ItemKind::Node | ItemKind::Namespace => &self.style.node,
-            ItemKind::Topic | ItemKind::Group => &self.style.topic,
-        }
-    }
-
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
         let title = self.fonts.width(&space.title, size, Weight::SemiBold);
@@ -204,7 +197,7 @@ impl Measurer<'_> {
     }
 
     fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
-        let body = self.body(item);
+        let body = options::body(self.style, item.kind);
         let whole = short_name(&item.label, inside);
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
@@ -227,7 +220,7 @@ impl Measurer<'_> {
     /// The size of a box with this label, whose changing smaller lines are at most `second` wide; for one
     /// with rows, that of the part above them.
     fn size(&self, item: &Item, label: &Label, second: f64, has_rows: bool) -> Size {
-        let body = self.body(item);
+        let body = options::body(self.style, item.kind);
         let width = self.fonts.width(&label.name, body.size, body.weight());
         let width = width.max(second);
         let small = if label.second { body.small * LINE } else { 0.0 };
@@ -258,7 +251,7 @@ impl Measurer<'_> {
                 continue;
             };
             if let Some(line) = second_line(shown, shown_rates[at]) {
-                let size = self.body(item).small;
+                let size = options::body(self.style, item.kind).small;
                 let width = |text: &str| self.fonts.width(text, size, Weight::SemiBold);
                 widen(&mut widest[at], width(&line).max(width(NO_MESSAGE)));
             }

@@ -5,7 +5,7 @@ use crate::draw::style::{Body, Change, Color, Quiet, Style};
 use crate::draw::text::Weight;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{ArrowKind, Mark, Shown};
+use crate::view::{ArrowKind, ItemKind, Mark, Shown};
 
 /// The paint of a box.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,14 @@ fn absent(style: &Style, shown: &Shown) -> Option<Quiet> {
         Some(Mark::Away) => Some(style.away()),
         Some(Mark::Gone) => Some(style.gone()),
         _ => None,
+    }
+}
+
+/// The look of a box of this kind without a change.
+pub(crate) fn body(style: &Style, kind: ItemKind) -> &Body {
+    match kind {
+        ItemKind::Node | ItemKind::Namespace => &style.node,
+        ItemKind::Topic | ItemKind::Group => &style.topic,
     }
 }
 
