@@ -1,4 +1,5 @@
-"""Prints the licence texts of all crates that `cargo metadata` (standard input) names, each text once with who is under it."""
+"""Prints the licence texts of all crates that the command contains according to `cargo metadata` (standard input), each text once
+with who is under it."""
 
 import json
 import sys
@@ -7,7 +8,14 @@ from pathlib import Path
 
 texts = defaultdict(list)
 metadata = json.load(sys.stdin)
-built = {node["id"] for node in metadata["resolve"]["nodes"]}
+nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
+built, found = set(), [metadata["resolve"]["root"]]
+while found:
+    package = found.pop()
+    if package not in built:
+        built.add(package)
+        deps = nodes[package]["deps"]
+        found += [dep["pkg"] for dep in deps if any(kind["kind"] is None for kind in dep["dep_kinds"])]
 for package in sorted(metadata["packages"], key=lambda package: (package["name"], package["version"])):
     if package["id"] not in built or package["source"] is None:
         continue
