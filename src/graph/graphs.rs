@@ -9,6 +9,7 @@ pub(crate) use column::{Column, ColumnCursor, ColumnWriter};
 pub(crate) use row::{Number, Row};
 pub(crate) use walk::ColumnWalk;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Element, Elements, Graph, PerElement};
@@ -175,79 +176,61 @@ impl<'a> IntoIterator for &'a Graphs {
     }
 }
 
-/// A writer of the graphs of windows, state by state: each element's in order of the windows, elements in any order.
-#[derive(Debug, Default)]
-pub(crate) struct GraphsWriter {
-    spans: Vec<Span>,
-    lifecycles: Vec<Arc<str>>,
-    columns: PerElement<ColumnWriter>,
-}
+/// A writer of the graphs of windows, element by element.
+#[derive(Debug)]
+pub(crate) struct GraphsWriter(Graphs);
 
 impl GraphsWriter {
     /// A writer for these windows, without any states.
     pub(crate) fn new(spans: Vec<Span>) -> Self {
-        Self {
+        Self(Graphs {
             spans,
-            ..Self::default()
-        }
+            ..Graphs::default()
+        })
     }
 
-    /// Adds the row of an element in the window with an index.
-    pub(crate) fn row(&mut self, what: Element, at: usize, row: Row) {
+    /// Adds all rows of an element.
+    pub(crate) fn element(&mut self, what: Element, rows: ColumnWriter) {
         let (kind, id) = what.place();
-        let columns = &mut self.columns.0[kind];
+        let columns = &mut self.0.columns.0[kind];
         if columns.len() <= id {
-            columns.resize_with(id + 1, ColumnWriter::default);
+            columns.resize_with(id + 1, Column::default);
         }
-        columns[id].push(at, row);
+        columns[id] = rows.finish();
     }
 
-    /// The number of a lifecycle state in rows.
+    /// The number of a lifecycle state in rows, counted from 1; states are few.
     pub(crate) fn lifecycle(&mut self, word: &Arc<str>) -> u32 {
-        place(&mut self.lifecycles, word)
-    }
-
-    /// Adds all states of the window with an index.
-    pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
-        for state in &graph.states {
-            let lifecycle = state.lifecycle.as_ref();
-            let lifecycle = lifecycle.map_or(0, |word| self.lifecycle(word));
-            let row = Row::of(state, self.spans[at], lifecycle);
-            self.row(state.what, at, row);
-        }
+        let words = &mut self.0.lifecycles;
+        let found = words.iter().position(|w| w == word).unwrap_or_else(|| {
+            words.push(Arc::clone(word));
+            words.len() - 1
+        });
+        u32::try_from(found + 1).unwrap_or(0)
     }
 
     /// The finished graphs.
-    pub(crate) fn finish(self) -> Graphs {
-        // Not collected from the iterator, which would keep the memory of the writers.
-        let columns = |writers: Vec<ColumnWriter>| {
-            let mut columns = Vec::with_capacity(writers.len());
-            columns.extend(writers.into_iter().map(ColumnWriter::finish));
-            columns
-        };
-        Graphs {
-            spans: self.spans,
-            lifecycles: self.lifecycles,
-            columns: PerElement(self.columns.0.map(columns)),
-        }
+    pub(crate) fn finish(mut self) -> Graphs {
+        self.0.columns.0.iter_mut().for_each(Vec::shrink_to_fit);
+        self.0
     }
-}
-
-/// The number of a word in a short list, counted from 1; adds it if it is new.
-fn place(words: &mut Vec<Arc<str>>, word: &Arc<str>) -> u32 {
-    let found = words.iter().position(|w| w == word).unwrap_or_else(|| {
-        words.push(Arc::clone(word));
-        words.len() - 1
-    });
-    u32::try_from(found + 1).unwrap_or(0)
 }
 
 impl FromIterator<(Span, Graph)> for Graphs {
     fn from_iter<I: IntoIterator<Item = (Span, Graph)>>(graphs: I) -> Self {
-        let mut all = GraphsWriter::default();
+        let mut all = GraphsWriter::new(Vec::new());
+        let mut columns: BTreeMap<Element, ColumnWriter> = BTreeMap::new();
         for (at, (span, graph)) in graphs.into_iter().enumerate() {
-            all.spans.push(span);
-            all.graph(at, &graph);
+            all.0.spans.push(span);
+            for state in &graph.states {
+                let lifecycle = state.lifecycle.as_ref();
+                let lifecycle = lifecycle.map_or(0, |word| all.lifecycle(word));
+                let rows = columns.entry(state.what).or_default();
+                rows.push(at, Row::of(state, span, lifecycle));
+            }
+        }
+        for (what, rows) in columns {
+            all.element(what, rows);
         }
         all.finish()
     }

@@ -4,7 +4,7 @@ mod tests_merged;
 
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::evidence::collector::Collector;
 use crate::evidence::conclude::ConcludeOptions;

@@ -135,7 +135,7 @@ impl GraphAssembly<'_> {
             return;
         };
         let mut list = sums.unwrap_or_default().iter().peekable();
-        let mut states = ColumnWriter::default();
+        let (mut states, mut rows) = (ColumnWriter::default(), ColumnWriter::default());
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
             if !self.sees(record, *window) {
@@ -156,8 +156,9 @@ impl GraphAssembly<'_> {
                     ..self.measures.of(what, at)
                 })
             };
-            self.graphs.row(what, at, row);
+            rows.push(at, row);
         }
+        self.graphs.element(what, rows);
         self.topics.insert(id, states.finish());
     }
 
@@ -168,6 +169,7 @@ impl GraphAssembly<'_> {
                 continue;
             };
             let sent = self.sent.get(name);
+            let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 if !self.sees(record, *window) {
                     continue;
@@ -184,8 +186,9 @@ impl GraphAssembly<'_> {
                         self.confidence(what, record, *window),
                     )
                 };
-                self.graphs.row(what, at, row);
+                rows.push(at, row);
             }
+            self.graphs.element(what, rows);
         }
     }
 
@@ -201,6 +204,7 @@ impl GraphAssembly<'_> {
             let ends = nodes.get(edge.node).zip(topics.get(edge.topic));
             let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
             let mut sent = sent.map(Column::cursor);
+            let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 let row = sent.as_mut().map(ColumnCursor::next);
                 let own = row.flatten();
@@ -221,8 +225,9 @@ impl GraphAssembly<'_> {
                     jitter_s: jitter.or(measures.jitter_s),
                     ..measures
                 };
-                self.graphs.row(what, at, row.with_measures(&measures));
+                rows.push(at, row.with_measures(&measures));
             }
+            self.graphs.element(what, rows);
         }
     }
 
@@ -234,6 +239,7 @@ impl GraphAssembly<'_> {
                 continue;
             };
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
+            let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 let topic = topic.as_mut().and_then(ColumnCursor::next);
                 if !self.sees(record, *window) {
@@ -251,8 +257,9 @@ impl GraphAssembly<'_> {
                     ..Row::new(state, self.confidence(what, record, *window))
                 };
                 let measures = self.measures.of(what, at);
-                self.graphs.row(what, at, row.with_measures(&measures));
+                rows.push(at, row.with_measures(&measures));
             }
+            self.graphs.element(what, rows);
         }
     }
 

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{Text, confidence_of, state_of};
 use crate::evidence::Confidence;
-use crate::graph::{Element, Graphs, GraphsWriter, Number, Row, State};
+use crate::graph::{ColumnWriter, Element, Graphs, GraphsWriter, Number, Row, State};
 use columns::{JsonColumn, JsonRate};
 
 /// The windows in which an element exists, with its states in them.
@@ -101,7 +101,7 @@ impl<'a> JsonColumns<'a> {
         let mut jitters = self.jitter_s.values(|value| Number::of(*value));
         let mut ages = self.age_s.values(|value| Number::of(*value));
         let mut rates = self.hz.values(JsonRate::number);
-        let mut next = 0;
+        let (mut rows, mut next) = (ColumnWriter::default(), 0);
         for (from, to) in &self.windows {
             for at in (*from).max(next)..(*to).saturating_add(1).min(many) {
                 let state = states.next().unwrap_or(State::Active);
@@ -118,9 +118,10 @@ impl<'a> JsonColumns<'a> {
                     rate: rates.next().flatten(),
                     ..Row::new(state, degree)
                 };
-                all.row(what, at, row);
+                rows.push(at, row);
                 next = at + 1;
             }
         }
+        all.element(what, rows);
     }
 }

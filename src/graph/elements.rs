@@ -1,0 +1,322 @@
+//! The nodes, topics and edges of a mission, their names and ids.
+
+use std::sync::Arc;
+
+use super::{ById, Id};
+use crate::base::ids::ids;
+use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder, is_service};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::Evidence;
+
+ids! {
+    /// The id of a node: its index in [`Elements::nodes`].
+    NodeId,
+    /// The id of a topic: its index in [`Elements::topics`].
+    TopicId,
+    /// The id of an edge: its index in [`Elements::publishes`] or [`Elements::subscribes`].
+    EdgeId,
+}
+
+/// A node, over the whole mission.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Node {
+    /// The name as recorded.
+    pub name: NodeName,
+    /// The name with anonymous suffixes folded; equal to the name for most.
+    pub role: Arc<str>,
+    /// The kinds of evidence for it.
+    pub evidence: Evidence,
+    /// The time of its first sign in the mission.
+    pub first: Option<Stamp>,
+    /// The time of its last sign in the mission.
+    pub last: Option<Stamp>,
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
+    pub runs: Vec<Span>,
+}
+
+impl Node {
+    /// Whether it records or plays bags, by its name or its log records.
+    pub(crate) fn records(&self) -> bool {
+        let name = self.name.as_str();
+        is_recorder(name) || is_player(name) || self.evidence.words().any(|w| w == "recorder")
+    }
+
+    /// Whether it is housekeeping, a recorder or a player: events, phases and figures leave it out.
+    pub(crate) fn is_tool(&self) -> bool {
+        self.records() || is_quiet(self.name.as_str())
+    }
+}
+
+/// A topic, over the whole mission.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Topic {
+    /// The name as recorded.
+    pub name: TopicName,
+    /// Its types, sorted; more than one is a mistake in the robot's software.
+    pub types: Vec<Arc<str>>,
+    /// The kinds of evidence for it.
+    pub evidence: Evidence,
+    /// The time of its first message or other sign.
+    pub first: Option<Stamp>,
+    /// The time of its last message or other sign.
+    pub last: Option<Stamp>,
+    /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
+    pub qos: Option<Arc<str>>,
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
+    pub runs: Vec<Span>,
+    /// The number of publishers that the bag counts but does not name, ≥ 0; `None` if it does not count publishers.
+    /// They are not nodes: a picture may show them as one small box.
+    pub unknown_publishers: Option<u32>,
+}
+
+impl Topic {
+    /// Whether it is a service: its clients write to it, and its server reads it. A topic of the same name
+    /// takes precedence.
+    pub fn is_service(&self) -> bool {
+        !self.types.is_empty() && self.types.iter().all(|kind| is_service(kind))
+    }
+
+    /// Whether many nodes publish to topics of its type in turn, so that a new publisher is not a takeover.
+    pub(crate) fn is_shared(&self) -> bool {
+        let mut types = self.types.iter();
+        types.any(|kind| SHARED.contains(&kind.rsplit('/').next().unwrap_or(kind)))
+    }
+}
+
+/// Types of topics that many nodes publish to in turn.
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
+
+/// A publication or a subscription, over the whole mission.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edge {
+    /// The node that publishes or subscribes.
+    pub node: NodeId,
+    /// The topic.
+    pub topic: TopicId,
+    /// The kinds of evidence for it.
+    pub evidence: Evidence,
+    /// The time of its first message or other sign.
+    pub first: Option<Stamp>,
+    /// The time of its last message or other sign.
+    pub last: Option<Stamp>,
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
+    pub runs: Vec<Span>,
+}
+
+/// All nodes, topics and edges of the mission: nodes and topics sorted by name, publications by (node, topic),
+/// subscriptions by (topic, node).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Elements {
+    /// Nodes, sorted by name.
+    pub nodes: ById<NodeId, Node>,
+    /// Topics, sorted by name.
+    pub topics: ById<TopicId, Topic>,
+    /// Publications, sorted by (node, topic).
+    pub publishes: ById<EdgeId, Edge>,
+    /// Subscriptions, sorted by (topic, node).
+    pub subscribes: ById<EdgeId, Edge>,
+}
+
+/// A node, topic or edge of the mission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Element {
+    /// A node.
+    Node(NodeId),
+    /// A topic.
+    Topic(TopicId),
+    /// A publication.
+    Publish(EdgeId),
+    /// A subscription.
+    Subscribe(EdgeId),
+}
+
+impl Element {
+    /// Makes an element of each kind from its id: nodes, topics, publications, subscriptions.
+    pub(crate) const KINDS: [fn(usize) -> Self; 4] = [
+        |at| Self::Node(Id::of(at)),
+        |at| Self::Topic(Id::of(at)),
+        |at| Self::Publish(Id::of(at)),
+        |at| Self::Subscribe(Id::of(at)),
+    ];
+
+    /// The index of its kind in [`Element::KINDS`], and its id.
+    pub(crate) fn place(self) -> (usize, usize) {
+        match self {
+            Self::Node(id) => (0, id.at()),
+            Self::Topic(id) => (1, id.at()),
+            Self::Publish(id) => (2, id.at()),
+            Self::Subscribe(id) => (3, id.at()),
+        }
+    }
+
+    /// Whether it is a node.
+    pub fn is_node(&self) -> bool {
+        matches!(self, Self::Node(_))
+    }
+
+    /// Whether it is a topic.
+    pub fn is_topic(&self) -> bool {
+        matches!(self, Self::Topic(_))
+    }
+
+    /// Whether it is a publication or subscription.
+    pub fn is_edge(&self) -> bool {
+        !self.is_node() && !self.is_topic()
+    }
+
+    /// The word for the element's kind in JSON: `node`, `topic`, `publish` or `subscribe`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Node(_) => "node",
+            Self::Topic(_) => "topic",
+            Self::Publish(_) => "publish",
+            Self::Subscribe(_) => "subscribe",
+        }
+    }
+}
+
+/// A value of an element's record, for any kind of element; `None` if the element does not exist.
+macro_rules! of_record {
+    ($elements:expr, $get:ident, $element:expr, $record:ident => $value:expr) => {{
+        match $element {
+            Element::Node(id) => $elements.nodes.$get(id).map(|$record| $value),
+            Element::Topic(id) => $elements.topics.$get(id).map(|$record| $value),
+            Element::Publish(id) => $elements.publishes.$get(id).map(|$record| $value),
+            Element::Subscribe(id) => $elements.subscribes.$get(id).map(|$record| $value),
+        }
+    }};
+}
+
+impl Elements {
+    /// Every element: nodes, topics, publications, subscriptions.
+    pub(crate) fn all(&self) -> impl Iterator<Item = Element> + use<> {
+        let many = [
+            self.nodes.len(),
+            self.topics.len(),
+            self.publishes.len(),
+            self.subscribes.len(),
+        ];
+        let kinds = Element::KINDS.into_iter().zip(many);
+        kinds.flat_map(|(kind, many)| (0..many).map(kind))
+    }
+
+    /// Every edge: publications, then subscriptions.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = (Element, &Edge)> {
+        let publishes = self.publishes.with_ids();
+        let subscribes = self.subscribes.with_ids();
+        let publishes = publishes.map(|(id, edge)| (Element::Publish(id), edge));
+        publishes.chain(subscribes.map(|(id, edge)| (Element::Subscribe(id), edge)))
+    }
+
+    /// The names of the node and the topic of an element: both for an edge, otherwise one.
+    pub(crate) fn names(&self, element: Element) -> (Option<&str>, Option<&str>) {
+        let (node, topic) = self.ends(element);
+        let node = node.and_then(|id| self.nodes.get(id));
+        let topic = topic.and_then(|id| self.topics.get(id));
+        (
+            node.map(|node| node.name.as_str()),
+            topic.map(|topic| topic.name.as_str()),
+        )
+    }
+
+    /// The node of this name.
+    pub fn node(&self, name: &str) -> Option<NodeId> {
+        let at = self
+            .nodes
+            .binary_search_by(|node| node.name.as_str().cmp(name));
+        at.ok().map(Id::of)
+    }
+
+    /// The topic of this name.
+    pub fn topic(&self, name: &str) -> Option<TopicId> {
+        let at = self
+            .topics
+            .binary_search_by(|topic| topic.name.as_str().cmp(name));
+        at.ok().map(Id::of)
+    }
+
+    /// The publication of a topic by a node.
+    pub fn publication(&self, node: NodeId, topic: TopicId) -> Option<EdgeId> {
+        let key = |edge: &Edge| (edge.node, edge.topic);
+        let at = self.publishes.binary_search_by_key(&(node, topic), key);
+        at.ok().map(Id::of)
+    }
+
+    /// The subscription of a topic by a node.
+    pub fn subscription(&self, topic: TopicId, node: NodeId) -> Option<EdgeId> {
+        let key = |edge: &Edge| (edge.topic, edge.node);
+        let at = self.subscribes.binary_search_by_key(&(topic, node), key);
+        at.ok().map(Id::of)
+    }
+
+    /// As [`Elements::publication`], of a node and a topic.
+    pub(crate) fn published(&self, (node, topic): (NodeId, TopicId)) -> Option<Element> {
+        self.publication(node, topic).map(Element::Publish)
+    }
+
+    /// As [`Elements::subscription`], of a node and a topic.
+    pub(crate) fn subscribed(&self, (node, topic): (NodeId, TopicId)) -> Option<Element> {
+        self.subscription(topic, node).map(Element::Subscribe)
+    }
+
+    /// The node and the topic of an element: both for an edge, otherwise one.
+    pub fn ends(&self, element: Element) -> (Option<NodeId>, Option<TopicId>) {
+        let ends = |edge: Option<&Edge>| (edge.map(|e| e.node), edge.map(|e| e.topic));
+        match element {
+            Element::Node(id) => (Some(id), None),
+            Element::Topic(id) => (None, Some(id)),
+            Element::Publish(id) => ends(self.publishes.get(id)),
+            Element::Subscribe(id) => ends(self.subscribes.get(id)),
+        }
+    }
+
+    /// Whether an element is a service, or an end of one.
+    pub(crate) fn is_service(&self, what: Element) -> bool {
+        let topic = self.ends(what).1;
+        topic.is_some_and(|id| self.topics.get(id).is_some_and(Topic::is_service))
+    }
+
+    /// The kinds of evidence for an element.
+    pub fn evidence(&self, element: Element) -> Evidence {
+        of_record!(self, get, element, it => it.evidence).unwrap_or(Evidence::NONE)
+    }
+
+    /// The intervals in which an element exists, in order, half-open; empty if only windows are known.
+    pub fn runs(&self, element: Element) -> &[Span] {
+        of_record!(self, get, element, it => it.runs.as_slice()).unwrap_or_default()
+    }
+
+    /// As [`Elements::runs`], to change them; `None` if the element does not exist.
+    pub(crate) fn runs_mut(&mut self, element: Element) -> Option<&mut Vec<Span>> {
+        of_record!(self, get_mut, element, it => &mut it.runs)
+    }
+
+    /// The only publication of each topic; `None` if none or several are known, or if the bag counts
+    /// publishers that it does not name.
+    pub(crate) fn sole_publishers(&self) -> ById<TopicId, Option<EdgeId>> {
+        let mut found = ById::like(&self.topics, (0, None));
+        for (id, edge) in self.publishes.with_ids() {
+            if let Some(found) = found.get_mut(edge.topic) {
+                *found = (found.0 + 1, Some(id));
+            }
+        }
+        let is_all = |topic: &Topic| topic.unknown_publishers.unwrap_or(0) == 0;
+        let each = self.topics.iter().zip(found);
+        each.map(|(topic, (many, id))| id.filter(|_| many == 1 && is_all(topic)))
+            .collect()
+    }
+
+    /// The first and the last sign of an element, if known.
+    pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
+        of_record!(self, get, element, it => (it.first, it.last)).unwrap_or_default()
+    }
+}
