@@ -313,11 +313,10 @@ fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId,
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic].count;
     }
-    for graph in &mission.graphs {
-        for (id, state) in graph.publishes() {
-            if let Some(count) = state.count {
-                *traffic[elements.publishes[id].node].sent.get_or_insert(0) += count;
-            }
+    for (id, edge) in elements.publishes.with_ids() {
+        let rows = mission.graphs.rows(Element::Publish(id));
+        for count in rows.filter_map(|(_, row)| row.count) {
+            *traffic[edge.node].sent.get_or_insert(0) += count;
         }
     }
     traffic
@@ -343,14 +342,14 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
             activity: vec![0; mission.windows.len()],
         })
         .collect();
-    for (window, graph) in mission.each() {
-        for (id, state) in graph.topics() {
-            let topic = &mut topics[id];
-            topic.count += state.messages();
-            topic.bytes = state
+    for (topic, id) in topics.iter_mut().zip(elements.topics.ids()) {
+        for (window, row) in mission.graphs.rows(Element::Topic(id)) {
+            let count = row.count.unwrap_or(0);
+            topic.count += count;
+            topic.bytes = row
                 .bytes
                 .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
-            topic.activity[window.index] = state.messages();
+            topic.activity[window] = count;
         }
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();

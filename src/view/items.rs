@@ -473,11 +473,10 @@ pub(super) fn arrow(
 /// The messages and the payload bytes of each topic in all windows in which its bytes are known.
 fn sizes(mission: &Mission) -> ById<TopicId, (u64, u64)> {
     let mut sizes = ById::like(&mission.elements.topics, (0_u64, 0_u64));
-    for graph in &mission.graphs {
-        for (id, state) in graph.topics() {
-            if let Some(bytes) = state.bytes {
-                let size = &mut sizes[id];
-                size.0 = size.0.saturating_add(state.messages());
+    for (size, id) in sizes.iter_mut().zip(mission.elements.topics.ids()) {
+        for (_, row) in mission.graphs.rows(Element::Topic(id)) {
+            if let Some(bytes) = row.bytes {
+                size.0 = size.0.saturating_add(row.count.unwrap_or(0));
                 size.1 = size.1.saturating_add(bytes);
             }
         }

@@ -100,10 +100,10 @@ pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
     let shown = shown(view);
     let is_shown = |id: NodeId| shown.contains(&Element::Node(id));
     let mut presence = ById::like(&elements.nodes, WindowsOf::default());
-    for graph in &mission.graphs {
-        graph
-            .nodes()
-            .for_each(|(id, state)| presence[id].add(state.hz));
+    for (there, id) in presence.iter_mut().zip(elements.nodes.ids()) {
+        for (at, row) in mission.graphs.rows(Element::Node(id)) {
+            there.add(row.hz(mission.windows[at].span));
+        }
     }
     let all = elements.nodes.with_ids().zip(&presence);
     let all = all.filter(|((id, _), _)| is_shown(*id));
@@ -129,11 +129,10 @@ pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     let shown = shown(view);
     let is_shown = |id: TopicId| shown.contains(&Element::Topic(id));
     let mut presence = ById::like(&elements.topics, (WindowsOf::default(), 0_u64));
-    for graph in &mission.graphs {
-        for (id, state) in graph.topics() {
-            let (one, messages) = &mut presence[id];
-            one.add(state.hz);
-            *messages += state.messages();
+    for ((there, messages), id) in presence.iter_mut().zip(elements.topics.ids()) {
+        for (at, row) in mission.graphs.rows(Element::Topic(id)) {
+            there.add(row.hz(mission.windows[at].span));
+            *messages += row.count.unwrap_or(0);
         }
     }
     let all = elements.topics.with_ids().zip(&presence);
