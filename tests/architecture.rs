@@ -39,7 +39,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["collector", "unknown"],
         &["conclude", "given", "offsets"],
     ]),
-    ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
+    ("graph", &[&["elements", "graphs", "history", "per_element"], &["build", "diff", "window"]]),
     ("mission", &[&["event_log"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
     ("view", &[
         &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "looks", "names", "replicas", "roles", "runs", "shown"],
