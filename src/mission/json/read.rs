@@ -14,7 +14,7 @@ use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Period, Span, Stamp};
-use crate::graph::{Element, Elements, Graphs, GraphsWriter};
+use crate::graph::{ColumnWriter, Element, Elements, Graphs, GraphsWriter};
 use crate::mission::{Mission, Window};
 
 /// Reads a mission in JSON; `path` is only used in errors.
@@ -173,12 +173,8 @@ const ONE: Period = match Period::from_nanos(1) {
 
 /// The graphs of these windows by the elements' columns.
 fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
-    let mut graphs = GraphsWriter::new(spans.to_vec());
-    let mut add = |what: Option<Element>, columns: Option<&JsonColumns<'_>>| {
-        if let (Some(what), Some(columns)) = (what, columns) {
-            columns.add(what, spans.len(), &mut graphs);
-        }
-    };
+    let mut found: Vec<(Element, &JsonColumns<'_>)> = Vec::new();
+    let mut add = |what: Option<Element>, columns| found.extend(what.zip(columns));
     for node in &raw.nodes {
         let id = all.node(&node.name);
         add(id.map(Element::Node), node.columns.as_deref());
@@ -196,6 +192,16 @@ fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
         let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
         let what = ends.and_then(|ends| all.subscribed(ends));
         add(what, edge.edge.columns.as_deref());
+    }
+    found.sort_by_key(|(what, _)| *what);
+    let mut graphs = GraphsWriter::new(spans.to_vec());
+    // An element may be listed twice.
+    for same in found.chunk_by(|a, b| a.0 == b.0) {
+        let mut rows = ColumnWriter::default();
+        for (_, columns) in same {
+            columns.add(&mut rows, spans.len(), &mut graphs);
+        }
+        graphs.element(same[0].0, rows);
     }
     graphs.finish()
 }
@@ -291,6 +297,24 @@ mod tests {
             String::from_utf8(first).unwrap(),
             String::from_utf8(second).unwrap()
         );
+    }
+
+    #[test]
+    fn an_element_listed_twice_has_the_windows_of_both() {
+        let listed = |window| {
+            format!(
+                r#"{{"what": "node", "name": "/a", "in": {{"windows": [[{window}, {window}]]}}}}"#
+            )
+        };
+        let text = format!(
+            r#"{{"schema": "bagreel.mission/3", "form": "runs", "windows": [{{"start_ns": 0, "end_ns": 10}},
+            {{"start_ns": 10, "end_ns": 20}}], "elements": [{}, {}]}}"#,
+            listed(0),
+            listed(1)
+        );
+        let mission = read(&text).unwrap();
+        let nodes: Vec<usize> = mission.graphs.iter().map(|g| g.nodes().count()).collect();
+        assert_eq!(nodes, [1, 1]);
     }
 
     #[test]

@@ -82,8 +82,9 @@ impl<'a> JsonColumns<'a> {
         all
     }
 
-    /// Adds the rows of an element in order; rows out of order or after the last window are ignored.
-    pub(crate) fn add(&self, what: Element, many: usize, all: &mut GraphsWriter) {
+    /// Adds the rows to those of the element, of which `all` has `many` windows; rows out of order or after the last window
+    /// are ignored.
+    pub(crate) fn add(&self, rows: &mut ColumnWriter, many: usize, all: &mut GraphsWriter) {
         let number = |word: &Option<Text<'_>>| {
             let word = word.as_deref().map(Arc::from);
             word.map_or(0, |word| all.lifecycle(&word))
@@ -101,7 +102,7 @@ impl<'a> JsonColumns<'a> {
         let mut jitters = self.jitter_s.values(|value| Number::of(*value));
         let mut ages = self.age_s.values(|value| Number::of(*value));
         let mut rates = self.hz.values(JsonRate::number);
-        let (mut rows, mut next) = (ColumnWriter::default(), 0);
+        let mut next = 0;
         for (from, to) in &self.windows {
             for at in (*from).max(next)..(*to).saturating_add(1).min(many) {
                 let state = states.next().unwrap_or(State::Active);
@@ -122,6 +123,5 @@ impl<'a> JsonColumns<'a> {
                 next = at + 1;
             }
         }
-        all.element(what, rows);
     }
 }
