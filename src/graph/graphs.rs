@@ -58,9 +58,14 @@ impl Graphs {
         self.iter().nth(window)
     }
 
+    /// A cursor over the rows of an element; `None` if it exists in no window.
+    fn cursor(&self, what: Element) -> Option<ColumnCursor<'_>> {
+        self.columns.of(what).map(Column::cursor)
+    }
+
     /// The rows of an element in the windows in which it exists, in order, with the indices of the windows.
     pub(crate) fn rows(&self, what: Element) -> impl Iterator<Item = (usize, Row)> + '_ {
-        let mut cursor = self.columns.of(what).map(Column::cursor);
+        let mut cursor = self.cursor(what);
         let row = move |at| {
             let row = cursor.as_mut().and_then(ColumnCursor::next);
             row.map(|row| (at, row))
@@ -71,7 +76,7 @@ impl Graphs {
     /// The indices of the windows from which an element exists (`true`) or no longer exists.
     pub(crate) fn turns(&self, what: Element) -> Vec<(usize, bool)> {
         let mut found = Vec::new();
-        let Some(mut cursor) = self.columns.of(what).map(Column::cursor) else {
+        let Some(mut cursor) = self.cursor(what) else {
             return found;
         };
         let (mut at, mut exists) = (0, false);
@@ -189,7 +194,7 @@ impl GraphsWriter {
         })
     }
 
-    /// Adds all rows of an element.
+    /// Sets all rows of an element.
     pub(crate) fn element(&mut self, what: Element, rows: ColumnWriter) {
         let (kind, id) = what.place();
         let columns = &mut self.0.columns.0[kind];
@@ -197,6 +202,11 @@ impl GraphsWriter {
             columns.resize_with(id + 1, Column::default);
         }
         columns[id] = rows.finish();
+    }
+
+    /// A cursor over the rows of an element that has been set.
+    pub(crate) fn cursor(&self, what: Element) -> Option<ColumnCursor<'_>> {
+        self.0.cursor(what)
     }
 
     /// The number of a lifecycle state in rows, counted from 1; states are few.

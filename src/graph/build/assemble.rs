@@ -52,7 +52,6 @@ pub(crate) fn graphs(
         history,
         published: BTreeMap::new(),
         sent: BTreeMap::new(),
-        topics: BTreeMap::new(),
     };
     all.topics(recorded).map_err(spool_error)?;
     all.nodes();
@@ -78,8 +77,6 @@ struct GraphAssembly<'a> {
     published: BTreeMap<(Name, Name), Column>,
     /// The number of messages of each known publisher per window.
     sent: BTreeMap<Name, Vec<u64>>,
-    /// The states of each topic in the windows in which it exists.
-    topics: BTreeMap<TopicId, Column>,
 }
 
 impl GraphAssembly<'_> {
@@ -135,7 +132,7 @@ impl GraphAssembly<'_> {
             return;
         };
         let mut list = sums.unwrap_or_default().iter().peekable();
-        let (mut states, mut rows) = (ColumnWriter::default(), ColumnWriter::default());
+        let mut rows = ColumnWriter::default();
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
             if !self.sees(record, *window) {
@@ -145,7 +142,6 @@ impl GraphAssembly<'_> {
                 record.state(*window, sum.is_some()),
                 self.confidence(what, record, *window),
             );
-            states.push(at, state);
             let row = Row {
                 count: Some(sum.map_or(0, |sum| sum.count)),
                 bytes: bytes(sum, sums.is_some()),
@@ -159,7 +155,6 @@ impl GraphAssembly<'_> {
             rows.push(at, row);
         }
         self.graphs.element(what, rows);
-        self.topics.insert(id, states.finish());
     }
 
     fn nodes(&mut self) {
@@ -238,7 +233,7 @@ impl GraphAssembly<'_> {
             let Some(record) = self.history.records.of(what) else {
                 continue;
             };
-            let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
+            let mut topic = self.graphs.cursor(Element::Topic(edge.topic));
             let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 let topic = topic.as_mut().and_then(ColumnCursor::next);
