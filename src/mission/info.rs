@@ -339,7 +339,7 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
             unknown_publishers: topic.unknown_publishers,
             qos: topic.qos.as_deref().map(str::to_owned),
             skew,
-            activity: vec![0; mission.windows.len()],
+            activity: vec![0; mission.graphs.len()],
         })
         .collect();
     for (topic, id) in topics.iter_mut().zip(elements.topics.ids()) {
@@ -351,6 +351,9 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
                 .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
             topic.activity[window] = count;
         }
+        let (first, last) = elements.life(Element::Topic(id));
+        let span = first.zip(last).map(|(first, last)| last.since(first));
+        topic.hz = span.and_then(|nanos| mean_rate(topic.count, nanos));
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();
     let named = elements.publishes.iter();
@@ -359,13 +362,6 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
     }
     for (_, edge) in listeners(mission) {
         topics[edge.topic].subscribers.push(name(edge.node));
-    }
-    for (topic, id) in topics.iter_mut().zip(elements.topics.ids()) {
-        let life = elements.life(Element::Topic(id));
-        topic.hz = life
-            .0
-            .zip(life.1)
-            .and_then(|(first, last)| mean_rate(topic.count, last.since(first)));
     }
     topics
 }

@@ -8,7 +8,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::count;
 use crate::evidence::Evidence;
-use crate::graph::{ById, Element, NodeId, TopicId};
+use crate::graph::{Element, Graphs};
 use crate::mission::Mission;
 use crate::mission::info::{how_many, info};
 use crate::view::View;
@@ -47,21 +47,27 @@ pub(super) fn folded(summary: &str, inside: &str) -> String {
     )
 }
 
-/// The number of windows that contain each element, and the sum of its rates in them.
-#[derive(Clone, Copy, Default)]
+/// The number of windows that contain an element, with its messages and the sum of its rates in them.
+#[derive(Default)]
 struct WindowsOf {
     windows: usize,
+    messages: u64,
     hz: f64,
     rated: usize,
 }
 
 impl WindowsOf {
-    fn add(&mut self, hz: Option<f64>) {
-        self.windows += 1;
-        if let Some(hz) = hz {
-            self.hz += hz;
-            self.rated += 1;
+    fn new(graphs: &Graphs, what: Element) -> Self {
+        let mut all = Self::default();
+        for (at, row) in graphs.rows(what) {
+            all.windows += 1;
+            all.messages += row.count.unwrap_or(0);
+            if let Some(hz) = row.hz(graphs.spans()[at]) {
+                all.hz += hz;
+                all.rated += 1;
+            }
         }
+        all
     }
 
     fn mean(&self) -> String {
@@ -98,17 +104,11 @@ fn shown(view: &View) -> BTreeSet<Element> {
 pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
     let shown = shown(view);
-    let is_shown = |id: NodeId| shown.contains(&Element::Node(id));
-    let mut presence = ById::like(&elements.nodes, WindowsOf::default());
-    for (there, id) in presence.iter_mut().zip(elements.nodes.ids()) {
-        for (at, row) in mission.graphs.rows(Element::Node(id)) {
-            there.add(row.hz(mission.windows[at].span));
-        }
-    }
-    let all = elements.nodes.with_ids().zip(&presence);
-    let all = all.filter(|((id, _), _)| is_shown(*id));
+    let all = elements.nodes.with_ids();
+    let all = all.filter(|(id, _)| shown.contains(&Element::Node(*id)));
     let nodes = all.clone().count();
-    let rows = all.map(|((_, node), there)| {
+    let rows = all.map(|(id, node)| {
+        let there = WindowsOf::new(&mission.graphs, Element::Node(id));
         format!(
             "| {} | {} | {} | {} | {} |\n",
             code(node.name.as_str()),
@@ -127,25 +127,19 @@ pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
 pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
     let shown = shown(view);
-    let is_shown = |id: TopicId| shown.contains(&Element::Topic(id));
-    let mut presence = ById::like(&elements.topics, (WindowsOf::default(), 0_u64));
-    for ((there, messages), id) in presence.iter_mut().zip(elements.topics.ids()) {
-        for (at, row) in mission.graphs.rows(Element::Topic(id)) {
-            there.add(row.hz(mission.windows[at].span));
-            *messages += row.count.unwrap_or(0);
-        }
-    }
-    let all = elements.topics.with_ids().zip(&presence);
-    let all = all.filter(|((id, _), _)| is_shown(*id));
+    let all = elements.topics.with_ids();
+    let all = all.filter(|(id, _)| shown.contains(&Element::Topic(*id)));
     let topics = all.clone().count();
-    let rows = all.map(|((_, topic), (there, messages))| {
+    let rows = all.map(|(id, topic)| {
+        let there = WindowsOf::new(&mission.graphs, Element::Topic(id));
         let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
         format!(
-            "| {} | {} | {} | {} | {messages} | {} | {} |\n",
+            "| {} | {} | {} | {} | {} | {} | {} |\n",
             code(topic.name.as_str()),
             types.join(", "),
             seen(mission, topic.first, topic.last),
             there.windows,
+            there.messages,
             there.mean(),
             words(topic.evidence)
         )
