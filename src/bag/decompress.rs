@@ -82,11 +82,13 @@ impl Allowance {
     ) -> io::Result<Box<dyn Read + Send + 'a>> {
         let packed = Counted {
             from,
+            failed: None,
             allowance: Arc::clone(self),
             spends: None,
         };
         Ok(Box::new(Counted {
             from: how.reader(packed)?,
+            failed: None,
             allowance: Arc::clone(self),
             spends: Some(how.cost()),
         }))
@@ -109,9 +111,12 @@ impl Allowance {
     }
 }
 
-/// A reader that counts the bytes it reads.
+/// A reader that counts the bytes it reads, and ends with its first error.
 struct Counted<R> {
     from: R,
+    /// The error after which `from` is not read again: libbz2 would continue with a half-read table, and access memory
+    /// outside it.
+    failed: Option<io::ErrorKind>,
     allowance: Arc<Allowance>,
     /// What a byte costs of the allowance; `None` for compressed bytes, which increase it.
     spends: Option<u64>,
@@ -119,7 +124,13 @@ struct Counted<R> {
 
 impl<R: Read> Read for Counted<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let n = self.from.read(into)?;
+        if let Some(kind) = self.failed {
+            return Err(kind.into());
+        }
+        let n = self.from.read(into).inspect_err(|error| {
+            // An interrupted read is simply repeated.
+            self.failed = Some(error.kind()).filter(|kind| *kind != io::ErrorKind::Interrupted);
+        })?;
         match self.spends {
             Some(cost) => self.allowance.spend(cost * n as u64)?,
             None => drop(self.allowance.packed.fetch_add(n as u64, Ordering::Relaxed)),
@@ -308,6 +319,32 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn no_bytes_follow_an_error() {
+        let plain: Vec<u8> = (0..20_000u32).flat_map(|i| (i / 7).to_le_bytes()).collect();
+        for how in [Compression::Bz2, Compression::Lz4, Compression::Zstd] {
+            let packed = packed(how, &plain);
+            let mut failed = 0;
+            for at in 0..packed.len() {
+                let mut damaged = packed.clone();
+                damaged[at] ^= 1 << (at % 8);
+                let allowance: Arc<Allowance> = Arc::default();
+                let Ok(mut reader) = allowance.open(how, &damaged[..]) else {
+                    continue;
+                };
+                let Err(error) = io::copy(&mut reader, &mut io::sink()) else {
+                    continue;
+                };
+                failed += 1;
+                for _ in 0..20 {
+                    let again = reader.read(&mut [0; 4096]).unwrap_err();
+                    assert_eq!(again.kind(), error.kind(), "{how:?}, byte {at}");
+                }
+            }
+            assert!(failed > 0, "{how:?}");
         }
     }
 
