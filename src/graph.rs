@@ -29,7 +29,7 @@ pub use build::{Built, build};
 pub(crate) use build::{
     History, Record, TopicCount, Windowed, counts, graphs, made, traffic, unread,
 };
-pub use elements::{Edge, EdgeId, Element, Elements, Node, NodeId, Topic, TopicId};
+pub use elements::{Edge, EdgeId, Element, Elements, Existence, Node, NodeId, Topic, TopicId};
 pub use per_element::PerElement;
 
 worded! {

@@ -130,8 +130,8 @@ pub mod values {
     pub use crate::evidence::{Confidence, Evidence};
     pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
-        ById, Edge, EdgeId, Element, ElementState, Elements, Graphs, GraphsIter, Id, Measures,
-        Node, NodeId, NodeLoad, State, Topic, TopicId,
+        ById, Edge, EdgeId, Element, ElementState, Elements, Existence, Graphs, GraphsIter, Id,
+        Measures, Node, NodeId, NodeLoad, State, Topic, TopicId,
     };
     pub use crate::mission::event_log::{
         Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,

@@ -151,13 +151,12 @@ impl Mission {
                 .collect();
             window.changes = changes.next(window.span, &graph, &inside);
         }
-        for what in self.elements.all() {
+        let all = self.elements.all();
+        for (what, seen) in all.zip(self.elements.seen_mut()) {
             let rows = self.graphs.rows(what);
             let windows = rows.filter_map(|(at, _)| Some(self.windows.get(at)?.span));
             let lives = Span::joined(windows.collect(), 0);
-            if let Some(runs) = self.elements.runs_mut(what) {
-                *runs = lives;
-            }
+            seen.lives = lives;
         }
         self.sending = Sending::of_windows(&self.elements, &self.graphs);
         self.log = EventLog::from_changes(&self.elements, &self.windows);
@@ -170,8 +169,8 @@ impl Mission {
     /// Whether exact lifetimes are known, not only windows.
     pub(crate) fn knows_lives(&self) -> bool {
         let all = &self.elements;
-        all.topics.iter().any(|t| !t.runs.is_empty())
-            || all.nodes.iter().any(|n| !n.runs.is_empty())
+        all.topics.iter().any(|t| !t.seen.lives.is_empty())
+            || all.nodes.iter().any(|n| !n.seen.lives.is_empty())
     }
 
     /// The name of the bag, or of the first of several with the number of the others.

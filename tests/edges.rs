@@ -74,8 +74,14 @@ fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
     let topic = |id| all.topics[id].name.as_str();
     let graph = &built.graphs[0];
     let confidence = |what| graph.get(what).map_or("never", |s| s.confidence.word());
-    let publishes = all.publishes.with_ids().filter(|(_, e)| by(e.evidence));
-    let subscribes = all.subscribes.with_ids().filter(|(_, e)| by(e.evidence));
+    let publishes = all
+        .publishes
+        .with_ids()
+        .filter(|(_, e)| by(e.seen.evidence));
+    let subscribes = all
+        .subscribes
+        .with_ids()
+        .filter(|(_, e)| by(e.seen.evidence));
     let mut lines: Vec<String> = publishes
         .map(|(id, e)| {
             let confidence = confidence(graph::Element::Publish(id));
@@ -576,7 +582,7 @@ fn an_anonymous_node_starts_at_the_time_in_its_name() {
     let probe = nodes
         .find(|n| n.name.as_str().starts_with("/probe"))
         .unwrap();
-    assert_eq!(probe.first, Some(Stamp(ORIGIN + 2 * SECOND)));
+    assert_eq!(probe.seen.first, Some(Stamp(ORIGIN + 2 * SECOND)));
 }
 
 #[test]

@@ -303,7 +303,7 @@ impl<'a> TopicTimeline<'a> {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
             let node = elements.nodes.get(*id);
-            node.is_some_and(|n| !n.evidence.is_guess())
+            node.is_some_and(|n| !n.seen.evidence.is_guess())
         };
         let roles = self.source.roles.iter();
         let all: Vec<_> = roles.filter(|(_, n)| n.iter().any(is_known)).collect();

@@ -53,6 +53,11 @@ impl Evidence {
         self.0 == 0
     }
 
+    /// Whether the set has the kind with this word.
+    pub fn has(self, word: &str) -> bool {
+        self.0 & Self::of(word).0 != 0
+    }
+
     /// The words of all kinds, in the order of [`SOURCES`].
     pub fn all_words() -> impl Iterator<Item = &'static str> {
         SOURCES.iter().map(|source| source.word)

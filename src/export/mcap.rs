@@ -78,7 +78,7 @@ impl<'a> Ends<'a> {
         let mut unnamed = Vec::new();
         for (what, edge) in all.edges() {
             if !is_known(what) {
-                let is_source = all.evidence(what).words().any(|word| word == "source_only");
+                let is_source = all.evidence(what).has("source_only");
                 let is_box = !is_source && matches!(what, Element::Publish(_));
                 let node = all.nodes.get(edge.node).filter(|_| is_box);
                 unnamed.extend(node.map(|node| (what, edge, boxed(node.name.as_str()))));
@@ -99,7 +99,7 @@ impl<'a> Ends<'a> {
         let all = mission.elements.all();
         let topics = all.filter(Element::is_topic);
         let runs = nodes.chain(edges).chain(topics);
-        let runs = runs.flat_map(|what| mission.elements.runs(what));
+        let runs = runs.flat_map(|what| &mission.elements.seen(what).lives);
         let turns = runs.flat_map(|run| [run.start, run.end]);
         let inside = turns.filter(|at| mission.span.contains(*at));
         inside.chain([mission.span.start]).collect()
@@ -108,7 +108,7 @@ impl<'a> Ends<'a> {
     /// The graph at a time.
     fn graph(&self, mission: &Mission, at: Stamp) -> Vec<u8> {
         let elements = &mission.elements;
-        let is_there = |what: Element| elements.runs(what).iter().any(|run| run.contains(at));
+        let is_there = |what: Element| elements.seen(what).lives.iter().any(|run| run.contains(at));
         let nodes = self
             .of
             .iter()

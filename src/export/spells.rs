@@ -63,7 +63,7 @@ impl SpellOf {
                 life.end.min(mission.span.end),
             )
         };
-        let lives = elements.runs(what).iter().map(inside);
+        let lives = elements.seen(what).lives.iter().map(inside);
         let mut all = Self {
             id,
             label,

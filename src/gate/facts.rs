@@ -57,7 +57,7 @@ fn is_seen(evidence: Evidence) -> bool {
 }
 
 fn has(evidence: Evidence, words: &[&str]) -> bool {
-    evidence.words().any(|word| words.contains(&word))
+    words.iter().any(|word| evidence.has(word))
 }
 
 impl<'a> Facts<'a> {
@@ -75,7 +75,7 @@ impl<'a> Facts<'a> {
         let mut names = BTreeMap::new();
         for (id, node) in elements.nodes.with_ids() {
             // Elements in no window are outside the part that is checked.
-            if is_there(id) && is_seen(node.evidence) {
+            if is_there(id) && is_seen(node.seen.evidence) {
                 roles.entry(&node.role).or_default().push(id);
                 names.insert(node.name.as_str(), &*node.role);
             }
@@ -154,9 +154,9 @@ impl<'a> Facts<'a> {
         let elements = &self.mission.elements;
         let any = |of: usize, edges: &ById<EdgeId, Edge>| {
             let mut own = self.edges[of][topic].iter();
-            own.any(|id| is_seen(edges[*id].evidence))
+            own.any(|id| is_seen(edges[*id].seen.evidence))
         };
-        is_seen(elements.topics[topic].evidence)
+        is_seen(elements.topics[topic].seen.evidence)
             && (self.messages[topic] > 0
                 || any(0, &elements.publishes)
                 || !any(1, &elements.subscribes))
@@ -243,7 +243,7 @@ impl<'a> Facts<'a> {
         let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
         let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
         let any = |words: &[&str]| {
-            let has_any = |id: &NodeId| has(self.mission.elements.nodes[*id].evidence, words);
+            let has_any = |id: &NodeId| has(self.mission.elements.nodes[*id].seen.evidence, words);
             named.iter().any(|nodes| nodes.iter().any(has_any))
         };
         !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
@@ -270,8 +270,8 @@ impl<'a> Facts<'a> {
     /// subscriber.
     pub(crate) fn lists_subscribers(&self, nodes: &[NodeId]) -> bool {
         self.mission.elements.subscribes.iter().any(|edge| {
-            let own = nodes.contains(&edge.node) && has(edge.evidence, &["links"]);
-            own || has(edge.evidence, &LISTING) && !self.is_tool(&[edge.node])
+            let own = nodes.contains(&edge.node) && has(edge.seen.evidence, &["links"]);
+            own || has(edge.seen.evidence, &LISTING) && !self.is_tool(&[edge.node])
         })
     }
 
@@ -279,7 +279,7 @@ impl<'a> Facts<'a> {
     pub(crate) fn lives(&self, nodes: &[NodeId]) -> Vec<Span> {
         let mut all: Vec<Span> = Vec::new();
         for id in nodes {
-            let runs = self.mission.elements.runs(Element::Node(*id));
+            let runs = &self.mission.elements.seen(Element::Node(*id)).lives;
             if runs.is_empty() {
                 all.extend(self.windows_of(*id));
             } else {
@@ -298,7 +298,7 @@ impl<'a> Facts<'a> {
     /// The time in which a node published a topic, if known, and the number of its messages.
     pub(crate) fn sent(&self, node: NodeId, edge: EdgeId) -> Option<(Span, u64)> {
         let mission = self.mission;
-        let runs = match mission.elements.runs(Element::Publish(edge)) {
+        let runs = match &mission.elements.seen(Element::Publish(edge)).lives[..] {
             [] => self.lives(&[node]),
             runs => runs.to_vec(),
         };
@@ -380,7 +380,7 @@ impl<'a> Facts<'a> {
     pub(crate) fn is_logged_only(&self, nodes: &[NodeId]) -> bool {
         let elements = &self.mission.elements;
         let is_listed = |id: &NodeId| {
-            let evidence = elements.nodes[*id].evidence;
+            let evidence = elements.nodes[*id].seen.evidence;
             has(evidence, &LISTING) || has(evidence, &STARTING) || !has(evidence, &["rosout"])
         };
         !self.is_sender(nodes) && !nodes.iter().any(is_listed)
@@ -416,7 +416,7 @@ fn by_topic(
     let mut all = ById::like(topics, Vec::new());
     for (id, edge) in edges
         .with_ids()
-        .filter(|(_, edge)| !edge.evidence.is_guess())
+        .filter(|(_, edge)| !edge.seen.evidence.is_guess())
     {
         all[edge.topic].push(id);
     }

@@ -17,6 +17,31 @@ ids! {
     EdgeId,
 }
 
+/// How an element is known, and when it exists, over the whole mission.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Existence {
+    /// The kinds of evidence for it.
+    pub evidence: Evidence,
+    /// The time of its first message or other sign.
+    pub first: Option<Stamp>,
+    /// The time of its last message or other sign.
+    pub last: Option<Stamp>,
+    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
+    pub lives: Vec<Span>,
+}
+
+impl Existence {
+    /// That of an element with this evidence and without times.
+    pub(crate) const fn of(evidence: Evidence) -> Self {
+        Self {
+            evidence,
+            first: None,
+            last: None,
+            lives: Vec::new(),
+        }
+    }
+}
+
 /// A node, over the whole mission.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Node {
@@ -24,21 +49,15 @@ pub struct Node {
     pub name: NodeName,
     /// The name with anonymous suffixes folded; equal to the name for most.
     pub role: Arc<str>,
-    /// The kinds of evidence for it.
-    pub evidence: Evidence,
-    /// The time of its first sign in the mission.
-    pub first: Option<Stamp>,
-    /// The time of its last sign in the mission.
-    pub last: Option<Stamp>,
-    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
-    pub runs: Vec<Span>,
+    /// How it is known, and when it exists.
+    pub seen: Existence,
 }
 
 impl Node {
     /// Whether it records or plays bags, by its name or its log records.
     pub(crate) fn records(&self) -> bool {
         let name = self.name.as_str();
-        is_recorder(name) || is_player(name) || self.evidence.words().any(|w| w == "recorder")
+        is_recorder(name) || is_player(name) || self.seen.evidence.has("recorder")
     }
 
     /// Whether it is housekeeping, a recorder or a player: events, phases and figures leave it out.
@@ -54,16 +73,10 @@ pub struct Topic {
     pub name: TopicName,
     /// Its types, sorted; more than one is a mistake in the robot's software.
     pub types: Vec<Arc<str>>,
-    /// The kinds of evidence for it.
-    pub evidence: Evidence,
-    /// The time of its first message or other sign.
-    pub first: Option<Stamp>,
-    /// The time of its last message or other sign.
-    pub last: Option<Stamp>,
     /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
     pub qos: Option<Arc<str>>,
-    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
-    pub runs: Vec<Span>,
+    /// How it is known, and when it exists.
+    pub seen: Existence,
     /// The number of publishers that the bag counts but does not name, ≥ 0; `None` if it does not count publishers.
     /// They are not nodes: a picture may show them as one small box.
     pub unknown_publishers: Option<u32>,
@@ -102,14 +115,8 @@ pub struct Edge {
     pub node: NodeId,
     /// The topic.
     pub topic: TopicId,
-    /// The kinds of evidence for it.
-    pub evidence: Evidence,
-    /// The time of its first message or other sign.
-    pub first: Option<Stamp>,
-    /// The time of its last message or other sign.
-    pub last: Option<Stamp>,
-    /// The intervals in which it exists, in order, half-open; empty if only windows are known.
-    pub runs: Vec<Span>,
+    /// How it is known, and when it exists.
+    pub seen: Existence,
 }
 
 /// All nodes, topics and edges of the mission: nodes and topics sorted by name, publications by (node, topic),
@@ -182,18 +189,6 @@ impl Element {
             Self::Subscribe(_) => "subscribe",
         }
     }
-}
-
-/// A value of an element's record, for any kind of element; `None` if the element does not exist.
-macro_rules! of_record {
-    ($elements:expr, $get:ident, $element:expr, $record:ident => $value:expr) => {{
-        match $element {
-            Element::Node(id) => $elements.nodes.$get(id).map(|$record| $value),
-            Element::Topic(id) => $elements.topics.$get(id).map(|$record| $value),
-            Element::Publish(id) => $elements.publishes.$get(id).map(|$record| $value),
-            Element::Subscribe(id) => $elements.subscribes.$get(id).map(|$record| $value),
-        }
-    }};
 }
 
 impl Elements {
@@ -285,19 +280,30 @@ impl Elements {
         topic.is_some_and(|id| self.topics.get(id).is_some_and(Topic::is_service))
     }
 
+    /// How an element is known, and when it exists; empty if there is no such element.
+    pub fn seen(&self, element: Element) -> &Existence {
+        const NONE: &Existence = &Existence::of(Evidence::NONE);
+        let found = match element {
+            Element::Node(id) => self.nodes.get(id).map(|node| &node.seen),
+            Element::Topic(id) => self.topics.get(id).map(|topic| &topic.seen),
+            Element::Publish(id) => self.publishes.get(id).map(|edge| &edge.seen),
+            Element::Subscribe(id) => self.subscribes.get(id).map(|edge| &edge.seen),
+        };
+        found.unwrap_or(NONE)
+    }
+
     /// The kinds of evidence for an element.
     pub fn evidence(&self, element: Element) -> Evidence {
-        of_record!(self, get, element, it => it.evidence).unwrap_or(Evidence::NONE)
+        self.seen(element).evidence
     }
 
-    /// The intervals in which an element exists, in order, half-open; empty if only windows are known.
-    pub fn runs(&self, element: Element) -> &[Span] {
-        of_record!(self, get, element, it => it.runs.as_slice()).unwrap_or_default()
-    }
-
-    /// As [`Elements::runs`], to change them; `None` if the element does not exist.
-    pub(crate) fn runs_mut(&mut self, element: Element) -> Option<&mut Vec<Span>> {
-        of_record!(self, get_mut, element, it => &mut it.runs)
+    /// That of every element, to change it, in the order of [`Elements::all`].
+    pub(crate) fn seen_mut(&mut self) -> impl Iterator<Item = &mut Existence> {
+        let nodes = self.nodes.iter_mut().map(|node| &mut node.seen);
+        let topics = self.topics.iter_mut().map(|topic| &mut topic.seen);
+        let edges = self.publishes.iter_mut().chain(&mut *self.subscribes);
+        let edges = edges.map(|edge| &mut edge.seen);
+        nodes.chain(topics).chain(edges)
     }
 
     /// The only publication of each topic; `None` if none or several are known, or if the bag counts
@@ -313,10 +319,5 @@ impl Elements {
         let each = self.topics.iter().zip(found);
         each.map(|(topic, (many, id))| id.filter(|_| many == 1 && is_all(topic)))
             .collect()
-    }
-
-    /// The first and the last sign of an element, if known.
-    pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
-        of_record!(self, get, element, it => (it.first, it.last)).unwrap_or_default()
     }
 }

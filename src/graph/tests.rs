@@ -326,6 +326,7 @@ fn user_topology_is_added_without_overwriting() {
     assert_eq!(states(&all, "/x"), ["active", "-", "-"]);
     assert_eq!(states(&all, "/z"), ["-", "active", "-"]);
     let words: Vec<_> = all.elements.subscribes[EdgeId(0)]
+        .seen
         .evidence
         .words()
         .collect();

@@ -192,16 +192,16 @@ pub fn info(mission: &Mission) -> Info {
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
     let named = elements.nodes.with_ids();
-    let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
+    let named = named.filter(|(_, node)| !is_unnamed(node.seen.evidence));
     let nodes = named.map(|(id, node)| {
         let own = &traffic[id];
         let confidence = best.of(Element::Node(id));
         NodeInfo {
             name: node.name.to_string(),
             confidence: confidence.map_or("", |confidence| confidence.word()),
-            evidence: node.evidence.words().collect(),
-            first_ns: node.runs.first().map(|run| run.start.0),
-            last_ns: node.runs.last().map(|run| run.end.0 - 1),
+            evidence: node.seen.evidence.words().collect(),
+            first_ns: node.seen.lives.first().map(|run| run.start.0),
+            last_ns: node.seen.lives.last().map(|run| run.end.0 - 1),
             publishes: own.publishes,
             subscribes: own.subscribes,
             sent: own.sent,
@@ -218,7 +218,7 @@ pub fn info(mission: &Mission) -> Info {
         nodes_by_degree: confidences(Element::is_node),
         publishes_by_degree: confidences(|what| matches!(what, Element::Publish(_))),
         subscribes_by_degree: listeners(mission)
-            .filter(|(_, edge)| !edge.evidence.is_guess())
+            .filter(|(_, edge)| !edge.seen.evidence.is_guess())
             .filter_map(|(id, _)| best.of(Element::Subscribe(id)).copied())
             .collect(),
         topics_without_publisher: lacking(&topics, &mut elements.publishes.iter()),
@@ -276,7 +276,7 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
     let elements = &mission.elements;
     let is_recorder = |edge: &Edge| {
         let node = &elements.nodes[edge.node];
-        is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
+        is_recorder(node.name.as_str()) || node.seen.evidence.has("recorder")
     };
     let edges = elements.subscribes.with_ids();
     edges.filter(move |(_, edge)| !is_recorder(edge))
@@ -284,7 +284,7 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (EdgeId, &Edge)> {
 
 /// The number of topics with messages but none of these edges.
 fn lacking(topics: &ById<TopicId, TopicInfo>, edges: &mut dyn Iterator<Item = &Edge>) -> usize {
-    let known = edges.filter(|edge| !edge.evidence.is_guess());
+    let known = edges.filter(|edge| !edge.seen.evidence.is_guess());
     let known: BTreeSet<TopicId> = known.map(|edge| edge.topic).collect();
     let with_messages = topics.with_ids().filter(|(_, t)| t.count > 0);
     with_messages.filter(|(id, _)| !known.contains(id)).count()
@@ -351,13 +351,14 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
                 .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
             topic.activity[window] = count;
         }
-        let (first, last) = elements.life(Element::Topic(id));
-        let span = first.zip(last).map(|(first, last)| last.since(first));
+        let seen = elements.seen(Element::Topic(id));
+        let span = seen.first.zip(seen.last);
+        let span = span.map(|(first, last)| last.since(first));
         topic.hz = span.and_then(|nanos| mean_rate(topic.count, nanos));
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();
     let named = elements.publishes.iter();
-    for edge in named.filter(|e| !is_unnamed(e.evidence)) {
+    for edge in named.filter(|e| !is_unnamed(e.seen.evidence)) {
         topics[edge.topic].publishers.push(name(edge.node));
     }
     for (_, edge) in listeners(mission) {
@@ -373,15 +374,18 @@ fn mean_rate(count: u64, nanos: i64) -> Option<f64> {
 
 fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
     let elements = &mission.elements;
-    let holds = |all: Evidence, word| all.words().any(|w| w == word);
-    let count = |sets: &mut dyn Iterator<Item = Evidence>, word| {
-        sets.filter(|set| holds(*set, word)).count()
-    };
-    let rows = Evidence::all_words().map(|source| EvidenceInfo {
-        source,
-        nodes: count(&mut elements.nodes.iter().map(|n| n.evidence), source),
-        publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
-        subscribes: count(&mut listeners(mission).map(|(_, e)| e.evidence), source),
+    let rows = Evidence::all_words().map(|source| {
+        let nodes = elements
+            .nodes
+            .iter()
+            .filter(|n| n.seen.evidence.has(source));
+        let has = |edge: &Edge| edge.seen.evidence.has(source);
+        EvidenceInfo {
+            source,
+            nodes: nodes.count(),
+            publishes: elements.publishes.iter().filter(|e| has(e)).count(),
+            subscribes: listeners(mission).filter(|(_, e)| has(e)).count(),
+        }
     });
     rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0 && row.source != UNNAMED)
         .collect()

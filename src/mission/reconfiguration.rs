@@ -56,7 +56,7 @@ impl Reconfiguration {
             let node = node.and_then(|id| elements.nodes.get(id));
             let topic = topic.and_then(|id| elements.topics.get(id));
             !elements.evidence(*what).is_guess()
-                && node.is_some_and(|node| !node.is_tool() && !node.evidence.is_guess())
+                && node.is_some_and(|node| !node.is_tool() && !node.seen.evidence.is_guess())
                 && topic.is_none_or(|topic| !is_quiet(topic.name.as_str()))
         };
         let mut before: Option<BTreeSet<Element>> = None;
@@ -90,7 +90,7 @@ impl Reconfiguration {
         let nodes = nodes.filter(|(id, _)| is_robot(&Element::Node(*id)));
         let lives = nodes.flat_map(|(_, node)| {
             let name = node.name.to_string();
-            node.runs.iter().map(move |run| (name.clone(), *run))
+            node.seen.lives.iter().map(move |run| (name.clone(), *run))
         });
         Self {
             run: run.to_owned(),

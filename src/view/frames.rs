@@ -87,7 +87,7 @@ fn turns(mission: &Mission) -> Vec<bool> {
     let mut turns = vec![false; windows.len()];
     let events = mission.log.events.iter();
     let times = events.flat_map(|event| [Some(event.time), event.until]);
-    let first = mission.elements.topics.iter().map(|topic| topic.first);
+    let first = mission.elements.topics.iter().map(|topic| topic.seen.first);
     for time in times.chain(first).flatten() {
         let from = windows.partition_point(|w| w.span.end <= time);
         let to = windows.partition_point(|w| w.span.start <= time) + 1;

@@ -129,7 +129,7 @@ impl<'a> ItemTurns<'a> {
         }
         for (id, carried) in carried.with_ids() {
             let topic = Element::Topic(id);
-            let first = self.elements.topics[id].first;
+            let first = self.elements.topics[id].seen.first;
             let lives = carried.unwrap_or(first.is_none_or(|first| first < end));
             if let (None, Some(is)) = (own(topic), alive.of_mut(topic)) {
                 *is = lives;

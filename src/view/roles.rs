@@ -37,7 +37,7 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
         let Some(node) = single_node(item, elements).filter(|n| is_anonymous(n)) else {
             continue;
         };
-        let first = node.first.unwrap_or(Stamp::MIN);
+        let first = node.seen.first.unwrap_or(Stamp::MIN);
         order.push((first, at, Arc::clone(&node.role)));
     }
     order.sort();
@@ -57,7 +57,7 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
 pub(crate) fn label_unknown(items: &mut [Item], elements: &Elements) {
     for item in items {
         let node = single_node(item, elements);
-        if node.is_some_and(|n| n.evidence == Evidence::of("unknown"))
+        if node.is_some_and(|n| n.seen.evidence == Evidence::of("unknown"))
             && let Some(mark) = item.name.rfind('?')
         {
             item.label = item.name[mark..].into();
@@ -83,9 +83,9 @@ fn is_taken(elements: &Elements, role: &str) -> bool {
 
 /// Whether each run was last seen before the next was first seen.
 fn follow(runs: &mut [&Node]) -> bool {
-    runs.sort_by_key(|n| n.first);
+    runs.sort_by_key(|n| n.seen.first);
     runs.windows(2)
-        .all(|pair| match (pair[0].last, pair[1].first) {
+        .all(|pair| match (pair[0].seen.last, pair[1].seen.first) {
             (Some(last), Some(first)) => last < first,
             _ => false,
         })
@@ -111,7 +111,7 @@ mod tests {
             node.role = name
                 .trim_end_matches(|c: char| c == '_' || c.is_ascii_digit())
                 .into();
-            (node.first, node.last) = (Some(Stamp(*first)), Some(Stamp(*last)));
+            (node.seen.first, node.seen.last) = (Some(Stamp(*first)), Some(Stamp(*last)));
         }
         let (view, _) = view(&mission, &ViewOptions::default());
         view.items.iter().map(|i| i.label.to_string()).collect()
@@ -122,7 +122,7 @@ mod tests {
         let mut mission = mission(&["/boss /scan"]);
         mission.elements.nodes[NodeId(1)].name = "/scan ? ×3".into();
         mission.elements.nodes[NodeId(1)].role = "/scan ? ×3".into();
-        mission.elements.nodes[NodeId(1)].evidence = Evidence::of("unknown");
+        mission.elements.nodes[NodeId(1)].seen.evidence = Evidence::of("unknown");
         let (view, _) = view(&mission, &ViewOptions::default());
         let labels: Vec<_> = view.items.iter().map(|i| &*i.label).collect();
         assert_eq!(labels, ["/boss", "? ×3"]);

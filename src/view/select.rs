@@ -97,7 +97,7 @@ fn ends(
 
 /// Whether only a hidden recorder subscribes to a topic, which has no other endpoint and no message.
 fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
-    let connected = topic.evidence.words().any(|word| word == "connection");
+    let connected = topic.seen.evidence.has("connection");
     ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
 }
 

@@ -222,7 +222,7 @@ impl<'a> Now<'a> {
     /// The topic of an element, if its first message comes after the window. A latched one needs no message.
     fn waits_for(&self, what: Element) -> Option<TopicId> {
         let (_, topic) = self.mission.elements.ends(what);
-        let first = self.mission.elements.topics.get(topic?)?.first;
+        let first = self.mission.elements.topics.get(topic?)?.seen.first;
         let row = self
             .rows
             .of(Element::Topic(topic?))
@@ -451,7 +451,7 @@ fn starved(mission: &Mission) -> Vec<(Element, Span)> {
     let events = events.filter(|event| event.kind == Kind::Starved);
     let edges = events.filter(|event| matches!(event.what, Element::Subscribe(_)));
     let lasts = |event: &Event| {
-        let mut runs = mission.elements.runs(event.what).iter();
+        let mut runs = mission.elements.seen(event.what).lives.iter();
         let run = runs.find(|run| run.contains(event.time));
         let end = run.map_or(mission.span.end, |run| run.end);
         (event.what, Span::new(event.time, end))

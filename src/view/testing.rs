@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
-use crate::evidence::{Confidence, Evidence};
+use crate::evidence::Confidence;
 use crate::graph::{
-    Edge, Element, ElementState, Elements, Graph, Node, NodeId, State, Topic, TopicId,
+    Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic, TopicId,
 };
 use crate::mission::{Mission, Window};
 
@@ -129,10 +129,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
             .map(|(node, topic)| Edge {
                 node: NodeId(node),
                 topic: TopicId(topic),
-                evidence: Evidence::NONE,
-                first: None,
-                last: None,
-                runs: Vec::new(),
+                seen: Existence::default(),
             })
             .collect()
     };
@@ -144,23 +141,14 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
             .map(|n| Node {
                 name: (*n).into(),
                 role: (*n).into(),
-                evidence: Evidence::NONE,
-                first: None,
-                last: None,
-                runs: Vec::new(),
+                seen: Existence::default(),
             })
             .collect(),
         topics: topics
             .iter()
             .map(|t| Topic {
                 name: (*t).into(),
-                types: Vec::new(),
-                evidence: Evidence::NONE,
-                first: None,
-                last: None,
-                runs: Vec::new(),
-                qos: None,
-                unknown_publishers: None,
+                ..Topic::default()
             })
             .collect(),
     }

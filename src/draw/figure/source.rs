@@ -138,7 +138,7 @@ impl<'a> FigureSource<'a> {
     /// The times in which an element exists.
     pub(crate) fn lives(&self, what: Element) -> impl Iterator<Item = Span> + '_ {
         let whole = self.span();
-        let lives = self.mission.elements.runs(what).iter();
+        let lives = self.mission.elements.seen(what).lives.iter();
         let inside =
             lives.map(move |life| Span::new(life.start.max(whole.start), life.end.min(whole.end)));
         inside.filter(|life| life.start < life.end)

@@ -354,7 +354,7 @@ fn a_node_that_forwards_stamps_subscribes_to_their_source() {
     let inferred = all
         .subscribes
         .iter()
-        .filter(|e| e.evidence.words().any(|w| w == "equal_stamps"));
+        .filter(|e| e.seen.evidence.has("equal_stamps"));
     let names = inferred.map(|e| {
         let (topic, node) = (&all.topics[e.topic], &all.nodes[e.node]);
         format!("{} {}", topic.name, node.name)

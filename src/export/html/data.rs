@@ -395,9 +395,9 @@ fn facts_of(
     let is_ros1 = is_ros1(page.sequence.mission).unwrap_or(false);
     facts.extend(evidence.lines().map(|line| known_by(&line, is_ros1)));
     if is_item {
-        let lives = members.iter().map(|m| elements.life(*m));
-        let first = lives.clone().filter_map(|l| l.0).min();
-        let last = lives.filter_map(|l| l.1).max();
+        let lives = members.iter().map(|m| elements.seen(*m));
+        let first = lives.clone().filter_map(|l| l.first).min();
+        let last = lives.filter_map(|l| l.last).max();
         if let (Some(first), Some(last)) = (first, last) {
             let at = |t: Stamp| words::offset_seconds(t.since(clock.0));
             facts.push(format!("seen {} – {}", at(first), at(last)));

@@ -112,10 +112,10 @@ pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
         format!(
             "| {} | {} | {} | {} | {} |\n",
             code(node.name.as_str()),
-            seen(mission, node.first, node.last),
+            seen(mission, node.seen.first, node.seen.last),
             there.windows,
             there.mean(),
-            words(node.evidence)
+            words(node.seen.evidence)
         )
     });
     let heads = ["Node", "Seen", "Windows", "Hz sent on average", "Known by"];
@@ -137,11 +137,11 @@ pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
             "| {} | {} | {} | {} | {} | {} | {} |\n",
             code(topic.name.as_str()),
             types.join(", "),
-            seen(mission, topic.first, topic.last),
+            seen(mission, topic.seen.first, topic.seen.last),
             there.windows,
             there.messages,
             there.mean(),
-            words(topic.evidence)
+            words(topic.seen.evidence)
         )
     });
     let heads = [

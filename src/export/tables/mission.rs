@@ -125,8 +125,8 @@ element_columns! {
     BYTES_OUT "bytes_out" I64 |_, one| count(one.load.and_then(|load| load.bytes_out));
     TOPICS_IN "topics_in" I64 |_, one| count(one.load.map(|load| load.topics_in.into()));
     TOPICS_OUT "topics_out" I64 |_, one| count(one.load.map(|load| load.topics_out.into()));
-    FIRST "first_ns" Time |all, one| time(all.elements.life(one.state.what).0);
-    LAST "last_ns" Time |all, one| time(all.elements.life(one.state.what).1);
+    FIRST "first_ns" Time |all, one| time(all.elements.seen(one.state.what).first);
+    LAST "last_ns" Time |all, one| time(all.elements.seen(one.state.what).last);
 }
 
 fn elements(

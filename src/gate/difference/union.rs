@@ -9,7 +9,9 @@ use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
-use crate::graph::{Edge, Element, ElementState, Elements, Graph, Node, NodeId, State, Topic};
+use crate::graph::{
+    Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic,
+};
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
 
@@ -51,7 +53,7 @@ impl MissionSide {
         let elements = &mission.elements;
         for (role, nodes) in facts.roles().filter(|(_, nodes)| !facts.is_tool(nodes)) {
             let evidence = nodes.iter().fold(Evidence::NONE, |all, id| {
-                all.and(elements.nodes[*id].evidence)
+                all.and(elements.nodes[*id].seen.evidence)
             });
             let confidence = if facts.is_sure(nodes) {
                 Confidence::Stated
@@ -66,19 +68,19 @@ impl MissionSide {
             let count: u64 = rates.iter().map(|r| r.count).sum();
             let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
             let topic = TopicSeen {
-                evidence: own.evidence,
+                evidence: own.seen.evidence,
                 types: own.types.iter().map(|t| (**t).to_owned()).collect(),
                 count: facts.messages(id),
                 hz: (nanos > 0).then(|| count as f64 / (nanos as f64 / 1e9)),
             };
             let name = facts.topic(id).to_owned();
             for (node, edge, confidence) in facts.publishers(id) {
-                let evidence = elements.publishes[edge].evidence;
+                let evidence = elements.publishes[edge].seen.evidence;
                 let key = (facts.role(node).to_owned(), name.clone());
                 seen.publishes.insert(key, (confidence, evidence));
             }
             for (node, edge, confidence) in facts.subscribers(id) {
-                let evidence = elements.subscribes[edge].evidence;
+                let evidence = elements.subscribes[edge].seen.evidence;
                 let key = (name.clone(), facts.role(node).to_owned());
                 seen.subscribes.insert(key, (confidence, evidence));
             }
@@ -165,7 +167,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
     let nodes = nodes.into_iter().map(|(name, evidence)| Node {
         name: name.as_str().into(),
         role: name.as_str().into(),
-        evidence,
+        seen: Existence::of(evidence),
         ..Node::default()
     });
     let topics = topics.into_iter().map(|name| {
@@ -175,7 +177,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         Topic {
             name: name.as_str().into(),
             types: types.into_iter().map(|t| t.as_str().into()).collect(),
-            evidence: own().fold(Evidence::NONE, |all, t| all.and(t.evidence)),
+            seen: Existence::of(own().fold(Evidence::NONE, |all, t| all.and(t.evidence))),
             ..Topic::default()
         }
     });
@@ -188,7 +190,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         Some(Edge {
             node: ends.node(node)?,
             topic: ends.topic(topic)?,
-            evidence,
+            seen: Existence::of(evidence),
             ..Edge::default()
         })
     };

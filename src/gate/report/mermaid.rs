@@ -110,7 +110,7 @@ fn edges<'a>(
     };
     let touches = |(node, topic): &(MermaidBox<'_>, MermaidBox<'_>), edge: &Edge| {
         let own = marked.contains_key(node) || marked.contains_key(topic);
-        let is_named = !edge.evidence.is_guess();
+        let is_named = !edge.seen.evidence.is_guess();
         own && is_named && !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic)
     };
     for edge in &elements.publishes {

@@ -260,7 +260,7 @@ impl GraphAssembly<'_> {
 
     /// The strength of the evidence for an element in a window: before its first sign it is inferred to exist.
     fn confidence(&self, what: Element, record: &Record, window: Span) -> Confidence {
-        let (first, _) = self.history.elements.life(what);
+        let first = self.history.elements.seen(what).first;
         if first.is_some_and(|first| window.end <= first) {
             record.confidence.max(Confidence::Inferred)
         } else {

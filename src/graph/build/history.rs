@@ -22,7 +22,9 @@ use crate::evidence::inference::{ElementKey, IncidentKind};
 use crate::evidence::observation::Name;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life, Sender, Sending, Stretch, Transition, all_silent};
-use crate::graph::{Edge, Element, Elements, Node, NodeId, PerElement, State, Topic, TopicId};
+use crate::graph::{
+    Edge, Element, Elements, Existence, Node, NodeId, PerElement, State, Topic, TopicId,
+};
 
 /// The history of a mission: its elements with their lifetimes, and the messages of all senders, in
 /// continuous time.
@@ -298,15 +300,11 @@ impl Assembly<'_> {
     fn node(&mut self, name: Name, track: &Liveness) {
         let silent = self.node_silences(name, &spans(track));
         let all = &mut self.history;
-        let (first, last) = track.bounds();
         let text = self.findings.text(name);
         let id = all.elements.nodes.push(Node {
             role: role(&text).into(),
             name: text.into(),
-            evidence: track.evidence,
-            first,
-            last,
-            runs: spans(track),
+            seen: seen(track),
         });
         all.node_ids.insert(name, id);
         let mut record = Record::new(track, self.findings.mission, silent);
@@ -331,16 +329,12 @@ impl Assembly<'_> {
             .collect();
         types.sort_unstable();
         types.dedup();
-        let (first, last) = track.bounds();
         let all = &mut self.history;
         let id = all.elements.topics.push(Topic {
             name: self.findings.text(name).into(),
             types,
-            evidence: track.evidence,
-            first,
-            last,
+            seen: seen(track),
             qos: values.quality(name),
-            runs: spans(track),
             unknown_publishers,
         });
         all.topic_ids.insert(name, id);
@@ -377,15 +371,11 @@ impl Assembly<'_> {
     }
 
     fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
-        let (first, last) = track.bounds();
         let (nodes, topics) = (&self.history.node_ids, &self.history.topic_ids);
         Edge {
             node: nodes.get(&node).copied().unwrap_or(NodeId(u32::MAX)),
             topic: topics.get(&topic).copied().unwrap_or(TopicId(u32::MAX)),
-            evidence: track.evidence,
-            first,
-            last,
-            runs: spans(track),
+            seen: seen(track),
         }
     }
 
@@ -414,6 +404,16 @@ impl Assembly<'_> {
 }
 
 /// The intervals in which an element exists, half-open.
+fn seen(track: &Liveness) -> Existence {
+    let (first, last) = track.bounds();
+    Existence {
+        evidence: track.evidence,
+        first,
+        last,
+        lives: spans(track),
+    }
+}
+
 fn spans(track: &Liveness) -> Vec<Span> {
     let span = |life: &Lifetime| Span::new(life.from, life.to.plus(1));
     track.lives.iter().map(span).collect()

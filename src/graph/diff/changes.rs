@@ -74,7 +74,8 @@ impl<'a> Changes<'a> {
     fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
         changes.extend(diff.added.iter().map(|state| {
             let what = state.what;
-            let time = self.elements.life(what).0.filter(|t| span.contains(*t));
+            let first = self.elements.seen(what).first;
+            let time = first.filter(|t| span.contains(*t));
             Change::Added { what, time }
         }));
     }
@@ -82,7 +83,7 @@ impl<'a> Changes<'a> {
     fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
         changes.extend(diff.removed.iter().map(|what| {
             let what = *what;
-            let time = self.elements.life(what).1.filter(|t| *t < span.end);
+            let time = self.elements.seen(what).last.filter(|t| *t < span.end);
             Change::Removed { what, time }
         }));
     }
@@ -137,7 +138,10 @@ impl<'a> Changes<'a> {
     fn present(&self, what: Element, span: Span) -> f64 {
         let (first, last) = match what {
             Element::Topic(id) => self.sent[id],
-            other => self.elements.life(other),
+            other => {
+                let other = self.elements.seen(other);
+                (other.first, other.last)
+            }
         };
         let start = first.map_or(span.start, |at| at.max(span.start));
         let end = last.map_or(span.end, |at| at.plus(1).min(span.end));
@@ -212,12 +216,12 @@ fn is_steady(topic: &ElementState, secs: f64) -> bool {
 /// none is known.
 fn sent(elements: &Elements) -> ById<TopicId, (Option<Stamp>, Option<Stamp>)> {
     let mut sent = ById::like(&elements.topics, (None, None));
-    for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {
+    for edge in elements.publishes.iter().filter(|e| e.seen.first.is_some()) {
         let (first, last): &mut (Option<Stamp>, Option<Stamp>) = &mut sent[edge.topic];
-        *first = [*first, edge.first].into_iter().flatten().min();
-        *last = (*last).max(edge.last);
+        *first = [*first, edge.seen.first].into_iter().flatten().min();
+        *last = (*last).max(edge.seen.last);
     }
-    let own = elements.topics.iter().map(|t| (t.first, t.last));
+    let own = elements.topics.iter().map(|t| (t.seen.first, t.seen.last));
     sent.into_iter()
         .zip(own)
         .map(|(sent, own)| if sent.0.is_some() { sent } else { own })

@@ -66,7 +66,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
     // Whether a node is known only from the messages of a topic.
     let is_only_sender = |node: NodeId, topic| {
-        let mut words = context.elements.nodes[node].evidence.words();
+        let mut words = context.elements.nodes[node].seen.evidence.words();
         let mut sent = sent.get(&node).into_iter().flatten();
         words.all(|word| word == "connection") && sent.all(|other| *other == topic)
     };

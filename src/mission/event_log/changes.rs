@@ -114,7 +114,7 @@ fn structure(
     list: &mut Vec<(Change, EventId)>,
 ) {
     for what in differ.added.iter().copied() {
-        let time = elements.life(what).0.filter(|t| span.contains(*t));
+        let time = elements.seen(what).first.filter(|t| span.contains(*t));
         if let Some((at, id)) = turns.find(&turns.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));

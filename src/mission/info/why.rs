@@ -115,18 +115,17 @@ fn describe(
     title: &str,
 ) -> std::fmt::Result {
     let all = &mission.elements;
-    let evidence = all.evidence(element);
+    let seen = all.seen(element);
     let at = |time: Option<Stamp>| {
         time.map_or_else(
             || "?".to_owned(),
             |time| words::offset(mission.offset(time)),
         )
     };
-    let (first, last) = all.life(element);
-    let words: Vec<&str> = evidence.words().collect();
-    let signs = match (first, last) {
+    let words: Vec<&str> = seen.evidence.words().collect();
+    let signs = match (seen.first, seen.last) {
         (None, None) => "no times of its own".to_owned(),
-        _ => format!("first sign {}, last sign {}", at(first), at(last)),
+        (first, last) => format!("first sign {}, last sign {}", at(first), at(last)),
     };
     writeln!(
         out,

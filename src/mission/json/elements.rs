@@ -11,7 +11,7 @@ use super::sending::SendingJson;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::{
-    Edge, Element, ElementState, Elements, Measures, Node, NodeId, State, Topic, TopicId,
+    Edge, Element, ElementState, Elements, Existence, Measures, Node, NodeId, State, Topic, TopicId,
 };
 
 /// A text, borrowed when written.
@@ -153,8 +153,8 @@ impl<'a> NodeJson<'a> {
             role: Some((&*node.role).into()),
             state: seen.map(|s| s.state.word().into()),
             degree: seen.map(|s| s.confidence.word().into()),
-            evidence: words(node.evidence),
-            life: LifeJson::new(node.first, node.last, lives(seen.is_some(), &node.runs)),
+            evidence: words(node.seen.evidence),
+            life: LifeJson::new(&node.seen, seen.is_some()),
             numbers: seen.map(|s| NodeNumbers {
                 hz: s.hz,
                 lifecycle: s.lifecycle.as_deref().map(Text::from),
@@ -186,7 +186,7 @@ impl<'a> TopicJson<'a> {
             types: topic.types.iter().map(|t| Text::from(&**t)).collect(),
             state: seen.map(|s| s.state.word().into()),
             degree: seen.map(|s| s.confidence.word().into()),
-            evidence: words(topic.evidence),
+            evidence: words(topic.seen.evidence),
             numbers: seen.map(|s| TopicNumbers {
                 count: Some(s.messages()),
                 bytes: s.bytes,
@@ -197,7 +197,7 @@ impl<'a> TopicJson<'a> {
             }),
             qos: topic.qos.as_deref().map(Text::from),
             unknown_publishers: topic.unknown_publishers,
-            life: LifeJson::new(topic.first, topic.last, lives(seen.is_some(), &topic.runs)),
+            life: LifeJson::new(&topic.seen, seen.is_some()),
             sending: SendingJson::default(),
             pauses: Vec::new(),
             columns: None,
@@ -232,14 +232,14 @@ impl<'a> PublishJson<'a> {
             edge: EdgeJson {
                 state: seen.map(|s| s.state.word().into()),
                 degree: seen.map(|s| s.confidence.word().into()),
-                evidence: words(edge.evidence),
+                evidence: words(edge.seen.evidence),
                 numbers: seen.map(|s| EdgeNumbers {
                     count: s.count,
                     hz: s.hz,
                     bytes: s.bytes,
                     measures: s.measures,
                 }),
-                life: LifeJson::new(edge.first, edge.last, lives(seen.is_some(), &edge.runs)),
+                life: LifeJson::new(&edge.seen, seen.is_some()),
                 sending: SendingJson::default(),
                 columns: None,
             },
@@ -273,18 +273,14 @@ impl EdgeJson<'_> {
 }
 
 impl LifeJson {
-    fn new(first: Option<Stamp>, last: Option<Stamp>, lives: &[Span]) -> Self {
+    fn new(known: &Existence, is_window: bool) -> Self {
+        let lives = if is_window { &[] } else { &known.lives[..] };
         Self {
-            first_ns: first.map(|at| at.0),
-            last_ns: last.map(|at| at.0),
+            first_ns: known.first.map(|at| at.0),
+            last_ns: known.last.map(|at| at.0),
             lives: pairs(lives),
         }
     }
-}
-
-/// The lifetimes to write: none in a window.
-fn lives(is_window: bool, all: &[Span]) -> &[Span] {
-    if is_window { &[] } else { all }
 }
 
 pub(crate) fn words<'a>(evidence: Evidence) -> Vec<Text<'a>> {

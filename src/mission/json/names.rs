@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::elements::{EdgeJson, LifeJson, NodeJson, PublishJson, TopicJson, evidence, spans};
+use super::elements::{
+    EdgeJson, LifeJson, NodeJson, PublishJson, Text, TopicJson, evidence, spans,
+};
 use super::raw::RawWindow;
-use crate::base::time::{Span, Stamp};
-use crate::graph::{Edge, Element, ElementState, Elements, Graph, Node, Topic};
+use crate::base::time::Stamp;
+use crate::graph::{Edge, Element, ElementState, Elements, Existence, Graph, Node, Topic};
 
 /// Names with their facts over all windows.
 #[derive(Default)]
@@ -56,8 +58,7 @@ impl Names {
             if let Some(role) = &raw.role {
                 node.role = (&**role).into();
             }
-            node.evidence = node.evidence.and(evidence(&raw.evidence));
-            widen(&mut node.first, &mut node.last, &mut node.runs, &raw.life);
+            widen(&mut node.seen, &raw.evidence, &raw.life);
         }
         for raw in topics {
             let topic = self.topic(&raw.name);
@@ -66,11 +67,9 @@ impl Names {
                 .extend(raw.types.iter().map(|t| Arc::from(&**t)));
             topic.types.sort();
             topic.types.dedup();
-            topic.evidence = topic.evidence.and(evidence(&raw.evidence));
             topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
             topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
-            let (first, last) = (&mut topic.first, &mut topic.last);
-            widen(first, last, &mut topic.runs, &raw.life);
+            widen(&mut topic.seen, &raw.evidence, &raw.life);
         }
         for raw in publishes {
             self.node(&raw.node);
@@ -111,22 +110,17 @@ impl Names {
 }
 
 fn learn(edge: &mut Edge, raw: &EdgeJson<'_>) {
-    edge.evidence = edge.evidence.and(evidence(&raw.evidence));
-    widen(&mut edge.first, &mut edge.last, &mut edge.runs, &raw.life);
+    widen(&mut edge.seen, &raw.evidence, &raw.life);
 }
 
-/// Extends the lifetime of an element. The first intervals are kept: up to schema 2 every window repeats all of them.
-fn widen(
-    first: &mut Option<Stamp>,
-    last: &mut Option<Stamp>,
-    runs: &mut Vec<Span>,
-    life: &LifeJson,
-) {
-    let begins = [*first, life.first_ns.map(Stamp)];
-    *first = begins.into_iter().flatten().min();
-    *last = (*last).max(life.last_ns.map(Stamp));
-    if runs.is_empty() {
-        *runs = spans(&life.lives);
+/// Adds the evidence and times of an element. The first intervals are kept: up to schema 2 every window repeats all of them.
+fn widen(known: &mut Existence, words: &[Text<'_>], life: &LifeJson) {
+    known.evidence = known.evidence.and(evidence(words));
+    let begins = [known.first, life.first_ns.map(Stamp)];
+    known.first = begins.into_iter().flatten().min();
+    known.last = known.last.max(life.last_ns.map(Stamp));
+    if known.lives.is_empty() {
+        known.lives = spans(&life.lives);
     }
 }
 

@@ -81,7 +81,7 @@ pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> 
     let mut all: BTreeMap<PresentThing, Vec<Span>> = BTreeMap::new();
     for (what, subject) in subjects(elements, knows_publishers(elements, sending)) {
         let times = match what {
-            Element::Node(_) => elements.runs(what).to_vec(),
+            Element::Node(_) => elements.seen(what).lives.clone(),
             _ => sent(elements, sending, what),
         };
         all.entry(subject).or_default().extend(times);
@@ -115,7 +115,7 @@ fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
         return Vec::new();
     };
     let mut times = Vec::new();
-    for life in elements.runs(what) {
+    for life in &elements.seen(what).lives {
         let mut start = life.start;
         let silent = silences(&sender.stretches, &[*life], &[]);
         for (from, to) in silent.into_iter().filter(|_| !sender.is_latched) {
@@ -156,7 +156,11 @@ fn subjects(
 /// Whether at least half of the messages are on topics with a known publisher.
 pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
     let mut known_on: BTreeMap<TopicId, Vec<&Edge>> = BTreeMap::new();
-    for edge in elements.publishes.iter().filter(|e| !e.evidence.is_guess()) {
+    for edge in elements
+        .publishes
+        .iter()
+        .filter(|e| !e.seen.evidence.is_guess())
+    {
         known_on.entry(edge.topic).or_default().push(edge);
     }
     let (mut all, mut known) = (0_u64, 0_u64);
@@ -168,7 +172,7 @@ pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
         let edges = known_on.get(&sender.topic).map_or(&[][..], Vec::as_slice);
         for stretch in &sender.stretches {
             let span = Span::new(stretch.first, stretch.last.plus(1));
-            let lives = |edge: &&Edge| edge.runs.iter().any(|life| life.shared(span) > 0);
+            let lives = |edge: &&Edge| edge.seen.lives.iter().any(|life| life.shared(span) > 0);
             all = all.saturating_add(stretch.count);
             if edges.iter().any(lives) {
                 known = known.saturating_add(stretch.count);
@@ -187,12 +191,12 @@ pub(crate) fn ends(elements: &Elements, topics: bool) -> BTreeMap<&str, Ends> {
     if topics {
         for topic in &elements.topics {
             let of = ends.entry(topic.name.as_str()).or_default();
-            of.push((topic.first, topic.last));
+            of.push((topic.seen.first, topic.seen.last));
         }
     } else {
         for node in &elements.nodes {
             let of = ends.entry(&*node.role).or_default();
-            of.push((node.first, node.last));
+            of.push((node.seen.first, node.seen.last));
         }
     }
     ends

@@ -6,35 +6,31 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
-use crate::graph::{Edge, Elements, Graph, Node, NodeId, Topic, TopicId};
+use crate::graph::{Edge, Elements, Existence, Graph, Node, NodeId, Topic, TopicId};
 use crate::mission::{EventLog, Json, JsonForm, Mission, Sending, Window, read_json};
 
 fn elements() -> Elements {
     let node = |name: &str| Node {
         name: name.into(),
         role: name.into(),
-        evidence: Evidence::of("connection"),
-        first: Some(Stamp(3)),
-        last: None,
-        runs: vec![Span::new(Stamp(3), Stamp(9))],
+        seen: Existence {
+            evidence: Evidence::of("connection"),
+            first: Some(Stamp(3)),
+            last: None,
+            lives: vec![Span::new(Stamp(3), Stamp(9))],
+        },
     };
     let topic = |name: &str| Topic {
         name: name.into(),
         types: vec!["a/B".into()],
-        evidence: Evidence::of("rosout"),
-        first: None,
-        last: None,
+        seen: Existence::of(Evidence::of("rosout")),
         qos: Some("reliable".into()),
-        runs: Vec::new(),
         unknown_publishers: Some(1),
     };
     let edge = |id| Edge {
         node: NodeId(id),
         topic: TopicId(id),
-        evidence: Evidence::NONE,
-        first: None,
-        last: None,
-        runs: Vec::new(),
+        seen: Existence::default(),
     };
     Elements {
         nodes: ["/a", "/b", "/c"].map(node).to_vec().into(),
