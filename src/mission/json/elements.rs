@@ -27,16 +27,23 @@ pub(crate) enum ElementJson<'a> {
     Subscribe(PublishJson<'a>),
 }
 
+/// The evidence for an element; in a window also its state and the confidence.
 #[derive(Default, Deserialize, Serialize)]
-pub(crate) struct NodeJson<'a> {
-    pub(crate) name: Text<'a>,
-    pub(crate) role: Option<Text<'a>>,
+pub(crate) struct KnownJson<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) state: Option<Text<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) degree: Option<Text<'a>>,
     #[serde(default)]
     pub(crate) evidence: Vec<Text<'a>>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+pub(crate) struct NodeJson<'a> {
+    pub(crate) name: Text<'a>,
+    pub(crate) role: Option<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) known: KnownJson<'a>,
     #[serde(flatten)]
     pub(crate) life: LifeJson,
     #[serde(flatten)]
@@ -67,12 +74,8 @@ pub(crate) struct TopicJson<'a> {
     pub(crate) name: Text<'a>,
     #[serde(default)]
     pub(crate) types: Vec<Text<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) state: Option<Text<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) degree: Option<Text<'a>>,
-    #[serde(default)]
-    pub(crate) evidence: Vec<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) known: KnownJson<'a>,
     #[serde(flatten)]
     pub(crate) numbers: Option<TopicNumbers>,
     pub(crate) qos: Option<Text<'a>>,
@@ -107,23 +110,20 @@ pub(crate) struct PublishJson<'a> {
     pub(crate) edge: EdgeJson<'a>,
 }
 
-#[derive(Default, Deserialize, Serialize)]
+/// A subscription in a window as it is written, with the topic first; it is read as a [`PublishJson`].
+#[derive(Serialize)]
 pub(crate) struct SubscribeJson<'a> {
-    pub(crate) topic: Text<'a>,
-    pub(crate) node: Text<'a>,
+    topic: Text<'a>,
+    node: Text<'a>,
     #[serde(flatten)]
-    pub(crate) edge: EdgeJson<'a>,
+    edge: EdgeJson<'a>,
 }
 
 /// An edge without the names of its ends.
 #[derive(Default, Deserialize, Serialize)]
 pub(crate) struct EdgeJson<'a> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) state: Option<Text<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) degree: Option<Text<'a>>,
-    #[serde(default)]
-    pub(crate) evidence: Vec<Text<'a>>,
+    #[serde(flatten)]
+    pub(crate) known: KnownJson<'a>,
     #[serde(flatten)]
     pub(crate) numbers: Option<EdgeNumbers>,
     #[serde(flatten)]
@@ -151,9 +151,7 @@ impl<'a> NodeJson<'a> {
         Self {
             name: node.name.as_str().into(),
             role: Some((&*node.role).into()),
-            state: seen.map(|s| s.state.word().into()),
-            degree: seen.map(|s| s.confidence.word().into()),
-            evidence: words(node.seen.evidence),
+            known: KnownJson::new(&node.seen, seen),
             life: LifeJson::new(&node.seen, seen.is_some()),
             numbers: seen.map(|s| NodeNumbers {
                 hz: s.hz,
@@ -169,11 +167,7 @@ impl<'a> NodeJson<'a> {
         ElementState {
             hz: numbers.and_then(|n| n.hz),
             lifecycle: lifecycle.map(Into::into),
-            ..state(
-                Element::Node(id),
-                self.state.as_deref(),
-                self.degree.as_deref(),
-            )
+            ..self.known.state(Element::Node(id))
         }
     }
 }
@@ -184,9 +178,7 @@ impl<'a> TopicJson<'a> {
         Self {
             name: topic.name.as_str().into(),
             types: topic.types.iter().map(|t| Text::from(&**t)).collect(),
-            state: seen.map(|s| s.state.word().into()),
-            degree: seen.map(|s| s.confidence.word().into()),
-            evidence: words(topic.seen.evidence),
+            known: KnownJson::new(&topic.seen, seen),
             numbers: seen.map(|s| TopicNumbers {
                 count: Some(s.messages()),
                 bytes: s.bytes,
@@ -214,11 +206,7 @@ impl<'a> TopicJson<'a> {
             median_period_s: numbers.median_period_s,
             max_gap_s: numbers.max_gap_s,
             measures: numbers.measures,
-            ..state(
-                Element::Topic(id),
-                self.state.as_deref(),
-                self.degree.as_deref(),
-            )
+            ..self.known.state(Element::Topic(id))
         }
     }
 }
@@ -230,9 +218,7 @@ impl<'a> PublishJson<'a> {
             node: elements.nodes[edge.node].name.as_str().into(),
             topic: elements.topics[edge.topic].name.as_str().into(),
             edge: EdgeJson {
-                state: seen.map(|s| s.state.word().into()),
-                degree: seen.map(|s| s.confidence.word().into()),
-                evidence: words(edge.seen.evidence),
+                known: KnownJson::new(&edge.seen, seen),
                 numbers: seen.map(|s| EdgeNumbers {
                     count: s.count,
                     hz: s.hz,
@@ -262,13 +248,24 @@ impl EdgeJson<'_> {
             hz: numbers.hz,
             bytes: numbers.bytes,
             measures: numbers.measures,
-            ..state(what, self.state.as_deref(), self.degree.as_deref())
+            ..self.known.state(what)
+        }
+    }
+}
+
+impl<'a> KnownJson<'a> {
+    fn new(known: &Existence, seen: Option<&ElementState>) -> Self {
+        Self {
+            state: seen.map(|s| s.state.word().into()),
+            degree: seen.map(|s| s.confidence.word().into()),
+            evidence: words(known.evidence),
         }
     }
 
-    /// The state of an end, which is at least as certain as the edge.
-    pub(crate) fn end(&self, what: Element) -> ElementState {
-        state(what, self.state.as_deref(), self.degree.as_deref())
+    /// The state of this element, without numbers.
+    pub(crate) fn state(&self, what: Element) -> ElementState {
+        let confidence = confidence_of(self.degree.as_deref());
+        ElementState::new(what, state_of(self.state.as_deref()), confidence)
     }
 }
 
@@ -301,11 +298,6 @@ pub(crate) fn pairs(spans: &[Span]) -> Vec<[i64; 2]> {
 pub(crate) fn spans(pairs: &[[i64; 2]]) -> Vec<Span> {
     let span = |[start, end]: &[i64; 2]| Span::new(Stamp(*start), Stamp(*end.max(start)));
     pairs.iter().map(span).collect()
-}
-
-/// The state of an element by these words, without numbers.
-fn state(what: Element, state: Option<&str>, degree: Option<&str>) -> ElementState {
-    ElementState::new(what, state_of(state), confidence_of(degree))
 }
 
 /// The state of this name; active if unknown or missing.

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::elements::{
-    EdgeJson, LifeJson, NodeJson, PublishJson, Text, TopicJson, evidence, spans,
-};
+use super::elements::{KnownJson, LifeJson, NodeJson, PublishJson, TopicJson, evidence, spans};
 use super::raw::RawWindow;
 use crate::base::time::Stamp;
 use crate::graph::{Edge, Element, ElementState, Elements, Existence, Graph, Node, Topic};
@@ -39,26 +37,20 @@ impl Names {
         self.topics.entry(name.into()).or_insert_with(new)
     }
 
-    pub(crate) fn window(&mut self, window: &RawWindow) {
-        self.elements(&window.nodes, &window.topics, &window.publishes);
-        for raw in &window.subscribes {
-            self.subscribe(&raw.node, &raw.topic, &raw.edge);
-        }
-    }
-
-    /// Adds all elements except subscriptions.
+    /// Adds elements of each kind.
     pub(crate) fn elements(
         &mut self,
         nodes: &[NodeJson<'_>],
         topics: &[TopicJson<'_>],
         publishes: &[PublishJson<'_>],
+        subscribes: &[PublishJson<'_>],
     ) {
         for raw in nodes {
             let node = self.node(&raw.name);
             if let Some(role) = &raw.role {
                 node.role = (&**role).into();
             }
-            widen(&mut node.seen, &raw.evidence, &raw.life);
+            widen(&mut node.seen, &raw.known, &raw.life);
         }
         for raw in topics {
             let topic = self.topic(&raw.name);
@@ -69,21 +61,25 @@ impl Names {
             topic.types.dedup();
             topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
             topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
-            widen(&mut topic.seen, &raw.evidence, &raw.life);
+            widen(&mut topic.seen, &raw.known, &raw.life);
         }
         for raw in publishes {
-            self.node(&raw.node);
-            self.topic(&raw.topic);
-            let key = ((*raw.node).into(), (*raw.topic).into());
-            learn(self.publishes.entry(key).or_default(), &raw.edge);
+            let ends = self.ends(raw);
+            let edge = self.publishes.entry(ends).or_default();
+            widen(&mut edge.seen, &raw.edge.known, &raw.edge.life);
+        }
+        for raw in subscribes {
+            let (node, topic) = self.ends(raw);
+            let edge = self.subscribes.entry((topic, node)).or_default();
+            widen(&mut edge.seen, &raw.edge.known, &raw.edge.life);
         }
     }
 
-    pub(crate) fn subscribe(&mut self, node: &str, topic: &str, raw: &EdgeJson<'_>) {
-        self.node(node);
-        self.topic(topic);
-        let edge = self.subscribes.entry((topic.into(), node.into()));
-        learn(edge.or_default(), raw);
+    /// The names of the node and the topic of an edge, which it adds.
+    fn ends(&mut self, raw: &PublishJson<'_>) -> (Arc<str>, Arc<str>) {
+        self.node(&raw.node);
+        self.topic(&raw.topic);
+        ((*raw.node).into(), (*raw.topic).into())
     }
 
     /// Assigns all ids.
@@ -109,18 +105,14 @@ impl Names {
     }
 }
 
-fn learn(edge: &mut Edge, raw: &EdgeJson<'_>) {
-    widen(&mut edge.seen, &raw.evidence, &raw.life);
-}
-
 /// Adds the evidence and times of an element. The first intervals are kept: up to schema 2 every window repeats all of them.
-fn widen(known: &mut Existence, words: &[Text<'_>], life: &LifeJson) {
-    known.evidence = known.evidence.and(evidence(words));
-    let begins = [known.first, life.first_ns.map(Stamp)];
-    known.first = begins.into_iter().flatten().min();
-    known.last = known.last.max(life.last_ns.map(Stamp));
-    if known.lives.is_empty() {
-        known.lives = spans(&life.lives);
+fn widen(seen: &mut Existence, known: &KnownJson<'_>, life: &LifeJson) {
+    seen.evidence = seen.evidence.and(evidence(&known.evidence));
+    let begins = [seen.first, life.first_ns.map(Stamp)];
+    seen.first = begins.into_iter().flatten().min();
+    seen.last = seen.last.max(life.last_ns.map(Stamp));
+    if seen.lives.is_empty() {
+        seen.lives = spans(&life.lives);
     }
 }
 
@@ -128,17 +120,16 @@ fn widen(known: &mut Existence, words: &[Text<'_>], life: &LifeJson) {
 pub(crate) fn graph(window: &RawWindow, all: &Elements) -> Graph {
     let mut states = BTreeMap::new();
     let mut add = |state: ElementState| _ = states.insert(state.what, state);
-    let publishes = window.publishes.iter();
-    let publishes = publishes.map(|raw| (&raw.node, &raw.topic, &raw.edge, true));
-    let subscribes = window.subscribes.iter();
-    let subscribes = subscribes.map(|raw| (&raw.node, &raw.topic, &raw.edge, false));
-    for (node, topic, edge, publishes) in publishes.chain(subscribes) {
+    let publishes = window.publishes.iter().map(|raw| (raw, true));
+    let subscribes = window.subscribes.iter().map(|raw| (raw, false));
+    for (PublishJson { node, topic, edge }, publishes) in publishes.chain(subscribes) {
         let ends = (
             all.node(node).unwrap_or_default(),
             all.topic(topic).unwrap_or_default(),
         );
-        add(edge.end(Element::Node(ends.0)));
-        let topic = edge.end(Element::Topic(ends.1));
+        // An end is at least as certain as the edge.
+        add(edge.known.state(Element::Node(ends.0)));
+        let topic = edge.known.state(Element::Topic(ends.1));
         add(ElementState {
             count: Some(0),
             ..topic

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 pub(crate) use super::elements::{
-    EdgeJson, EdgeNumbers, ElementJson, LifeJson, NodeJson, NodeNumbers, PublishJson,
+    EdgeJson, EdgeNumbers, ElementJson, KnownJson, LifeJson, NodeJson, NodeNumbers, PublishJson,
     SubscribeJson, Text, TopicJson, TopicNumbers,
 };
 use super::events::{EventJson, InterruptionRow, PhaseRow};
@@ -80,5 +80,5 @@ pub(crate) struct RawWindow {
     #[serde(default)]
     pub(crate) publishes: Vec<PublishJson<'static>>,
     #[serde(default)]
-    pub(crate) subscribes: Vec<SubscribeJson<'static>>,
+    pub(crate) subscribes: Vec<PublishJson<'static>>,
 }

@@ -6,8 +6,9 @@
 use std::path::Path;
 
 use super::names::{Names, graph};
-use super::raw::{BagJson, ElementJson, NoticeJson, Raw, RawWindow};
-use super::runs::JsonColumns;
+use super::raw::{
+    BagJson, ElementJson, NodeJson, NoticeJson, PublishJson, Raw, RawWindow, TopicJson,
+};
 use super::sending::sending;
 use super::write::{OLD_SCHEMAS, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
@@ -95,11 +96,10 @@ fn build(mut raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         }
     }
     let mut names = Names::default();
-    raw.windows.iter().for_each(|w| names.window(w));
-    names.elements(&raw.nodes, &raw.topics, &raw.publishes);
-    for edge in &raw.subscribes {
-        names.subscribe(&edge.node, &edge.topic, &edge.edge);
+    for w in &raw.windows {
+        names.elements(&w.nodes, &w.topics, &w.publishes, &w.subscribes);
     }
+    names.elements(&raw.nodes, &raw.topics, &raw.publishes, &raw.subscribes);
     let elements = names.placed();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
@@ -173,26 +173,21 @@ const ONE: Period = match Period::from_nanos(1) {
 
 /// The graphs of these windows by the elements' columns.
 fn of_columns(raw: &Raw, all: &Elements, spans: &[Span]) -> Graphs {
-    let mut found: Vec<(Element, &JsonColumns<'_>)> = Vec::new();
-    let mut add = |what: Option<Element>, columns| found.extend(what.zip(columns));
-    for node in &raw.nodes {
-        let id = all.node(&node.name);
-        add(id.map(Element::Node), node.columns.as_deref());
-    }
-    for topic in &raw.topics {
-        let id = all.topic(&topic.name);
-        add(id.map(Element::Topic), topic.columns.as_deref());
-    }
-    for edge in &raw.publishes {
-        let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
-        let what = ends.and_then(|ends| all.published(ends));
-        add(what, edge.edge.columns.as_deref());
-    }
-    for edge in &raw.subscribes {
-        let ends = all.node(&edge.node).zip(all.topic(&edge.topic));
-        let what = ends.and_then(|ends| all.subscribed(ends));
-        add(what, edge.edge.columns.as_deref());
-    }
+    let ends = |one: &PublishJson<'_>| all.node(&one.node).zip(all.topic(&one.topic));
+    let node = |one: &NodeJson<'_>| all.node(&one.name).map(Element::Node);
+    let topic = |one: &TopicJson<'_>| all.topic(&one.name).map(Element::Topic);
+    let publish = |one| ends(one).and_then(|ends| all.published(ends));
+    let subscribe = |one| ends(one).and_then(|ends| all.subscribed(ends));
+    let nodes = raw.nodes.iter().map(|one| (node(one), &one.columns));
+    let topics = raw.topics.iter().map(|one| (topic(one), &one.columns));
+    let publishes = raw.publishes.iter();
+    let publishes = publishes.map(|one| (publish(one), &one.edge.columns));
+    let subscribes = raw.subscribes.iter();
+    let subscribes = subscribes.map(|one| (subscribe(one), &one.edge.columns));
+    let listed = nodes.chain(topics).chain(publishes).chain(subscribes);
+    let mut found: Vec<_> = listed
+        .filter_map(|(what, columns)| what.zip(columns.as_ref()))
+        .collect();
     found.sort_by_key(|(what, _)| *what);
     let mut graphs = GraphsWriter::new(spans.to_vec());
     // An element may be listed twice.

@@ -11,8 +11,8 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::{State, per_second};
 use crate::mission::raw::{
-    BagJson, EdgeJson, EdgeNumbers, LifeJson, NodeJson, NodeNumbers, PublishJson, Raw, RawWindow,
-    Text, TopicJson, TopicNumbers,
+    BagJson, EdgeJson, EdgeNumbers, KnownJson, LifeJson, NodeJson, NodeNumbers, PublishJson, Raw,
+    RawWindow, Text, TopicJson, TopicNumbers,
 };
 use crate::mission::{Mission, mission_of};
 
@@ -234,16 +234,19 @@ fn window(
     sums: &WindowSums,
     lives: &WindowLives,
 ) -> RawWindow {
-    let state = |sum: Option<&CountSum>| {
+    let known = |sum: Option<&CountSum>| {
         let is_sent = sum.is_some_and(|sum| sum.n > 0);
         let state = if is_sent {
             State::Active
         } else {
             State::Silent
         };
-        Some(state.word().into())
+        KnownJson {
+            state: Some(state.word().into()),
+            degree: Some("measured".into()),
+            evidence: vec!["connection".into()],
+        }
     };
-    let (confidence, evidence) = (|| Some("measured".into()), || vec!["connection".into()]);
     let sent = |sum: Option<&CountSum>| sum.map_or(0, |sum| sum.n);
     let topics = lives.topics.iter().filter(|(_, life)| life.holds(at));
     let topics = topics.map(|(name, life)| {
@@ -251,9 +254,7 @@ fn window(
         TopicJson {
             name: name.to_string().into(),
             types: types(lives, name),
-            state: state(sum),
-            degree: confidence(),
-            evidence: evidence(),
+            known: known(sum),
             numbers: Some(TopicNumbers {
                 count: Some(sent(sum)),
                 bytes: sum.and_then(|sum| sum.bytes),
@@ -272,9 +273,7 @@ fn window(
             node: key.1.to_string().into(),
             topic: key.0.to_string().into(),
             edge: EdgeJson {
-                state: state(sum),
-                degree: confidence(),
-                evidence: evidence(),
+                known: known(sum),
                 numbers: Some(EdgeNumbers {
                     count: Some(sent(sum)),
                     hz: per_second(sent(sum), span),
@@ -295,9 +294,7 @@ fn window(
         NodeJson {
             name: name.to_string().into(),
             role: Some(role::role(name).to_owned().into()),
-            state: state(Some(&sum)),
-            degree: confidence(),
-            evidence: evidence(),
+            known: known(Some(&sum)),
             life: life.json(),
             numbers: Some(NodeNumbers {
                 hz: per_second(sum.n, span),
