@@ -18,7 +18,7 @@ use bagreel::internals::export::{Output, Written};
 use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::{Mission, read_json};
 use bagreel::internals::view::{Frame, Headline, View};
-use bagreel::values::{Element, NodeId};
+use bagreel::values::{Element, EventId, NodeId};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
@@ -63,7 +63,7 @@ fn mission(windows: usize) -> (Mission, View) {
     let frame = |index: usize| Frame {
         headlines: (index % 2 == 1)
             .then_some(Headline {
-                event: 0,
+                event: EventId(0),
                 kind: Kind::Started,
                 what: Element::Node(NodeId(0)),
                 time: second(index),

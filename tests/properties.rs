@@ -100,7 +100,7 @@ fn follows(mission: &Mission) -> Result<(), TestCaseError> {
     for (window, graph) in mission.each() {
         let mut now = before.unwrap_or_else(|| there(&graph));
         for (change, entry) in window.changes.iter().zip(&window.events) {
-            let kind = mission.log.events[*entry as usize].kind;
+            let kind = mission.log.events[*entry].kind;
             match change {
                 Change::Added { what, .. } => {
                     prop_assert!(now.insert(*what), "{what:?} came twice");

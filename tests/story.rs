@@ -134,8 +134,8 @@ fn every_window_difference_refers_to_its_event() {
             let shown = words.get("added").unwrap_or(&0) + words.get("removed").unwrap_or(&0);
             assert_eq!(moved, shown, "window {} of {seconds} s", after.index);
             assert_eq!(after.changes.len(), after.events.len());
-            let places = after.events.iter().map(|id| *id as usize);
-            assert!(places.max().is_none_or(|id| id < mission.log.events.len()));
+            let mut events = after.events.iter();
+            assert!(events.all(|id| mission.log.events.get(*id).is_some()));
         }
     }
 }
@@ -148,7 +148,7 @@ fn the_log_is_sorted_and_parts_are_not_nested() {
     for entry in entries {
         assert!(entry.earliest <= entry.time && entry.time <= entry.latest);
         if let Some(whole) = entry.part_of {
-            assert_eq!(entries[whole as usize].part_of, None);
+            assert_eq!(entries[whole].part_of, None);
         }
     }
 }
@@ -163,9 +163,8 @@ fn truth() -> Vec<serde_json::Value> {
 /// Starts or stops of nodes by role, including restarts, with seconds and the interval that should contain the truth.
 fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
     let second = |at| mission.offset(at) as f64 / 1e9;
-    let entries = mission.log.events.iter();
     let mut all = Vec::new();
-    for (id, entry) in (0..).zip(entries) {
+    for (id, entry) in mission.log.events.with_ids() {
         let bagreel::values::Element::Node(node) = entry.what else {
             continue;
         };

@@ -41,14 +41,14 @@ fn every_headline_is_counted_captioned_and_marked() {
         for (k, frame) in view.frames.iter().enumerate() {
             let seen = view.seen(k);
             let at = format!("{name}, window {}", frame.index);
-            let reported: BTreeSet<u32> = frame.headlines.iter().map(|h| h.event).collect();
+            let reported: BTreeSet<_> = frame.headlines.iter().map(|h| h.event).collect();
             assert_eq!(reported.len(), frame.counts.total(), "{at}");
-            let reported: BTreeSet<u32> = frame.events().collect();
+            let reported: BTreeSet<_> = frame.events().collect();
             let phrases = frame.caption.iter();
-            let said: BTreeSet<u32> = phrases.flat_map(|one| one.events.concat()).collect();
+            let said: BTreeSet<_> = phrases.flat_map(|one| one.events.concat()).collect();
             assert_eq!(reported, said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
-            let marked: BTreeSet<u32> = marked.flat_map(|s| s.events.clone()).collect();
+            let marked: BTreeSet<_> = marked.flat_map(|s| s.events.clone()).collect();
             assert_eq!(marked, reported, "{at}");
             assert!(
                 all(&seen).all(|s| s.mark.is_none() || !s.events.is_empty()),

@@ -30,11 +30,11 @@ macro_rules! ids {
 
         impl $crate::base::ids::Id for $name {
             fn of(at: usize) -> Self {
-                Self(Id::of(at))
+                Self($crate::base::ids::Id::of(at))
             }
 
             fn at(self) -> usize {
-                self.0.at()
+                $crate::base::ids::Id::at(self.0)
             }
         }
     )*};

@@ -43,7 +43,7 @@ fn written(mission: &Mission) -> io::Result<Vec<u8>> {
     let mut all: Vec<(Stamp, usize, Vec<u8>)> = graphs.collect();
     let last = mission.span.end.plus(-1);
     let parts = mission.log.all_parts();
-    for (id, event) in (0..).zip(&mission.log.events) {
+    for (id, event) in mission.log.events.with_ids() {
         if event.is_headline() {
             let at = event.time.max(mission.span.start).min(last);
             let text = sentence(mission, &parts, id, event);

@@ -17,11 +17,14 @@ mod silence;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
+use crate::base::ids::ids;
 use crate::base::rhythm::{CLOSE_NS, SWITCH, SWITCH_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::{Element, Elements, NodeId};
+use crate::graph::{ById, Element, Elements, NodeId};
 use crate::mission::Window;
 
 pub(crate) use changes::{explain, places};
@@ -31,8 +34,17 @@ pub(crate) use make::{LogInput, make, sorted};
 /// The most reconfigurations of a mission: the limit of automatic windows.
 const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 
-/// An event's index in [`EventLog::events`].
-pub type EventId = u32;
+ids! {
+    /// The id of an event: its index in [`EventLog::events`].
+    #[derive(Deserialize, Serialize)]
+    EventId,
+}
+
+impl std::fmt::Display for EventId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 /// The parts of events.
 pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
@@ -56,7 +68,7 @@ pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 #[non_exhaustive]
 pub struct EventLog {
     /// Sorted by time, then kind, then name.
-    pub events: Vec<Event>,
+    pub events: ById<EventId, Event>,
     /// The interruptions of the recording, which are not actions of the robot, sorted by time.
     pub interruptions: Vec<Interruption>,
     /// The phases, in order and without gaps; empty if not detected.
@@ -250,10 +262,8 @@ impl EventLog {
     /// Entries with times in `span`, with their ids, in order.
     pub fn inside(&self, span: Span) -> impl Iterator<Item = (EventId, &Event)> {
         let first = self.events.partition_point(|e| e.time < span.start);
-        let events = self.events.iter().enumerate().skip(first);
-        events
-            .take_while(move |(_, e)| e.time < span.end)
-            .map(|(id, e)| (u32::try_from(id).unwrap_or(u32::MAX), e))
+        let events = self.events.with_ids().skip(first);
+        events.take_while(move |(_, e)| e.time < span.end)
     }
 
     /// The headlines with times in `span`, in order.
@@ -312,7 +322,7 @@ impl EventLog {
     /// The ids of the parts of all events, in order, by the ids of those events.
     pub fn all_parts(&self) -> BTreeMap<EventId, Vec<EventId>> {
         let mut parts = Parts::new();
-        for (id, event) in (0..).zip(&self.events) {
+        for (id, event) in self.events.with_ids() {
             if let Some(whole) = event.part_of {
                 parts.entry(whole).or_default().push(id);
             }

@@ -12,7 +12,7 @@ use crate::base::columns::hang;
 use crate::base::csv::table;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
-use crate::graph::{Element, NodeId};
+use crate::graph::{ById, Element, NodeId};
 use crate::mission::Mission;
 use crate::mission::event_log::{
     Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
@@ -121,7 +121,7 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
     let mut phases = phases.filter(|_| options.phases).peekable();
     let mut interruptions = log.interruptions.iter().peekable();
     let mut rows = Vec::new();
-    for (id, event) in (0..).zip(&log.events) {
+    for (id, event) in log.events.with_ids() {
         while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= event.time) {
             rows.push(LogRow::Phase(at, phase));
         }
@@ -133,7 +133,7 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
         }
         rows.push(LogRow::Event(id, event));
         let own = parts.get(&id).into_iter().flatten();
-        let own = own.filter_map(|part| Some(LogRow::Part(*part, log.events.get(*part as usize)?)));
+        let own = own.filter_map(|part| Some(LogRow::Part(*part, log.events.get(*part)?)));
         rows.extend(own);
     }
     rows.extend(phases.map(|(at, phase)| LogRow::Phase(at, phase)));
@@ -401,7 +401,7 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
             }
             LogRow::Switch(_) => continue,
             LogRow::Event(id, _) | LogRow::Part(id, _) => {
-                all.push_str(events.get(*id as usize).map_or("{}", String::as_str));
+                all.push_str(events.get(*id).map_or("{}", String::as_str));
             }
         }
         all.push('\n');
@@ -410,7 +410,7 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
 }
 
 /// Every event as an object on one line.
-fn rows_of(mission: &Mission) -> Vec<String> {
+fn rows_of(mission: &Mission) -> ById<EventId, String> {
     rows(&mission.log, &mission.elements)
         .map(|row| harmless(&row))
         .collect()

@@ -91,7 +91,7 @@ impl<'a> CaptionWriter<'a> {
     }
 
     fn event(&self, id: EventId) -> Option<&'a crate::mission::event_log::Event> {
-        self.log.events.get(id as usize)
+        self.log.events.get(id)
     }
 
     /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing

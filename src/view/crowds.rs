@@ -95,7 +95,7 @@ fn changes(frame: &Frame, view: &View, mission: &Mission) -> Vec<Change> {
         names.map(move |(name, events)| (at, phrase, name, events))
     });
     let change = |(at, phrase, name, events): (usize, &Phrase, &String, &Vec<EventId>)| {
-        let event = mission.log.events.get(*events.first()? as usize)?;
+        let event = mission.log.events.get(*events.first()?)?;
         let mut counts = [0; 4];
         counts[noun(event)] = 1;
         let (node, topic) = mission.elements.names(event.what);
@@ -395,17 +395,19 @@ mod tests {
             space: None,
             mark: Mark::Removed,
             words: String::new(),
-            events: vec![0],
+            events: vec![EventId(0)],
         };
         let calm = |second: Kind| {
             let frame = Frame {
-                headlines: [(0, Kind::Stopped), (1, second)].map(headline).to_vec(),
+                headlines: [(EventId(0), Kind::Stopped), (EventId(1), second)]
+                    .map(headline)
+                    .to_vec(),
                 crowds: vec![crowd.clone()],
                 ..Frame::default()
             };
             let mut shown = Shown {
                 mark: Some(Mark::Removed),
-                events: vec![0, 1],
+                events: vec![EventId(0), EventId(1)],
                 ..Shown::default()
             };
             frame.calm(&mut shown);

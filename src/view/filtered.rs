@@ -85,10 +85,10 @@ impl Keep {
                 ..event.clone()
             })
         });
-        let mut events: Vec<Event> = events.collect();
+        let mut events: ById<EventId, Event> = events.collect();
         let parts = events.iter().filter_map(|event| event.part_of);
-        let mut weights = vec![1; events.len()];
-        parts.for_each(|whole| weights[whole as usize] += 1);
+        let mut weights = ById::like(&events, 1);
+        parts.for_each(|whole| weights[whole] += 1);
         for (event, weight) in events.iter_mut().zip(weights) {
             event.weight = weight.min(event.weight);
         }

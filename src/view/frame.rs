@@ -23,7 +23,7 @@ impl Headline {
     #[cfg(test)]
     pub(crate) fn started() -> Self {
         Self {
-            event: 0,
+            event: EventId(0),
             kind: Kind::Started,
             what: Element::Node(crate::graph::NodeId(0)),
             time: Stamp(0),

@@ -69,7 +69,7 @@ impl<'a> LastingEvents<'a> {
                 && event.is_headline()
                 && viewed.sees(event.what)
         };
-        let all = (0..).zip(&log.events).filter(|(_, event)| lasts(event));
+        let all = log.events.with_ids().filter(|(_, event)| lasts(event));
         Self {
             all: all.collect(),
             next: 0,

@@ -33,7 +33,7 @@ impl<'a> ItemTurns<'a> {
             // A part is reported with its whole, so it appears and vanishes with it. An element that restarts
             // keeps its parts; for a role, one run ends and the next one begins at a restart, otherwise each
             // run would exist all the time.
-            let whole = event.part_of.and_then(|id| events.get(id as usize));
+            let whole = event.part_of.and_then(|id| events.get(id));
             let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
             if is_kept && !event.what.is_node() {
                 continue;

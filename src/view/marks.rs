@@ -48,7 +48,7 @@ impl WindowMarks {
     ) -> Self {
         let mut changed = Self::default();
         for last in &lasting {
-            if let Some(event) = log.events.get(last.event as usize) {
+            if let Some(event) = log.events.get(last.event) {
                 changed.report(viewed, event, last.event, last.part());
             }
         }
@@ -69,7 +69,7 @@ impl WindowMarks {
             // A return has its own mark.
             let parts = parts.get(&id).filter(|_| event.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
-                if let Some(part) = log.events.get(*part as usize) {
+                if let Some(part) = log.events.get(*part) {
                     changed.report(viewed, part, id, Part::Whole);
                 }
             }

@@ -410,7 +410,7 @@ impl<'a> Now<'a> {
 
     /// An event of the log.
     pub(crate) fn event(&self, id: EventId) -> Option<&Event> {
-        self.mission.log.events.get(id as usize)
+        self.mission.log.events.get(id)
     }
 
     /// Whether the options hide elements without messages in a window.

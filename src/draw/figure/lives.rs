@@ -247,7 +247,7 @@ impl<'a> LivesFigure<'a> {
     /// The text of an event in the log.
     fn sentence(&self, id: EventId) -> String {
         let mission = self.source.mission;
-        let event = mission.log.events.get(id as usize);
+        let event = mission.log.events.get(id);
         let parts = mission.log.all_parts();
         event.map_or_else(String::new, |event| sentence(mission, &parts, id, event))
     }

@@ -97,7 +97,7 @@ impl Marks {
         let rows = Rows::new(tracks);
         let mut marks = Self::default();
         let mut circles: Vec<RowMark> = Vec::new();
-        for (id, event) in (0..).zip(&source.mission.log.events) {
+        for (id, event) in source.mission.log.events.with_ids() {
             if event.quiet {
                 continue;
             }
@@ -149,11 +149,7 @@ impl Marks {
     fn letter(&mut self, source: &FigureSource<'_>, tracks: &[Track], circles: Vec<RowMark>) {
         let events = &source.mission.log.events;
         let whole = source.span().nanos().max(1) as f64;
-        let weight = |mark: &RowMark| {
-            events
-                .get(mark.event as usize)
-                .map_or(0.0, |e| weight(e, whole))
-        };
+        let weight = |mark: &RowMark| events.get(mark.event).map_or(0.0, |e| weight(e, whole));
         let mut order: Vec<usize> = (0..circles.len()).collect();
         order.sort_by(|a, b| {
             weight(&circles[*b])
@@ -162,15 +158,11 @@ impl Marks {
         });
         // A circle suffices for a connection: labels for all of them would fill the page.
         let has_words = |e: &Event| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
-        let is_lettered = |at: &usize| {
-            events
-                .get(circles[*at].event as usize)
-                .is_some_and(has_words)
-        };
+        let is_lettered = |at: &usize| events.get(circles[*at].event).is_some_and(has_words);
         let lettered = order.into_iter().filter(is_lettered).take(MOST.0);
         let lettered: BTreeSet<usize> = lettered.collect();
         for (at, mark) in circles.into_iter().enumerate() {
-            let Some(event) = events.get(mark.event as usize) else {
+            let Some(event) = events.get(mark.event) else {
                 continue;
             };
             if lettered.contains(&at) {

@@ -48,7 +48,7 @@ fn two_nodes() -> (Mission, View) {
                 sign: ' ',
                 lead: String::new(),
                 names: vec!["/planner".to_owned()],
-                events: vec![vec![0]],
+                events: vec![vec![crate::mission::EventId(0)]],
                 tail: m.class().to_owned(),
             })
             .into_iter()

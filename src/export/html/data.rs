@@ -267,7 +267,7 @@ fn reported(
             .iter()
             .take(MOST_REPORTED)
             .filter_map(|headline| {
-                let event = mission.log.events.get(headline.event as usize)?;
+                let event = mission.log.events.get(headline.event)?;
                 let what = place(&headline.what);
                 let sentence = sentence(mission, &parts, headline.event, event);
                 let time = clock.secs(event.time);

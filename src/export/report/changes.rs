@@ -76,7 +76,7 @@ fn changes_of(mission: &Mission, frame: &Frame) -> String {
     }
     let rest: Vec<&Headline> = frame.headlines.iter().filter(|h| !is_together(h)).collect();
     for headline in rest.iter().take(MOST_LISTED) {
-        let event = mission.log.events.get(headline.event as usize);
+        let event = mission.log.events.get(headline.event);
         parts.extend(event.map(|event| plain(&sentence_with(mission, &[], event))));
     }
     if rest.len() > MOST_LISTED {

@@ -6,7 +6,7 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::diff::Change;
 use crate::graph::{Element, Node, NodeId, Topic};
 use crate::mission::Mission;
-use crate::mission::event_log::{Detail, Event, described};
+use crate::mission::event_log::{Detail, Event, EventId, described};
 
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
@@ -51,7 +51,12 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "ledger",
         batch: || Batch::with(LEDGER),
-        fill: |all, _, row| (0..all.log.events.len()).for_each(|id| put(all, LEDGER, &id, row)),
+        fill: |all, _, row| {
+            all.log
+                .events
+                .ids()
+                .for_each(|id| put(all, LEDGER, &id, row))
+        },
     },
     Table {
         word: "phases",
@@ -196,8 +201,8 @@ const CHANGES: &[Column<WindowChange>] = columns! {
     "to_value" Text |all, one| values(all, &one.detail).1;
 };
 
-const LEDGER: &[Column<usize>] = columns! {
-    "entry" I64 |_, id| TableCell::count(*id);
+const LEDGER: &[Column<EventId>] = columns! {
+    "entry" I64 |_, id| TableCell::count(id.0);
     "kind" Text |all, id| TableCell::text(event(all, *id).kind.word());
     "what" Text |all, id| what(event(all, *id).what);
     "node" Text |all, id| node(all, event(all, *id).what);
@@ -212,7 +217,7 @@ const LEDGER: &[Column<usize>] = columns! {
     "to_value" Text |all, id| values(all, &event(all, *id).detail).1;
     "degree" Text |all, id| TableCell::text(event(all, *id).confidence.word());
     "evidence" Text |all, id| words(event(all, *id).evidence.words());
-    "part_of" I64 |all, id| count(event(all, *id).part_of.map(u64::from));
+    "part_of" I64 |all, id| count(event(all, *id).part_of.map(|id| id.0.into()));
     "is_quiet" Flag |all, id| TableCell::Flag(event(all, *id).quiet);
     "weight" I64 |all, id| TableCell::count(event(all, *id).weight);
 };
@@ -238,7 +243,7 @@ const BAGS: &[Column<usize>] = columns! {
     "file_bytes" I64 |all, at| TableCell::count(all.bags[*at].file_bytes);
 };
 
-fn event(mission: &Mission, id: usize) -> &Event {
+fn event(mission: &Mission, id: EventId) -> &Event {
     &mission.log.events[id]
 }
 

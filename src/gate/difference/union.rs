@@ -10,7 +10,7 @@ use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{
-    Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic,
+    ById, Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic,
 };
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
@@ -137,7 +137,7 @@ pub(crate) fn union(
         differing,
         turned: turned(differing),
         at,
-        events: Vec::new(),
+        events: ById::default(),
     };
     let period = Period::from_nanos(SECOND).unwrap_or(first.period);
     Mission {
@@ -250,7 +250,7 @@ struct UnionLog<'a> {
     differing: &'a [Difference],
     turned: Turned<'a>,
     at: Stamp,
-    events: Vec<Event>,
+    events: ById<EventId, Event>,
 }
 
 /// Whether an element appeared (true) or vanished (false), by kind and name.
@@ -267,7 +267,7 @@ fn turned(differing: &[Difference]) -> Turned<'_> {
 }
 
 impl UnionLog<'_> {
-    fn all(mut self) -> Vec<Event> {
+    fn all(mut self) -> ById<EventId, Event> {
         let mut wholes: BTreeMap<NodeId, EventId> = BTreeMap::new();
         for (id, node) in self.elements.nodes.with_ids() {
             let turned = self.turned("node", node.name.as_str());
@@ -308,10 +308,7 @@ impl UnionLog<'_> {
                 _ => ("subscribes", format!("{topic} → {node}")),
             };
             if let Some(whole) = wholes.get(&edge.node).copied() {
-                let came = self
-                    .events
-                    .get(whole as usize)
-                    .is_some_and(|e| e.kind == Kind::Started);
+                let came = self.events[whole].kind == Kind::Started;
                 self.add(appeared(came), what, Detail::None, Some(whole));
             } else if let Some(came) = self.turned(kind, &label) {
                 self.add(appeared(came), what, Detail::None, None);
@@ -377,8 +374,7 @@ impl UnionLog<'_> {
             part_of,
             quiet: false,
             weight: 1,
-        });
-        EventId::try_from(self.events.len() - 1).unwrap_or(EventId::MAX)
+        })
     }
 }
 

@@ -35,7 +35,7 @@ impl Judge<'_> {
     fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
         let mission = self.facts.mission;
         let parts = mission.log.all_parts();
-        let own = (0..).zip(&mission.log.events);
+        let own = mission.log.events.with_ids();
         let own = own.filter(|(_, event)| event.kind == kind && !event.quiet);
         let found = own.map(|(id, event)| {
             let (node, topic) = mission.elements.names(event.what);

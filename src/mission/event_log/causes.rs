@@ -21,7 +21,7 @@ pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
 
 /// The ids of the headlines of some kinds, sorted by time.
 fn headlines(drafts: &Drafts, kinds: &[Kind]) -> Vec<EventId> {
-    let all = (0..).zip(&drafts.list);
+    let all = drafts.list.with_ids();
     let wanted = all.filter(|(_, e)| e.is_headline() && kinds.contains(&e.kind));
     let mut places: Vec<EventId> = wanted.map(|(id, _)| id).collect();
     places.sort_by_key(|id| (drafts.get(*id).time, *id));
@@ -103,8 +103,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
 
 /// Subscriptions that appear or vanish with the topic's publisher are consequences.
 fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let all = (0..).zip(&drafts.list).map(|(id, _)| id);
-    let turns = by(drafts, all, turn);
+    let turns = by(drafts, drafts.list.ids(), turn);
     let wiring = Wiring::of(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let event = drafts.get(id);
@@ -173,7 +172,7 @@ fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
     let wiring = Wiring::of(context);
     let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
     let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
-    for (id, event) in (0..).zip(&drafts.list) {
+    for (id, event) in drafts.list.with_ids() {
         match (event.kind, context.elements.ends(event.what).1) {
             (Kind::Silent | Kind::Stopped | Kind::Restarted, _) => {
                 pauses.entry(event.what).or_default().push(id);
@@ -245,7 +244,7 @@ fn flaps(context: &LogInput<'_>, drafts: &mut Drafts) {
             continue;
         }
         let until = drafts.get(last).time;
-        let event = &mut drafts.list[first as usize];
+        let event = &mut drafts.list[first];
         event.detail = Detail::Count(many as u64);
         event.until = Some(until);
         for turn in &turns[1..] {
@@ -356,11 +355,11 @@ mod tests {
         for topic in 0..3 {
             drafts.add(event(Kind::Silent, topic, 1, None));
         }
-        drafts.fold(2, 1);
-        drafts.fold(1, 0);
-        drafts.fold(0, 2);
+        drafts.fold(EventId(2), EventId(1));
+        drafts.fold(EventId(1), EventId(0));
+        drafts.fold(EventId(0), EventId(2));
         drafts.flatten();
         let wholes: Vec<_> = drafts.list.iter().map(|e| e.part_of).collect();
-        assert_eq!(wholes, [None, Some(0), Some(0)]);
+        assert_eq!(wholes, [None, Some(EventId(0)), Some(EventId(0))]);
     }
 }

@@ -57,7 +57,7 @@ impl EventTurns {
         let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
             to.entry(what).or_default().push((time, id));
         };
-        for (id, event) in (0..).zip(&log.events) {
+        for (id, event) in log.events.with_ids() {
             match event.kind {
                 Kind::Started | Kind::Appeared => add(&mut begins, event.what, event.time, id),
                 Kind::Stopped | Kind::Vanished => add(&mut ends, event.what, event.time, id),
@@ -130,7 +130,7 @@ fn structure(
 
 /// The changes of a window in events that are not about existence: rates, hand-overs, restarts, values.
 fn values(log: &EventLog, news: Span) -> impl Iterator<Item = (Change, EventId)> + '_ {
-    let inside = (0..).zip(&log.events).filter(move |(_, e)| {
+    let inside = log.events.with_ids().filter(move |(_, e)| {
         news.contains(
             e.until
                 .filter(|_| e.kind == Kind::Restarted)
@@ -184,10 +184,10 @@ fn change(event: &Event) -> Option<Change> {
 /// nearest in time with the same kind and element.
 pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
     let mut of: BTreeMap<(Kind, Element), Vec<EventId>> = BTreeMap::new();
-    for (id, event) in (0..).zip(&log.events) {
+    for (id, event) in log.events.with_ids() {
         of.entry((event.kind, event.what)).or_default().push(id);
     }
-    let time = |id: EventId| log.events[id as usize].time;
+    let time = |id: EventId| log.events[id].time;
     let place = |change: &Change, start: Stamp| {
         let (kind, what, ..) = described(change);
         let all = of.get(&(kind, what))?;
@@ -198,7 +198,7 @@ pub(crate) fn places(log: &EventLog, windows: &[Window]) -> Vec<Vec<EventId>> {
     let of_window = |window: &Window| {
         let changes = window.changes.iter();
         changes
-            .map(|c| place(c, window.span.start).unwrap_or(0))
+            .map(|c| place(c, window.span.start).unwrap_or_default())
             .collect()
     };
     windows.iter().map(of_window).collect()

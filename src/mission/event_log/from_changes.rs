@@ -7,18 +7,19 @@ use super::{Detail, Event, EventId, EventLog, Kind};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::diff::{Change, ValueKind};
-use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
+use crate::graph::{ById, Edge, Element, Elements, Id as _, NodeId, TopicId};
 use crate::mission::Window;
 
 /// The log from the changes between windows. A change without a time inside its window is put at the window's start.
 pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog {
-    let mut events: Vec<Event> = Vec::new();
+    let mut events = ById::default();
     for window in windows {
         let offset = events.len();
         let owners = WindowTurns::new(elements, window);
-        let all: Vec<Event> = owners.events().collect();
+        let all: ById<EventId, Event> = owners.events().collect();
         for event in &all {
-            let part_of = event.part_of.map(|at| id(offset + whole(&all, at)));
+            let whole = event.part_of.map(|id| whole(&all, id));
+            let part_of = whole.map(|id| EventId::of(offset + id.at()));
             events.push(Event {
                 part_of,
                 ..event.clone()
@@ -32,16 +33,12 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> EventLog 
 }
 
 /// The outermost event that explains this one: parts have no parts.
-fn whole(events: &[Event], mut at: EventId) -> usize {
+fn whole(events: &ById<EventId, Event>, mut id: EventId) -> EventId {
     // A topic may belong to a publication, and that to a node or a hand-over.
     for _ in 0..3 {
-        at = events[at as usize].part_of.unwrap_or(at);
+        id = events[id].part_of.unwrap_or(id);
     }
-    at as usize
-}
-
-fn id(place: usize) -> EventId {
-    EventId::try_from(place).unwrap_or(EventId::MAX)
+    id
 }
 
 /// The elements that appeared or vanished in one window, and their relations.
@@ -114,7 +111,7 @@ impl<'a> WindowTurns<'a> {
             detail,
             confidence: Confidence::Measured,
             evidence: Evidence::NONE,
-            part_of: whole.map(id),
+            part_of: whole.map(EventId::of),
             quiet: false,
             weight: 1,
         }

@@ -56,16 +56,14 @@ fn publishers(context: &LogInput<'_>, topic: Name) -> Vec<NodeId> {
 /// happened.
 fn explain(drafts: &mut Drafts, loss: EventId, topic: Element, (from, to): (Stamp, Stamp)) {
     let list = &mut drafts.list;
-    let silences = (0..).zip(list.iter()).filter(|(_, e)| {
+    let silences = list.with_ids().filter(|(_, e)| {
         let is_then = e.time <= to && e.until.is_none_or(|end| from <= end.plus(CLOSE_NS));
         e.kind == Kind::Silent && e.what == topic && is_then
     });
     let wholes: Vec<EventId> = silences.map(|(id, e)| e.part_of.unwrap_or(id)).collect();
     for whole in wholes {
-        let is_silence = list
-            .get(whole as usize)
-            .is_some_and(|e| e.kind == Kind::Silent);
-        for (id, event) in (0..).zip(list.iter_mut()) {
+        let is_silence = list.get(whole).is_some_and(|e| e.kind == Kind::Silent);
+        for (id, event) in list.ids().zip(list.iter_mut()) {
             if is_silence && (id == whole || event.part_of == Some(whole)) {
                 event.part_of = Some(loss);
             }

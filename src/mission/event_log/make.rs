@@ -5,7 +5,7 @@ use crate::base::name::{is_feedback, is_quiet};
 use crate::base::time::Stamp;
 use crate::evidence::{Confidence, Evidence};
 use crate::graph::history::{Bound, Life};
-use crate::graph::{Element, Elements, History, NodeId, TopicId};
+use crate::graph::{ById, Element, Elements, History, NodeId, TopicId};
 
 /// The data from which events are made.
 #[derive(Clone, Copy)]
@@ -19,26 +19,25 @@ pub(crate) struct LogInput<'a> {
 /// Unsorted events; a part refers to the index of its whole.
 #[derive(Default)]
 pub(crate) struct Drafts {
-    pub(crate) list: Vec<Event>,
+    pub(crate) list: ById<EventId, Event>,
 }
 
 impl Drafts {
     /// Adds an event; returns its index.
     pub(crate) fn add(&mut self, event: Event) -> EventId {
-        self.list.push(event);
-        EventId::try_from(self.list.len() - 1).unwrap_or(EventId::MAX)
+        self.list.push(event)
     }
 
     /// The event at this index.
     pub(crate) fn get(&self, id: EventId) -> &Event {
-        &self.list[id as usize]
+        &self.list[id]
     }
 
     /// Makes a headline a part of another event, unless that is a part of it.
     pub(crate) fn fold(&mut self, part: EventId, whole: EventId) {
         let whole = self.root(whole);
         if whole != part {
-            self.list[part as usize].part_of = Some(whole);
+            self.list[part].part_of = Some(whole);
         }
     }
 
@@ -52,7 +51,7 @@ impl Drafts {
 
     /// Makes the parts of parts parts of their headlines.
     pub(crate) fn flatten(&mut self) {
-        for id in 0..self.list.len() {
+        for id in self.list.ids() {
             let part_of = self.list[id].part_of.map(|whole| self.root(whole));
             self.list[id].part_of = part_of;
         }
@@ -60,7 +59,7 @@ impl Drafts {
 }
 
 /// Every event of a mission, sorted.
-pub(crate) fn make(context: &LogInput<'_>) -> Vec<Event> {
+pub(crate) fn make(context: &LogInput<'_>) -> ById<EventId, Event> {
     let mut drafts = Drafts::default();
     lifetimes::add(context, &mut drafts);
     silence::add(context, &mut drafts);
@@ -72,34 +71,36 @@ pub(crate) fn make(context: &LogInput<'_>) -> Vec<Event> {
     sorted(drafts.list, context.elements).0
 }
 
-/// Sorts by time, kind and name, updates the references of parts and the weights of wholes; also returns the new index
-/// of each.
-pub(crate) fn sorted(list: Vec<Event>, elements: &Elements) -> (Vec<Event>, Vec<EventId>) {
+/// Events in order, and the new id of each by the old one.
+pub(crate) type SortedEvents = (ById<EventId, Event>, ById<EventId, EventId>);
+
+/// Sorts by time, kind and name, and updates the references of parts and the weights of wholes.
+pub(crate) fn sorted(list: ById<EventId, Event>, elements: &Elements) -> SortedEvents {
     sorted_by(list, |event| (elements.ends(event.what), event.what))
 }
 
 /// As [`sorted`], with the order of events of one time and kind.
 pub(crate) fn sorted_by<K: Ord>(
-    mut list: Vec<Event>,
+    mut list: ById<EventId, Event>,
     key: impl Fn(&Event) -> K,
-) -> (Vec<Event>, Vec<EventId>) {
-    let mut order: Vec<usize> = (0..list.len()).collect();
+) -> SortedEvents {
+    let mut order: Vec<EventId> = list.ids().collect();
     order.sort_by_key(|at| (list[*at].time, list[*at].kind, key(&list[*at])));
-    let mut new: Vec<EventId> = vec![0; list.len()];
-    for (place, old) in (0..).zip(&order) {
+    let mut new = ById::like(&list, EventId::default());
+    for (place, old) in list.ids().zip(&order) {
         new[*old] = place;
     }
-    let mut weights = vec![1_u32; list.len()];
-    for event in &mut list {
+    let mut weights = ById::like(&list, 1_u32);
+    for event in list.iter_mut() {
         if let Some(whole) = event.part_of {
-            weights[whole as usize] = weights[whole as usize].saturating_add(1);
-            event.part_of = Some(new[whole as usize]);
+            weights[whole] = weights[whole].saturating_add(1);
+            event.part_of = Some(new[whole]);
         }
     }
     for (event, weight) in list.iter_mut().zip(weights) {
         event.weight = weight;
     }
-    let mut list: Vec<Option<Event>> = list.into_iter().map(Some).collect();
+    let mut list: ById<EventId, Option<Event>> = list.into_iter().map(Some).collect();
     let list = order.iter().filter_map(|at| list[*at].take()).collect();
     (list, new)
 }

@@ -44,7 +44,7 @@ struct Gone(BTreeMap<NodeId, Vec<(Stamp, EventId)>>);
 impl Gone {
     fn new(drafts: &Drafts) -> Self {
         let mut gone: BTreeMap<NodeId, Vec<(Stamp, EventId)>> = BTreeMap::new();
-        for (id, event) in (0..).zip(&drafts.list) {
+        for (id, event) in drafts.list.with_ids() {
             let whole = event.part_of.unwrap_or(id);
             if let (Element::Node(node), Kind::Stopped | Kind::Restarted) = (event.what, event.kind)
             {

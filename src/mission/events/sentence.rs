@@ -137,10 +137,7 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let own = elements.ends(event.what);
     let is_node = event.what.is_node();
     let (mut alike, mut silent) = (Vec::new(), Vec::new());
-    for part in parts
-        .iter()
-        .filter_map(|id| mission.log.events.get(*id as usize))
-    {
+    for part in parts.iter().filter_map(|id| mission.log.events.get(*id)) {
         let (node, topic) = elements.ends(part.what);
         // The topics of a node that stopped or is silent are implied.
         let sent = |topic| {
@@ -217,7 +214,7 @@ fn with(mission: &Mission, parts: &[EventId], event: &Event) -> String {
     let (mut sends, mut takes) = (BTreeSet::new(), BTreeSet::new());
     let events = &mission.log.events;
     let node = elements.ends(event.what).0;
-    let parts = parts.iter().filter_map(|id| events.get(*id as usize));
+    let parts = parts.iter().filter_map(|id| events.get(*id));
     // Others may depend on it, such as its subscribers.
     for part in parts.filter(|part| elements.ends(part.what).0 == node) {
         match part.what {

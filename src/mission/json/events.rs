@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{Text, confidence_of, evidence, words};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Element, Elements, NodeId};
+use crate::graph::{ById, Element, Elements, NodeId};
 use crate::mission::event_log::{
-    Detail, Event, EventLog, Interruption, InterruptionKind, Kind, Phase, sorted,
+    Detail, Event, EventId, EventLog, Interruption, InterruptionKind, Kind, Phase, sorted,
 };
 
 /// An element by its name, or an edge by its two names.
@@ -51,7 +51,7 @@ impl<'a> ElementName<'a> {
 #[derive(Deserialize, Serialize)]
 pub(crate) struct EventJson<'a> {
     #[serde(default)]
-    id: u32,
+    id: EventId,
     kind: Text<'a>,
     #[serde(flatten)]
     named: ElementName<'a>,
@@ -68,10 +68,10 @@ pub(crate) struct EventJson<'a> {
     #[serde(default)]
     evidence: Vec<Text<'a>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    parts: Vec<u32>,
+    parts: Vec<EventId>,
     /// The event that this one follows from: the one that lists it among its parts.
     #[serde(skip_serializing_if = "Option::is_none")]
-    cause: Option<u32>,
+    cause: Option<EventId>,
     #[serde(default)]
     quiet: bool,
     weight: Option<u32>,
@@ -152,7 +152,7 @@ pub(crate) fn events<'a>(
     elements: &'a Elements,
 ) -> impl Iterator<Item = EventJson<'a>> + Clone {
     let parts = log.all_parts();
-    (0..).zip(&log.events).map(move |(id, event)| EventJson {
+    log.events.with_ids().map(move |(id, event)| EventJson {
         id,
         kind: event.kind.word().into(),
         named: ElementName::new(event.what, elements),
@@ -192,12 +192,12 @@ fn role(what: Element, elements: &Elements) -> Option<&str> {
 }
 
 /// The log of rows that were read; `None` if one of them is about an element that is not in any window.
-pub(crate) fn read(rows: &[EventJson<'_>], elements: &Elements) -> Option<Vec<Event>> {
+pub(crate) fn read(rows: &[EventJson<'_>], elements: &Elements) -> Option<ById<EventId, Event>> {
     let events = rows.iter().map(|row| row.event(elements));
-    let mut list = events.collect::<Option<Vec<_>>>()?;
-    for (id, row) in (0..).zip(rows) {
+    let mut list = events.collect::<Option<ById<_, _>>>()?;
+    for (id, row) in list.ids().zip(rows) {
         for part in &row.parts {
-            list.get_mut(*part as usize)?.part_of = Some(id);
+            list.get_mut(*part)?.part_of = Some(id);
         }
     }
     Some(sorted(list, elements).0)
