@@ -11,6 +11,7 @@ mod gexf;
 mod gif;
 mod graphml;
 pub(crate) mod html;
+mod indexed;
 mod json;
 pub(crate) mod mcap;
 pub(crate) mod mermaid;

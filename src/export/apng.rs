@@ -3,28 +3,21 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Started, Written};
-use crate::base::error::{Error, Result};
+use super::indexed::{self, IndexedAnimation};
+use super::{DrawnFrame, Pack, Packet, Started};
+use crate::base::error::Result;
 use crate::export::palette::{self, Area, Palette};
-use crate::export::sequence::{FrameTime, Sequence};
+use crate::export::sequence::Sequence;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
-struct Apng {
-    target: Target,
-    frames: usize,
-    out: Shared,
-    animation: Option<Animation<Shared>>,
-}
-
 /// The file, shared with the writer, which does not return it.
-#[derive(Clone)]
-struct Shared(Arc<Mutex<OutputSink>>);
+struct Shared<W>(Arc<Mutex<W>>);
 
-impl Write for Shared {
+impl<W: Write> Write for Shared<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut sink = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        sink.write(bytes)
+        let mut out = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        out.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -35,66 +28,9 @@ impl Write for Shared {
 /// Begins the animation.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
+/// [`Error::Usage`](crate::Error::Usage) for a name with `{n}`.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    target.must_be_one("an animation contains all windows")?;
-    Ok(Box::new(Apng {
-        target: target.clone(),
-        frames: sequence.frame_times().len(),
-        out: Shared(Arc::new(Mutex::new(OutputSink::create(
-            target,
-            sequence.options.max_bytes,
-        )?))),
-        animation: None,
-    }))
-}
-
-impl Apng {
-    fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
-        Error::io("write", self.target.path())
-    }
-}
-
-impl Encoder for Apng {
-    fn needs(&self) -> Needs {
-        Needs::Indices
-    }
-
-    fn plays(&self) -> bool {
-        true
-    }
-
-    fn pack(&self) -> Pack {
-        pack
-    }
-
-    fn begin(&mut self, size: (u32, u32), palette: &Palette) -> Result<()> {
-        let frames = u32::try_from(self.frames).unwrap_or(u32::MAX);
-        let animation = Animation::new(self.out.clone(), size, palette, frames);
-        self.animation = Some(animation.map_err(self.error())?);
-        Ok(())
-    }
-
-    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
-        let failed = self.error();
-        match &mut self.animation {
-            Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),
-            None => Ok(()),
-        }
-    }
-
-    fn finish(mut self: Box<Self>) -> Result<Written> {
-        let failed = self.error();
-        let mut written = Written::to(&self.target);
-        if let Some(animation) = self.animation.take() {
-            animation.finish().map_err(failed)?;
-            if let Some(sink) = Arc::into_inner(self.out.0) {
-                let sink = sink.into_inner().unwrap_or_else(PoisonError::into_inner);
-                written.add(sink.commit()?);
-            }
-        }
-        Ok(written)
-    }
+    indexed::start::<Animation<OutputSink>>(sequence, target)
 }
 
 /// The packet of the area that differs from the previous frame; one pixel if nothing does, as a frame cannot be empty.
@@ -118,17 +54,21 @@ fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
 
 /// An APNG in progress. The number of frames is stated first, so equal frames are not joined.
 struct Animation<W: Write> {
-    writer: png::Writer<W>,
+    out: Arc<Mutex<W>>,
+    writer: png::Writer<Shared<W>>,
 }
 
-impl<W: Write> Animation<W> {
-    /// Begins an endless loop of `frames` frames; the palette has at most 255 colours.
-    fn new(out: W, size: (u32, u32), palette: &Palette, frames: u32) -> io::Result<Self> {
+impl<W: Write> IndexedAnimation<W> for Animation<W> {
+    const PACK: Pack = pack;
+
+    fn new(out: W, size: (u32, u32), palette: &Palette, frames: usize) -> io::Result<Self> {
+        let frames = u32::try_from(frames).unwrap_or(u32::MAX);
+        let out = Arc::new(Mutex::new(out));
         let mut colours = palette.bytes();
         colours.extend([0; 3]);
         let mut opacity = vec![255; palette.colours().len()];
         opacity.push(0);
-        let mut encoder = png::Encoder::new(out, size.0, size.1);
+        let mut encoder = png::Encoder::new(Shared(Arc::clone(&out)), size.0, size.1);
         encoder.set_color(png::ColorType::Indexed);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_palette(colours);
@@ -139,12 +79,10 @@ impl<W: Write> Animation<W> {
         encoder.set_deflate_compression(png::DeflateCompression::Level(9));
         encoder.set_animated(frames, 0).map_err(to_io)?;
         encoder.set_blend_op(png::BlendOp::Over).map_err(to_io)?;
-        Ok(Self {
-            writer: encoder.write_header().map_err(to_io)?,
-        })
+        let writer = encoder.write_header().map_err(to_io)?;
+        Ok(Self { out, writer })
     }
 
-    /// Shows a frame for `ms` milliseconds.
     fn add(&mut self, packet: Packet, ms: u32) -> io::Result<()> {
         let (delay, parts) = delay(ms);
         self.writer.set_frame_delay(delay, parts).map_err(to_io)?;
@@ -159,6 +97,14 @@ impl<W: Write> Animation<W> {
         self.writer.write_image_data(&pixels).map_err(to_io)
     }
 
+    fn finish(self) -> io::Result<W> {
+        self.writer.finish().map_err(to_io)?;
+        let out = Arc::into_inner(self.out).ok_or(io::ErrorKind::ResourceBusy)?;
+        Ok(out.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl<W: Write> Animation<W> {
     /// Sets the area of the next pixels.
     fn place(&mut self, area: Area) -> Result<(), png::EncodingError> {
         // Positions inside an image whose sides are u32.
@@ -168,11 +114,6 @@ impl<W: Write> Animation<W> {
             .set_frame_dimension(number(area.width), number(area.height))?;
         self.writer
             .set_frame_position(number(area.x), number(area.y))
-    }
-
-    /// Ends the file.
-    fn finish(self) -> io::Result<()> {
-        self.writer.finish().map_err(to_io)
     }
 }
 
@@ -207,17 +148,14 @@ mod tests {
 
     fn written(frames: &[(Vec<u8>, u32)]) -> Vec<u8> {
         let palette = Palette::new(vec![[255; 3], [200, 30, 30]]);
-        let mut bytes = Vec::new();
-        let count = u32::try_from(frames.len()).unwrap();
-        let mut animation = Animation::new(&mut bytes, SIZE, &palette, count).unwrap();
+        let mut animation = Animation::new(Vec::new(), SIZE, &palette, frames.len()).unwrap();
         let mut before: &[u8] = &[];
         for (frame, ms) in frames {
             let packet = packed(&palette, before, frame, (40, 30), pack);
             animation.add(packet, *ms).unwrap();
             before = frame;
         }
-        animation.finish().unwrap();
-        bytes
+        animation.finish().unwrap()
     }
 
     /// The frames as a decoder reads them: delays in milliseconds and the position of the dot.

@@ -248,17 +248,10 @@ impl Finding {
         }
     }
 
-    /// A finding that is not observable, with the reason in `text`.
-    pub(crate) fn unknown(
-        kind: FindingKind,
-        name: &str,
-        place: YamlPlace,
-        text: impl fmt::Display,
-    ) -> Self {
-        Self {
-            severity: Severity::Unknown,
-            ..Self::new(kind, name, place, text)
-        }
+    /// The finding as one that is not observable, with the reason in its text.
+    pub(crate) fn unknown(mut self) -> Self {
+        self.severity = Severity::Unknown;
+        self
     }
 
     /// The finding with the observed and the expected value.

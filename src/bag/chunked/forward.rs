@@ -304,21 +304,18 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         what: &G::Description,
         len: u64,
     ) -> Result<(), NoRecord> {
-        if len > MOST_PAYLOAD as u64 {
-            return pass(stream, len);
+        let new = self.announced.read(stream, (what, len), self.sink)?;
+        match new {
+            Err(_) => self.damage("the description of a connection cannot be read"),
+            Ok(Some((raw, id))) => {
+                if let Some((stamps, sizes)) = self.early.runs.remove(&raw) {
+                    self.found_messages.messages += stamps.len() as u64;
+                    self.sink.stamps(id, &stamps, Some(&sizes));
+                }
+            }
+            Ok(None) => {}
         }
-        let data = peek_whole(stream, len)?;
-        let Ok(new) = self.announced.describe(what, data, self.sink) else {
-            self.damage("the description of a connection cannot be read");
-            return pass(stream, len);
-        };
-        if let Some((raw, id)) = new
-            && let Some((stamps, sizes)) = self.early.runs.remove(&raw)
-        {
-            self.found_messages.messages += stamps.len() as u64;
-            self.sink.stamps(id, &stamps, Some(&sizes));
-        }
-        pass(stream, len)
+        Ok(())
     }
 }
 

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::forward::peek_whole;
 use super::index::hand_over;
 use super::record::{Announced, NoRecord, RecordHead, pass, walk};
 use super::unpack::{Visitor, unpack};
@@ -11,7 +10,7 @@ use super::{Grammar, HEAD};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::input::closed;
-use crate::bag::model::{Growing, Growth, MOST_PAYLOAD, Sink};
+use crate::bag::model::{Growing, Growth, Sink};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -154,11 +153,8 @@ impl<G: Grammar> Visitor<G> for Records<'_, G> {
         what: &G::Description,
         len: u64,
     ) -> Result<(), NoRecord> {
-        if len <= MOST_PAYLOAD as u64 {
-            let data = peek_whole(stream, len)?;
-            // Errors are reported when the closed bag is read.
-            let _ = self.bag.announced.describe(what, data, self.sink);
-        }
-        pass(stream, len)
+        // Errors are reported when the closed bag is read.
+        let new = self.bag.announced.read(stream, (what, len), self.sink);
+        new.map(drop)
     }
 }

@@ -5,10 +5,11 @@ use std::collections::HashMap;
 use std::{fmt, io};
 
 use super::Grammar;
+use super::forward::peek_whole;
 use super::index::{hand_over_slice, nameless};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::Compression;
-use crate::bag::model::{Connection, ConnectionId, Sink, Want};
+use crate::bag::model::{Connection, ConnectionId, MOST_PAYLOAD, Sink, Want};
 use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
@@ -185,6 +186,22 @@ impl<G: Grammar> Announced<G> {
     pub(crate) fn get(&self, raw: u32) -> Option<(ConnectionId, Want)> {
         let id = self.connections.get(raw)?;
         Some((id, self.wants[id.0 as usize]))
+    }
+
+    /// As [`Announced::describe`], for a description of `len` bytes that follows in `stream`; one that is too long to be
+    /// one is ignored. The outer error is that of the stream.
+    pub(crate) fn read(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        (what, len): (&G::Description, u64),
+        sink: &mut dyn Sink,
+    ) -> Result<Result<Option<(u32, ConnectionId)>, NoRecord>, NoRecord> {
+        let new = if len > MOST_PAYLOAD as u64 {
+            Ok(None)
+        } else {
+            self.describe(what, peek_whole(stream, len)?, sink)
+        };
+        pass(stream, len).map(|()| new)
     }
 
     /// Announces the connection of a description if it is a new one; returns it with the bag's number for it.

@@ -52,10 +52,8 @@ pub(super) const TABLES: &[Table] = &[
         word: "ledger",
         batch: || Batch::with(LEDGER),
         fill: |all, _, row| {
-            all.log
-                .events
-                .ids()
-                .for_each(|id| put(all, LEDGER, &id, row))
+            let ids = all.log.events.ids();
+            ids.for_each(|id| put(all, LEDGER, &id, row));
         },
     },
     Table {

@@ -316,29 +316,28 @@ topics:
         (gone.collect(), new.collect())
     }
 
+    /// Checks that an edit replaces only this part of the file.
+    fn replaces(edit: impl Fn(&mut EditedText) -> Result<(), BadYaml>, old: &str, new: &str) {
+        assert_eq!(edited(edit), FILE.replace(old, new));
+    }
+
     #[test]
     fn only_the_value_is_changed() {
-        let text = edited(|t| t.set("topics", "/scan", "hz", "5..6"));
-        assert_eq!(text, FILE.replace("9..11", "5..6"));
-        let text = edited(|t| t.set("topics", "/scan", "by", "[/z]"));
-        assert_eq!(text, FILE.replace("[/a, \"/b: x\"]", "[/z]"));
-        let text = edited(|t| t.set("topics", "/block", "hz", "5..6"));
-        assert_eq!(text, FILE.replace("1..2", "5..6"));
-        let text = edited(|t| t.set("topics", "/block", "by", "[/z]"));
-        assert_eq!(
-            text,
-            FILE.replace("by:\n      - /a\n      - /c", "by: [/z]")
-        );
+        let topic = |name, key, value| move |t: &mut EditedText| t.set("topics", name, key, value);
+        replaces(topic("/scan", "hz", "5..6"), "9..11", "5..6");
+        replaces(topic("/scan", "by", "[/z]"), "[/a, \"/b: x\"]", "[/z]");
+        replaces(topic("/block", "hz", "5..6"), "1..2", "5..6");
+        let list = "by:\n      - /a\n      - /c";
+        replaces(topic("/block", "by", "[/z]"), list, "by: [/z]");
     }
 
     #[test]
     fn keys_are_added_to_entries_with_or_without_keys() {
-        let text = edited(|t| t.set("nodes", "/a", "may_end", "true"));
-        assert_eq!(text, FILE.replace("/a: {} #", "/a: {may_end: true} #"));
-        let text = edited(|t| t.set("nodes", "/c", "may_end", "true"));
-        assert_eq!(text, FILE.replace("..0}", "..0, may_end: true}"));
-        let text = edited(|t| t.set("topics", "/null", "hz", "1.."));
-        assert_eq!(text, FILE.replace("/null:", "/null: {hz: 1..}"));
+        let ends = |name| move |t: &mut EditedText| t.set("nodes", name, "may_end", "true");
+        replaces(ends("/a"), "/a: {} #", "/a: {may_end: true} #");
+        replaces(ends("/c"), "..0}", "..0, may_end: true}");
+        let rate = |t: &mut EditedText| t.set("topics", "/null", "hz", "1..");
+        replaces(rate, "/null:", "/null: {hz: 1..}");
         let text = edited(|t| t.set("topics", "/block", "latched", "true"));
         let added = differing(&text);
         assert_eq!(added, (vec![], vec!["    latched: true"]));
@@ -346,18 +345,14 @@ topics:
 
     #[test]
     fn entries_are_added_and_removed_with_their_lines() {
-        let text = edited(|t| t.drop_entry("nodes", "/a"));
-        assert_eq!(text, FILE.replace("  /a: {} # first\n", ""));
-        let text = edited(|t| t.drop_entry("topics", "/null"));
-        assert_eq!(text, FILE.replace("  /null:\n", ""));
-        let text = edited(|t| t.unset("topics", "/scan", "hz"));
-        assert_eq!(text, FILE.replace("hz: 9..11, ", ""));
-        let text = edited(|t| t.unset("topics", "/scan", "by"));
-        assert_eq!(text, FILE.replace(", by: [/a, \"/b: x\"]", ""));
-        let text = edited(|t| t.insert("nodes", "/b", "/b", "{}"));
-        assert_eq!(text, FILE.replace("  /c:  ", "  /b: {}\n  /c:  "));
-        let text = edited(|t| t.insert("nodes", "/d", "/d", "{}"));
-        assert_eq!(text, FILE.replace("# kept\n", "# kept\n  /d: {}\n"));
+        replaces(|t| t.drop_entry("nodes", "/a"), "  /a: {} # first\n", "");
+        replaces(|t| t.drop_entry("topics", "/null"), "  /null:\n", "");
+        replaces(|t| t.unset("topics", "/scan", "hz"), "hz: 9..11, ", "");
+        let by = ", by: [/a, \"/b: x\"]";
+        replaces(|t| t.unset("topics", "/scan", "by"), by, "");
+        let insert = |name| move |t: &mut EditedText| t.insert("nodes", name, name, "{}");
+        replaces(insert("/b"), "  /c:  ", "  /b: {}\n  /c:  ");
+        replaces(insert("/d"), "# kept\n", "# kept\n  /d: {}\n");
         let text = edited(|t| t.insert("rules", "/d", "/d", "{}"));
         assert_eq!(text, format!("{FILE}rules:\n  /d: {{}}\n"));
     }

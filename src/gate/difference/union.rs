@@ -168,7 +168,6 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         name: name.as_str().into(),
         role: name.as_str().into(),
         seen: Existence::of(evidence),
-        ..Node::default()
     });
     let topics = topics.into_iter().map(|name| {
         let own = [a.topics.get(name), b.topics.get(name)];
@@ -191,7 +190,6 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
             node: ends.node(node)?,
             topic: ends.topic(topic)?,
             seen: Existence::of(evidence),
-            ..Edge::default()
         })
     };
     let publishes = both(&a.publishes, &b.publishes).into_iter();

@@ -33,7 +33,11 @@ impl Judge<'_> {
         if known.is_empty() {
             let text = format!("cannot tell the {key} of {name}: this bag does not record it");
             let hint = "enable topic statistics, or record `/statistics`";
-            return Some(Finding::unknown(measure.kind, name, at, text).hint(hint));
+            return Some(
+                Finding::new(measure.kind, name, at, text)
+                    .unknown()
+                    .hint(hint),
+            );
         }
         let bad: Vec<&(Span, f64)> = known.iter().filter(|(_, v)| !range.holds(*v)).collect();
         if bad.len() as f64 <= known.len() as f64 * (1.0 - facts.percent.unwrap_or(100.0) / 100.0) {

@@ -94,7 +94,7 @@ impl Judge<'_> {
                     let text = format!(
                         "cannot tell whether {name} is present: only its log would show it"
                     );
-                    vec![Finding::unknown(FindingKind::NodeMissing, name, at, text)]
+                    vec![Finding::new(FindingKind::NodeMissing, name, at, text).unknown()]
                 }
                 (false, true) => vec![self.missing(pattern, at)],
                 (false, false) => vec![self.unnamed(FindingKind::NodeMissing, name, at)],
@@ -140,7 +140,7 @@ impl Judge<'_> {
             )
         };
         let text = format!("cannot tell whether {name} is present: {why}");
-        Finding::unknown(kind, name, at, text).hint(hint)
+        Finding::new(kind, name, at, text).unknown().hint(hint)
     }
 
     /// The finding that a node is named, but none of the topics that only it publishes has messages.
@@ -200,7 +200,7 @@ impl Judge<'_> {
         // It may have ended in the robot's shutdown.
         if whole.end.since(ended.latest) <= CLOSING_NS {
             let text = format!("cannot tell when {role} ended: its last sign is at {clock}");
-            return Some(Finding::unknown(FindingKind::NodeGone, role, at, text));
+            return Some(Finding::new(FindingKind::NodeGone, role, at, text).unknown());
         }
         let finding = Finding::new(
             FindingKind::NodeGone,
@@ -237,12 +237,7 @@ impl Judge<'_> {
                 let text = format!(
                     "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
                 );
-                return Some(Finding::unknown(
-                    FindingKind::NodeLate,
-                    role,
-                    within.at,
-                    text,
-                ));
+                return Some(Finding::new(FindingKind::NodeLate, role, within.at, text).unknown());
             }
             let text = format!("{role} appeared at {clock}, expected {expected}");
             let finding = Finding::new(FindingKind::NodeLate, role, within.at, text);
@@ -294,12 +289,12 @@ impl Judge<'_> {
                     Some(Finding::new(FindingKind::NodeLifecycle, role, at, text).saw(seen, expected))
                 }
                 None => Some(
-                    Finding::unknown(
+                    Finding::new(
                         FindingKind::NodeLifecycle,
                         role,
                         at,
                         format!("cannot tell whether {role} is {expected}: this bag has no transition of it"),
-                    )
+                    ).unknown()
                     .hint(format!("record {role}/transition_event")),
                 ),
             }

@@ -144,7 +144,7 @@ impl Judge<'_> {
         }
         let name = self.facts.topic(topic);
         let text = format!("cannot tell the rate of {name}: it has no whole window to check");
-        let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, text);
+        let finding = Finding::new(FindingKind::TopicRateLow, name, at, text).unknown();
         vec![finding.hint("use a shorter period: `period: 5s`, or `--period 5`")]
     }
 

@@ -87,7 +87,7 @@ impl Judge<'_> {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
         let text = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
-        Finding::unknown(FindingKind::NodeLate, name, at, text)
+        Finding::new(FindingKind::NodeLate, name, at, text).unknown()
     }
 
     fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, facts: &TopicFacts) {
@@ -145,7 +145,7 @@ impl Judge<'_> {
         if began.latest >= earlier.earliest {
             let text =
                 format!("cannot tell whether {other} appeared after {one}: the times overlap");
-            return Finding::unknown(FindingKind::OrderBroken, other, second.at, text);
+            return Finding::new(FindingKind::OrderBroken, other, second.at, text).unknown();
         }
         let text = format!(
             "{other} appeared at {}, expected after {one} at {}",
@@ -210,7 +210,7 @@ impl Judge<'_> {
                 "cannot tell whether {name} {} in time after {what} at {clock}: {doubt}",
                 past(expect)
             );
-            return Finding::unknown(FindingKind::ReactionMissing, name, at, text);
+            return Finding::new(FindingKind::ReactionMissing, name, at, text).unknown();
         }
         let text = format!("{what} at {clock}, and {expected} did not follow");
         let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, text)

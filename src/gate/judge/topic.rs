@@ -184,12 +184,7 @@ impl Judge<'_> {
         let expected = words::some_of(&expected, NAMED);
         if types.is_empty() {
             let text = format!("cannot tell whether {name} is a {expected}: its type is unknown");
-            return vec![Finding::unknown(
-                FindingKind::TopicType,
-                name,
-                kinds.at,
-                text,
-            )];
+            return vec![Finding::new(FindingKind::TopicType, name, kinds.at, text).unknown()];
         }
         if other.is_empty() {
             return Vec::new();
@@ -252,7 +247,9 @@ impl Judge<'_> {
             let text =
                 format!("cannot tell whether {who} publishes {name}: its publishers are unknown");
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
-            return Finding::unknown(kind, name, wanted.at, text).hint(hint);
+            return Finding::new(kind, name, wanted.at, text)
+                .unknown()
+                .hint(hint);
         }
         let known = self.facts.publishers(topic);
         let roles: Vec<&str> = known
@@ -303,7 +300,11 @@ impl Judge<'_> {
                 "cannot tell whether {who} subscribes to {name}: this bag has no evidence of subscribers"
             );
             let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
-            return Some(Finding::unknown(kind, name, wanted.at, text).hint(hint));
+            return Some(
+                Finding::new(kind, name, wanted.at, text)
+                    .unknown()
+                    .hint(hint),
+            );
         }
         let text = format!("{who} does not subscribe to {name}");
         let mut finding = Finding::new(kind, name, wanted.at, text).saw("nothing", who);
@@ -326,7 +327,7 @@ impl Judge<'_> {
             }
             None => {
                 let text = format!("cannot tell whether {name} is {expected}: unknown in this bag");
-                vec![Finding::unknown(FindingKind::TopicQos, name, at, text)]
+                vec![Finding::new(FindingKind::TopicQos, name, at, text).unknown()]
             }
         }
     }
@@ -339,7 +340,7 @@ impl Judge<'_> {
             let text = format!(
                 "cannot tell whether {name} is {expected}: this bag has no quality of service"
             );
-            return vec![Finding::unknown(FindingKind::TopicQos, name, at, text)];
+            return vec![Finding::new(FindingKind::TopicQos, name, at, text).unknown()];
         };
         let has = |word: &str| seen.split_whitespace().any(|own| own == word);
         if expected.split_whitespace().all(has) {

@@ -253,7 +253,7 @@ impl EdgeJson<'_> {
     }
 }
 
-impl<'a> KnownJson<'a> {
+impl KnownJson<'_> {
     fn new(known: &Existence, seen: Option<&ElementState>) -> Self {
         Self {
             state: seen.map(|s| s.state.word().into()),
