@@ -146,6 +146,15 @@ pub fn is_quiet(name: &str) -> bool {
         || name.starts_with("/events/")
 }
 
+/// The topic on which every node publishes its own log records, and the one with the records of all, which one node
+/// publishes.
+pub(crate) const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
+
+/// Whether every node publishes its own log records on a topic, so that its messages have many senders.
+pub(crate) fn is_log(topic: &str) -> bool {
+    topic == LOGS[0]
+}
+
 /// Whether a topic is the feedback of an action: its rhythm says nothing about the server, which sends it while there is
 /// a goal.
 pub(crate) fn is_feedback(topic: &str) -> bool {

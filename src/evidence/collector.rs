@@ -8,6 +8,7 @@ use super::clock::{Belief, believed};
 
 use crate::bag::{Connection, Message, Want};
 use crate::base::error::{Error, Result};
+use crate::base::name::is_log;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
@@ -386,7 +387,7 @@ impl Collector {
 fn is_held(connection: &Connection) -> bool {
     let qos = connection.qos.as_deref().unwrap_or_default();
     let kept = connection.latching || source::qos::is_transient_local(qos);
-    kept && connection.topic.as_str() != "/rosout"
+    kept && !is_log(connection.topic.as_str())
 }
 
 /// A notice that a stream, or a message of it, has another layout than its type implies.

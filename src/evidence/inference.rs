@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
-use crate::base::name::{OWN_NODE, plain_type};
+use crate::base::name::{OWN_NODE, is_log, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::closed::Closed;
 use crate::evidence::observation::{
@@ -171,7 +171,7 @@ fn gone(streams: &[Stream]) -> BTreeSet<Option<Name>> {
     let absent = of(&|s| s.is_outside && s.publisher.is_some());
     let speaking = of(&|s| !s.is_outside);
     let holding = of(&|s| s.latched);
-    let repeating = of(&|s| !s.latched && s.connection.topic.as_str() != "/rosout");
+    let repeating = of(&|s| !s.latched && !is_log(s.connection.topic.as_str()));
     let is_gone = |node: &Option<Name>| {
         !speaking.contains(node) && (repeating.contains(node) || !holding.contains(node))
     };

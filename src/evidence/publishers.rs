@@ -6,7 +6,7 @@ mod successors;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use crate::base::name::is_player;
+use crate::base::name::{is_log, is_player};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Reliability, Stream};
@@ -51,7 +51,7 @@ pub(crate) fn judge(
             let by_player = stream
                 .publisher
                 .is_some_and(|node| is_player(&facts.text(node)));
-            if by_player && stream.connection.topic.as_str() != "/rosout" {
+            if by_player && !is_log(stream.connection.topic.as_str()) {
                 played = true;
                 stream.trust = Reliability::Player;
             }
@@ -150,7 +150,7 @@ fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics) -> bool 
     }
     let log = of_bag
         .iter()
-        .find(|at| streams[**at].connection.topic.as_str() == "/rosout");
+        .find(|at| is_log(streams[**at].connection.topic.as_str()));
     let host = log.and_then(|at| streams[*at].publisher);
     host.is_some_and(|host| named.guests.contains_key(&host))
 }

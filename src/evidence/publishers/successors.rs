@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::{NamedTopics, SOON_NS};
+use crate::base::name::is_log;
 use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Reliability, Stream};
@@ -130,7 +131,7 @@ impl<'a> RewrittenBag<'a> {
         for at in self.of_bag {
             let stream = &self.streams[*at];
             let nodes: BTreeSet<Name> = named.nodes(stream.topic).chain(stream.publisher).collect();
-            if stream.latched || stream.connection.topic.as_str() == "/rosout" {
+            if stream.latched || is_log(stream.connection.topic.as_str()) {
                 continue;
             }
             let mut times = None;
@@ -252,7 +253,7 @@ pub(super) fn shown(observation: Observation) -> Option<Name> {
 
 /// Whether all messages of a stream are by the node that its header names, and are evidence of its lifetime.
 fn is_own(streams: &[Stream], at: usize) -> bool {
-    streams[at].trust == Reliability::Whole && streams[at].connection.topic.as_str() != "/rosout"
+    streams[at].trust == Reliability::Whole && !is_log(streams[at].connection.topic.as_str())
 }
 
 /// The usual interval between the signs of a node.

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
 use crate::bag::{Connection, Encoding};
-use crate::base::name::plain_type;
+use crate::base::name::{LOGS, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::{Conclusions, ElementKey};
@@ -37,8 +37,6 @@ const MOST_AT_ONCE: usize = 32;
 const UNIT_NS: i64 = 10_000;
 /// The longest time in which a node responds, in units (1 s).
 const ANSWER: i32 = 100_000;
-/// Log topics, which are left out: log records carry the stamps of the messages they are about.
-const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 /// Lists whose first element begins with a header.
 const LISTS: [&str; 3] = [
     "tf2_msgs/TFMessage",
@@ -57,6 +55,7 @@ pub(crate) enum FirstHeader {
 
 /// Where the messages of a connection have their first header, as far as known; `None` if they do not begin with one.
 pub(crate) fn first_header(connection: &Connection, schema: &MessageSchema) -> Option<FirstHeader> {
+    // Log records carry the stamps of the messages they are about.
     if LOGS.contains(&connection.topic.as_str()) {
         return None;
     }

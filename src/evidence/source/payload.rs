@@ -12,6 +12,7 @@ use foldhash::quality::FixedState;
 use foldhash::{HashMap, HashSet};
 
 use super::SourceContext;
+use crate::base::name::LOGS;
 use crate::base::rhythm::FEWEST_OF_SENDER;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
@@ -30,8 +31,6 @@ const MOST_AT_ONCE: usize = 32;
 const MOST_RUNS: usize = 4096;
 /// The longest time in which a message is forwarded, in nanoseconds.
 const RECENT_NS: i64 = 2_000_000_000;
-/// Log topics, which are left out: log records are forwarded by a known node.
-const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 
 /// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
@@ -147,7 +146,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let kept = known.facts.payloads.clone();
     let kept = kept.into_iter().filter(|(at, _)| {
         let stream = &known.streams[*at];
-        // The only topic of its type is not a copy of another.
+        // The only topic of its type is not a copy of another, and log records are forwarded by a known node.
         let alike = topics.get(&known.kind(stream.topic));
         !LOGS.contains(&stream.connection.topic.as_str()) && alike.is_some_and(|all| all.len() > 1)
     });

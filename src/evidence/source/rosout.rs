@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::SourceContext;
+use crate::base::name::is_log;
 use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::base::time::Stamp;
@@ -38,7 +39,7 @@ pub(crate) fn read(
     let logs = || format!("{name} logs: {message}");
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
-    if context.stream.connection.topic.as_str() == "/rosout" {
+    if is_log(context.stream.connection.topic.as_str()) {
         if number <= FIRST_RECORD {
             let begins = || format!("{name} logs its first record: {message}");
             context.states(Observation::Begins(node), begins);

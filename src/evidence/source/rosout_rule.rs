@@ -2,7 +2,7 @@
 //! publishes `/rosout_agg`.
 
 use crate::bag::Encoding;
-use crate::base::name::in_space;
+use crate::base::name::{LOGS, in_space};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, SourceId};
 
@@ -29,8 +29,7 @@ fn add(source: SourceId, known: &mut Conclusions<'_>, space: &str) {
     };
     let nodes = known.nodes().iter().copied();
     let nodes: Vec<Name> = nodes.filter(|node| own(&known.text(*node))).collect();
-    let [log, all] =
-        ["/rosout", "/rosout_agg"].map(|name| known.facts.name(&in_space(space, name)));
+    let [log, all] = LOGS.map(|name| known.facts.name(&in_space(space, name)));
     let rule = |what, when| Inference::new(source, what, Confidence::Inferred, when);
     for node in nodes {
         if node != log {

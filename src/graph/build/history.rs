@@ -352,7 +352,9 @@ impl Assembly<'_> {
     }
 
     fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
-        let edge = self.edge(node, topic, track);
+        let Some(edge) = self.edge(node, topic, track) else {
+            return;
+        };
         let senders = self.traffic.get(&topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let silent = self.silences(sender.into_iter(), &spans(track));
@@ -363,20 +365,22 @@ impl Assembly<'_> {
     }
 
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
-        let edge = self.edge(node, topic, track);
+        let Some(edge) = self.edge(node, topic, track) else {
+            return;
+        };
         let all = &mut self.history;
         let id = all.elements.subscribes.push(edge);
         let record = Record::new(track, self.findings.mission, Vec::new());
         all.records.push(Element::Subscribe(id), record);
     }
 
-    fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
-        let (nodes, topics) = (&self.history.node_ids, &self.history.topic_ids);
-        Edge {
-            node: nodes.get(&node).copied().unwrap_or(NodeId(u32::MAX)),
-            topic: topics.get(&topic).copied().unwrap_or(TopicId(u32::MAX)),
+    /// An edge between elements that were added before; `None` if one of them was not.
+    fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Option<Edge> {
+        Some(Edge {
+            node: *self.history.node_ids.get(&node)?,
+            topic: *self.history.topic_ids.get(&topic)?,
             seen: seen(track),
-        }
+        })
     }
 
     /// The times at which all senders of a topic are silent.

@@ -6,6 +6,7 @@ use std::io;
 
 use super::senders::{Sender, Traffic};
 use crate::base::error::Result;
+use crate::base::name::is_log;
 use crate::base::rhythm::{FEWEST, GAP, GAP_NS};
 use crate::base::time::Stamp;
 use crate::evidence::collector::{Recorded, spool_error};
@@ -239,7 +240,7 @@ pub(crate) fn restarts(
         let mut breaks: Vec<_> = own_falls.map(|fall| (fall.from, fall.to)).collect();
         breaks.extend(sent_again(recorded, own)?);
         let mut breaks = narrowed(breaks);
-        for log in own.iter().filter(|own| is_log(recorded, own)) {
+        for log in own.iter().filter(|own| logs(recorded, own)) {
             breaks.retain(|gap| !counts_on(recorded, log, *gap));
         }
         if breaks.is_empty() {
@@ -320,7 +321,7 @@ fn falls_of(
                 breaks.entry(places).or_default().push(*gap);
             }
         }
-        if is_log(recorded, one) {
+        if logs(recorded, one) {
             // Its numbers are those of all log records of a process, which have no rhythm.
             breaks.extend(between_records(recorded, &streams).map(|places| (places, Vec::new())));
         }
@@ -350,9 +351,9 @@ fn falls_of(
 }
 
 /// Whether a node publishes its log records there.
-fn is_log(recorded: &Recorded, own: &Own<'_>) -> bool {
+fn logs(recorded: &Recorded, own: &Own<'_>) -> bool {
     let mut streams = own.streams.iter().map(|at| &recorded.streams[*at]);
-    streams.any(|stream| stream.connection.topic.as_str() == "/rosout")
+    streams.any(|stream| is_log(stream.connection.topic.as_str()))
 }
 
 /// The log records between which numbers start over after a gap, or may do so between two parts of a recording.

@@ -6,7 +6,7 @@ use std::io;
 use super::liveness::{Extent, Liveness, Pulse};
 use super::restarts::{Restart, Restarts};
 use super::senders::{Senders, Traffic};
-use crate::base::name::{is_feedback, lies_in};
+use crate::base::name::{is_feedback, is_log, lies_in};
 use crate::base::rhythm::{CROWD_NS, FOUND_NS, broken_after};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::Recorded;
@@ -39,7 +39,7 @@ pub(crate) fn tracks(
     let mut data = findings
         .streams
         .iter()
-        .filter(|s| s.connection.topic.as_str() != "/rosout");
+        .filter(|s| !is_log(s.connection.topic.as_str()));
     let is_rewritten = data.any(|stream| stream.trust == Reliability::First);
     let forwarded = forwarded(findings, traffic);
     let asked = asked(findings, traffic);
@@ -66,7 +66,7 @@ pub(crate) fn tracks(
                 let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
                 let (with_start, with_end) = with.copied().unwrap_or_default();
                 let topic = stream.connection.topic.as_str();
-                let is_free = topic == "/rosout" || is_feedback(topic);
+                let is_free = is_log(topic) || is_feedback(topic);
                 let what = Followed {
                     known: node.is_none() && sent.contains(at),
                     begins: !is_free && !with_start,
