@@ -46,7 +46,7 @@ impl std::fmt::Display for EventId {
     }
 }
 
-/// The parts of events.
+/// The parts of each event that has any, in order.
 pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// All events of a mission, and its phases.
@@ -320,7 +320,7 @@ impl EventLog {
     }
 
     /// The ids of the parts of all events, in order, by the ids of those events.
-    pub fn all_parts(&self) -> BTreeMap<EventId, Vec<EventId>> {
+    pub fn all_parts(&self) -> Parts {
         let mut parts = Parts::new();
         for (id, event) in self.events.with_ids() {
             if let Some(whole) = event.part_of {

@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
-use crate::mission::event_log::{Detail, EventId, EventLog, Kind};
+use crate::mission::event_log::{Detail, EventId, EventLog, Kind, Parts};
 use crate::view::lasting::Part;
 
 /// The largest length of a name in characters; longer ones are cut.
@@ -28,7 +28,7 @@ pub(crate) struct CaptionWriter<'a> {
     viewed: &'a Viewed,
     log: &'a EventLog,
     /// The parts of each event of the log.
-    parts: BTreeMap<EventId, Vec<EventId>>,
+    parts: Parts,
     start: Stamp,
     /// Whether there is only one window.
     is_still: bool,

@@ -6,13 +6,14 @@ use super::items::Viewed;
 use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
 use super::looks::{Looks, LooksWriter};
-use super::marks::{Parts, WindowMarks};
+use super::marks::WindowMarks;
 use super::stable::{Lengths, stable};
 use super::state::{LivingItems, Now};
 use super::turn::{WindowTurn, marked, with_ends};
 use super::{Counts, Frame, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::Element;
+use crate::mission::event_log::Parts;
 use crate::mission::{Mission, Window};
 
 /// The windows, and the looks of each item and arrow in them.

@@ -8,7 +8,7 @@ use super::{Headline, ItemKind, Lasting, Mark};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Id};
 use crate::mission::EventLog;
-use crate::mission::event_log::{Detail, Event, EventId, Kind};
+use crate::mission::event_log::{Detail, Event, EventId, Kind, Parts};
 
 /// The changes of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
@@ -23,9 +23,6 @@ pub(crate) struct Changed {
     /// The headlines behind the mark, sorted.
     pub(crate) events: Vec<EventId>,
 }
-
-/// The parts of each headline, by their indices in the event log.
-pub(crate) type Parts = BTreeMap<EventId, Vec<EventId>>;
 
 /// The changes of one window by the id of the item or arrow.
 #[derive(Default)]

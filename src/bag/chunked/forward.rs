@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::Grammar;
 use super::check::{Behind, ChunkMessages};
 use super::index::{hand_over, nameless};
-use super::record::{Announced, ChunkHead, NoRecord, RecordHead, pass, walk};
+use super::record::{Announced, ChunkHead, NoRecord, RecordHead, pass, peek_whole, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::model::{MOST_PAYLOAD, Sink};
+use crate::bag::model::Sink;
 use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
@@ -317,19 +317,6 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
         }
         Ok(())
     }
-}
-
-/// The next `len` bytes of `stream`, without taking them.
-pub(super) fn peek_whole<'s>(
-    stream: &'s mut ByteStream<'_>,
-    len: u64,
-) -> Result<&'s [u8], NoRecord> {
-    let len = usize::try_from(len).unwrap_or(usize::MAX);
-    let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
-    if bytes.len() < len {
-        return Err(NoRecord::Cut);
-    }
-    Ok(bytes)
 }
 
 /// Goes to the beginning of the next chunk after byte `from`; false if there is none before the end of the stream.

@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use std::{fmt, io};
 
 use super::Grammar;
-use super::forward::peek_whole;
 use super::index::{hand_over_slice, nameless};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::Compression;
@@ -129,6 +128,19 @@ pub(crate) fn walk<'a>(
         }
     }
     NoRecord::End
+}
+
+/// The next `len` bytes of `stream`, without taking them.
+pub(crate) fn peek_whole<'s>(
+    stream: &'s mut ByteStream<'_>,
+    len: u64,
+) -> Result<&'s [u8], NoRecord> {
+    let len = usize::try_from(len).unwrap_or(usize::MAX);
+    let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
+    if bytes.len() < len {
+        return Err(NoRecord::Cut);
+    }
+    Ok(bytes)
 }
 
 /// Skips `len` bytes, which must exist: if the length exceeds the file, nothing is skipped.
