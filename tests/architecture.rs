@@ -60,7 +60,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["spells"],
+        &["indexed", "spells"],
         &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "still", "tex", "video"],
         &["report", "run", "tables"],
         &["nodl"],
