@@ -33,7 +33,8 @@ pub mod mission {
 #[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
-        CardRow, Counts, Frame, Headline, Looks, Mark, SeenWindow, Shown, View, ViewOptions, view,
+        ArrowId, CardRow, Counts, Frame, Headline, ItemId, Looks, Mark, SeenWindow, Shown, View,
+        ViewOptions, view,
     };
 }
 

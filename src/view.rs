@@ -38,8 +38,9 @@ pub(crate) mod words;
 
 use std::sync::Arc;
 
+use crate::base::ids::ids;
 use crate::base::notice::Notices;
-use crate::graph::Element;
+use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 pub use cards::CardRow;
@@ -149,6 +150,13 @@ impl ItemKind {
     }
 }
 
+ids! {
+    /// The id of an item: its index in [`View::items`].
+    ItemId,
+    /// The id of an arrow: its index in [`View::arrows`].
+    ArrowId,
+}
+
 /// A box of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
@@ -249,10 +257,10 @@ impl ArrowKind {
 /// An arrow of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrow {
-    /// The item it begins at: an index into [`View::items`].
-    pub from: u32,
-    /// The item it ends at: an index into [`View::items`].
-    pub to: u32,
+    /// The item it begins at.
+    pub from: ItemId,
+    /// The item it ends at.
+    pub to: ItemId,
     /// The kind of connection it represents.
     pub kind: ArrowKind,
     /// The edges it represents, sorted.
@@ -348,9 +356,9 @@ pub struct SeenWindow {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct View {
     /// Every box ever shown.
-    pub items: Vec<Item>,
+    pub items: ById<ItemId, Item>,
     /// Every arrow ever shown.
-    pub arrows: Vec<Arrow>,
+    pub arrows: ById<ArrowId, Arrow>,
     /// Every namespace with a box around its members; parents before children.
     pub namespaces: Vec<Namespace>,
     /// The topics that are listed as rows in boxes.
@@ -360,9 +368,9 @@ pub struct View {
     /// The windows.
     pub frames: Vec<Frame>,
     /// The looks of each item, window by window.
-    pub items_shown: Vec<Looks>,
+    pub items_shown: ById<ItemId, Looks>,
     /// The looks of each arrow, window by window.
-    pub arrows_shown: Vec<Looks>,
+    pub arrows_shown: ById<ArrowId, Looks>,
     /// Whether two missions are compared, A and B, so that times, windows and the timeline are meaningless;
     /// the first of the two windows is A alone.
     pub compares: bool,
@@ -381,8 +389,8 @@ impl View {
     }
 
     /// The namespaces with a box around an item, the innermost first.
-    pub(crate) fn around(&self, item: u32) -> impl Iterator<Item = usize> + '_ {
-        let first = self.items.get(item as usize).and_then(|item| item.cluster);
+    pub(crate) fn around(&self, item: ItemId) -> impl Iterator<Item = usize> + '_ {
+        let first = self.items.get(item).and_then(|item| item.cluster);
         // Parents have smaller indices, so this terminates.
         std::iter::successors(first, |at| self.namespaces.get(*at)?.parent)
     }
@@ -390,7 +398,11 @@ impl View {
     /// For each namespace with a box, whether anything inside it is visible.
     pub(crate) fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let mut inhabited = vec![false; self.namespaces.len()];
-        for at in seen.items.iter().flat_map(|shown| self.around(shown.id)) {
+        for at in seen
+            .items
+            .iter()
+            .flat_map(|shown| self.around(shown.item()))
+        {
             inhabited[at] = true;
         }
         inhabited

@@ -87,11 +87,7 @@ fn a_crash_is_drawn_before_during_and_after() {
     let view = example("warehouse.bag", Some("10"));
     let of = |k: usize| {
         let frame = &view.frames[k];
-        let name = |s: &&Shown| {
-            view.items[s.id as usize]
-                .label
-                .ends_with("/object_detector")
-        };
+        let name = |s: &&Shown| view.items[s.item()].label.ends_with("/object_detector");
         let seen = view.seen(k);
         let mark = seen.items.iter().find(name).and_then(|s| s.mark);
         (mark, frame.words(usize::MAX), frame.note.clone())
@@ -148,13 +144,13 @@ fn a_node_that_restarts_keeps_its_arrows() {
     let mission = read(&reading, &mut Unwatched).unwrap();
     let view = view(&mission, &ViewOptions::default()).0;
     let item = |name: &str| {
-        let found = view.items.iter().position(|i| &*i.name == name).unwrap();
-        u32::try_from(found).unwrap()
+        let mut items = view.items.with_ids();
+        items.find(|(_, i)| &*i.name == name).unwrap().0
     };
     let (lidar, scan) = (item("/robot2/lidar_driver"), item("/robot2/scan"));
     for k in 20..30 {
         let drawn = view.seen(k).arrows.iter().any(|shown| {
-            let arrow = &view.arrows[shown.id as usize];
+            let arrow = &view.arrows[shown.arrow()];
             (arrow.from, arrow.to) == (lidar, scan)
         });
         assert!(drawn, "window {k}");

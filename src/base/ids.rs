@@ -78,6 +78,17 @@ impl<I: Id, T> ById<I, T> {
         I::of(self.list.len() - 1)
     }
 
+    /// Keeps only the values whose ids stay; the others get smaller ids.
+    pub(crate) fn retain(&mut self, stays: impl Fn(I) -> bool) {
+        let mut ids = self.ids();
+        self.list.retain(|_| ids.next().is_some_and(&stays));
+    }
+
+    /// Removes and returns the values from an index on.
+    pub(crate) fn split_off(&mut self, at: usize) -> Vec<T> {
+        self.list.split_off(at)
+    }
+
     /// Reserves space for exactly this many more values.
     pub(crate) fn reserve_exact(&mut self, many: usize) {
         self.list.reserve_exact(many);

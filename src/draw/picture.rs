@@ -41,8 +41,9 @@ pub use crate::draw::figure::course::Course;
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
+use crate::graph::Id as _;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{ArrowKind, Frame, SeenWindow, View};
+use crate::view::{ArrowId, ArrowKind, Frame, ItemId, SeenWindow, View};
 
 /// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -184,7 +185,7 @@ pub struct Picture<'a> {
     /// The distance of each namespace's title from the top left of its frame, so that no line crosses it.
     shifts: Vec<Point>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
-    order: Vec<usize>,
+    order: Vec<ArrowId>,
     title: Title<'a>,
     timeline: Timeline<'a>,
     /// The groups that are equal in every frame, behind the graph and the moving parts.
@@ -202,17 +203,17 @@ impl<'a> Picture<'a> {
         } = &measured;
         let fit = page.fit(layout.size);
         let (cards, tracks, shifts) = places(&measured, &layout, fit);
-        let mut order: Vec<usize> = (0..tracks.len()).collect();
-        let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
+        let mut order: Vec<ArrowId> = view.arrows.ids().collect();
+        let is_publish = |id: ArrowId| view.arrows[id].kind == ArrowKind::Publish;
         order.sort_by(|&a, &b| {
-            let length = tracks[b].length.total_cmp(&tracks[a].length);
+            let length = tracks[b.at()].length.total_cmp(&tracks[a.at()].length);
             is_publish(a)
                 .cmp(&is_publish(b))
                 .then(length)
                 .then(a.cmp(&b))
         });
         let gates = measured.graph.gates.iter().filter_map(|(gate, names)| {
-            let mut path = gate.path(view, &tracks[gate.lead], &layout, fit)?;
+            let mut path = gate.path(view, &tracks[gate.lead.at()], &layout, fit)?;
             path.topics.clone_from(names);
             Some((gate.clone(), path))
         });
@@ -373,7 +374,7 @@ impl<'a> Picture<'a> {
         let [lines, labels] = self.lines(seen);
         let items = seen.items.iter().filter_map(|shown| {
             let at = shown.id as usize;
-            Some((view.items.get(at)?, self.cards.get(at)?, shown))
+            Some((view.items.get(shown.item())?, self.cards.get(at)?, shown))
         });
         let glows = items
             .clone()
@@ -438,7 +439,7 @@ fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox
 
 fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowPath> {
     let view = measured.view;
-    let name = |id: u32| view.items.get(id as usize).map_or("", |item| &*item.name);
+    let name = |id: ItemId| view.items.get(id).map_or("", |item| &*item.name);
     let empty = layout::Route::default();
     let arrows = view
         .arrows

@@ -23,8 +23,9 @@ use crate::draw::style::Style;
 use crate::draw::text;
 use crate::draw::topic_timeline::Overview;
 use crate::export::sequence::Sequence;
-use crate::view::View;
+use crate::graph::Id as _;
 use crate::view::runs::{ElementRuns, Runs, at};
+use crate::view::{ArrowId, ItemId, View};
 
 const PAGE: &str = include_str!("html/player/page.html");
 const LOOK: &str = include_str!("html/player/page.css");
@@ -67,15 +68,15 @@ pub(crate) struct PageGraph<'a> {
     pub view: &'a View,
     pub union: Union,
     pub runs: Runs,
-    /// The indices of the arrows in the view, in painting order.
-    pub order: Vec<usize>,
+    /// The arrows in painting order.
+    pub order: Vec<ArrowId>,
 }
 
 impl<'a> PageGraph<'a> {
     /// The graph of a view whose union is `union`; nothing is drawn if that is empty.
     pub(crate) fn new(view: &'a View, union: Union) -> Self {
         let order = if union.order.is_empty() {
-            (0..view.arrows.len()).collect()
+            view.arrows.ids().collect()
         } else {
             union.order.clone()
         };
@@ -253,14 +254,14 @@ impl HtmlPage<'_> {
         graph.spaces(xml);
         xml.close();
         layer(xml, "arrows");
-        for &arrow in &drawn.order {
-            let life = &runs.arrows[arrow];
-            graph.arrow(xml, arrow, &Still { runs, life, window });
+        for &id in &drawn.order {
+            let life = &runs.arrows[id.at()];
+            graph.arrow(xml, id, &Still { runs, life, window });
         }
         xml.close();
         layer(xml, "items");
         for (item, life) in runs.items.iter().enumerate() {
-            graph.item(xml, item, &Still { runs, life, window });
+            graph.item(xml, ItemId::of(item), &Still { runs, life, window });
         }
         xml.close().close();
     }

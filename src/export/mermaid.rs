@@ -14,7 +14,7 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
     members(view, seen, &mut out, None, 1);
     let mut marked = String::new();
     for (at, shown) in seen.arrows.iter().enumerate() {
-        let Some(arrow) = view.arrows.get(shown.id as usize) else {
+        let Some(arrow) = view.arrows.get(shown.arrow()) else {
             continue;
         };
         let line = match (&arrow.kind, shown.mark) {
@@ -34,7 +34,7 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
         } else {
             format!("|\"{label}\"|")
         };
-        let _ = writeln!(out, "  i{} {line}{label} i{}", arrow.from, arrow.to);
+        let _ = writeln!(out, "  i{} {line}{label} i{}", arrow.from.0, arrow.to.0);
         if let Some(class) = shown.mark.map(Mark::class) {
             let _ = writeln!(marked, "  linkStyle {at} stroke:{}", colour(style, class));
         }
@@ -106,11 +106,7 @@ fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>
         }
     }
     for shown in &seen.items {
-        let Some(item) = view
-            .items
-            .get(shown.id as usize)
-            .filter(|i| i.cluster == home)
-        else {
+        let Some(item) = view.items.get(shown.item()).filter(|i| i.cluster == home) else {
             continue;
         };
         let (open, close) = match item.kind {

@@ -14,7 +14,7 @@ use crate::draw::style::Style;
 use crate::graph::Element;
 use crate::layout::{Engine, Layout, LayoutOptions, Plan, RING, engine, extend, lay_out};
 use crate::mission::Mission;
-use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
+use crate::view::{Collapsible, ItemId, Mode, View, ViewOptions, headlines, outline, view};
 use notices::{parts, reported, so_that};
 
 /// The style used to decide what is drawn.
@@ -249,8 +249,8 @@ impl Fitting<'_> {
             .edges()
             .filter(|(_, edge)| topics.contains(&edge.topic));
         reported.extend(edges.map(|(_, edge)| Element::Node(edge.node)));
-        let is_reported = |item: u32| {
-            view.items[item as usize]
+        let is_reported = |item: ItemId| {
+            view.items[item]
                 .members
                 .iter()
                 .any(|m| reported.contains(m))
@@ -259,10 +259,8 @@ impl Fitting<'_> {
             .arrows
             .iter()
             .filter(|a| is_reported(a.from) != is_reported(a.to));
-        let partners: BTreeSet<u32> = lines.flat_map(|arrow| [arrow.from, arrow.to]).collect();
-        let members = partners
-            .iter()
-            .flat_map(|item| &view.items[*item as usize].members);
+        let partners: BTreeSet<ItemId> = lines.flat_map(|arrow| [arrow.from, arrow.to]).collect();
+        let members = partners.iter().flat_map(|item| &view.items[*item].members);
         let members: Vec<Element> = members.copied().collect();
         reported.extend(members);
         reported

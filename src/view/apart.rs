@@ -84,12 +84,11 @@ impl Viewed {
         for (edges, publishes) in [(&elements.publishes, true), (&elements.subscribes, false)] {
             for (id, edge) in edges.with_ids() {
                 let Some((node, topic)) = self.ends(edge).filter(|(node, topic)| {
-                    let kind = self.items[*topic as usize].kind;
+                    let kind = self.items[*topic].kind;
                     kind == ItemKind::Topic && self.is_drawn(*node) && self.is_drawn(*topic)
                 }) else {
                     continue;
                 };
-                let place = u32::try_from(self.arrows.len()).unwrap_or(u32::MAX);
                 let (ends, element, places) = if publishes {
                     (
                         (node, topic, ArrowKind::Publish),
@@ -103,8 +102,8 @@ impl Viewed {
                         &mut self.subscribe,
                     )
                 };
-                places[id] = EdgePlace::Arrow(place);
-                self.arrows.push(arrow(elements, ends, vec![element]));
+                let arrow = self.arrows.push(arrow(elements, ends, vec![element]));
+                places[id] = EdgePlace::Arrow(arrow);
             }
         }
     }

@@ -316,7 +316,7 @@ impl<'a> CaptionWriter<'a> {
     /// The label of its box; its role if it has no box of its own.
     fn node_name(&self, id: NodeId) -> Option<&'a str> {
         let item = self.viewed.node.get(id).copied().flatten();
-        let item = item.and_then(|at| self.viewed.items.get(at as usize));
+        let item = item.and_then(|at| self.viewed.items.get(at));
         match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
             Some(item) => Some(&item.label),
             None => self.elements.nodes.get(id).map(|n| &*n.role),

@@ -7,14 +7,15 @@ use std::sync::Arc;
 
 use super::looks::{Looks, LooksWriter};
 use super::names::is_infrastructure;
-use super::{Arrow, ArrowKind, Item, Shown, TopicRow};
+use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
+use crate::graph::ById;
 
 /// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardRow {
-    /// The box that it is a row of: an index into [`View::items`](super::View::items).
-    pub owner: u32,
+    /// The box that it is a row of.
+    pub owner: ItemId,
     /// Whether that box publishes it, and whether it subscribes to it.
     pub ways: [bool; 2],
     /// Whether it is a hub, a topic that half the system is connected to, and a row in each of these boxes.
@@ -32,10 +33,10 @@ const FEWEST_HOMES: usize = 2;
 
 /// The boxes and arrows of a view, and the looks of each.
 pub(super) struct Drawn {
-    pub(super) items: Vec<Item>,
-    pub(super) arrows: Vec<Arrow>,
-    pub(super) items_shown: Vec<Looks>,
-    pub(super) arrows_shown: Vec<Looks>,
+    pub(super) items: ById<ItemId, Item>,
+    pub(super) arrows: ById<ArrowId, Arrow>,
+    pub(super) items_shown: ById<ItemId, Looks>,
+    pub(super) arrows_shown: ById<ArrowId, Looks>,
 }
 
 impl Drawn {
@@ -43,8 +44,8 @@ impl Drawn {
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
     pub(super) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
-        let mut lines: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (at, arrow) in self.arrows.iter().enumerate() {
+        let mut lines: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
+        for (at, arrow) in self.arrows.with_ids() {
             if let Some((topic, _)) = self.topic_of(arrow) {
                 lines.entry(topic).or_default().push(at);
             }
@@ -52,13 +53,13 @@ impl Drawn {
         let mut rows = Vec::new();
         let mut gone = BTreeSet::new();
         for (topic, lines) in lines {
-            let mut owners: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+            let mut owners: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
             for at in &lines {
                 let end = self.topic_of(&self.arrows[*at]).map(|(_, owner)| owner);
                 owners.entry(end.unwrap_or(topic)).or_default().push(*at);
             }
             let is_infrastructure = hides_infrastructure
-                && is_infrastructure(&self.items[topic as usize].name)
+                && is_infrastructure(&self.items[topic].name)
                 || self.is_hub(owners.keys());
             if (owners.len() == 1 || is_infrastructure)
                 && self.is_reported(topic, &lines, is_infrastructure)
@@ -70,8 +71,8 @@ impl Drawn {
                 gone.extend(lines);
             }
         }
-        keep(&mut self.arrows, |at| !gone.contains(&at));
-        keep(&mut self.arrows_shown, |at| !gone.contains(&at));
+        self.arrows.retain(|at| !gone.contains(&at));
+        self.arrows_shown.retain(|at| !gone.contains(&at));
         let never = self.hide_unnamed(&rows);
         self.drop_items(&mut rows, &never);
         rows.sort_by(|a, b| {
@@ -90,8 +91,8 @@ impl Drawn {
     }
 
     /// Whether a topic connected to these boxes is a hub: many, in several outermost namespaces.
-    fn is_hub<'a>(&self, owners: impl Iterator<Item = &'a u32>) -> bool {
-        let names = owners.map(|at| &*self.items[*at as usize].name);
+    fn is_hub<'a>(&self, owners: impl Iterator<Item = &'a ItemId>) -> bool {
+        let names = owners.map(|at| &*self.items[*at].name);
         let homes: Vec<&str> = names
             .map(|name| namespace(name).split('/').nth(1).unwrap_or_default())
             .collect();
@@ -100,12 +101,8 @@ impl Drawn {
     }
 
     /// The topic of an arrow with the box at its other end.
-    fn topic_of(&self, arrow: &Arrow) -> Option<(u32, u32)> {
-        let is_topic = |at: u32| {
-            self.items
-                .get(at as usize)
-                .is_some_and(|i| i.kind.word() == "topic")
-        };
+    fn topic_of(&self, arrow: &Arrow) -> Option<(ItemId, ItemId)> {
+        let is_topic = |at: ItemId| self.items.get(at).is_some_and(|i| i.kind.word() == "topic");
         match (is_topic(arrow.from), is_topic(arrow.to)) {
             (true, false) => Some((arrow.from, arrow.to)),
             (false, true) => Some((arrow.to, arrow.from)),
@@ -115,8 +112,8 @@ impl Drawn {
 
     /// Whether one of these arrows of a topic exists whenever the topic does; of a hub, whenever there is an
     /// event about it.
-    fn is_reported(&self, topic: u32, lines: &[usize], is_infrastructure: bool) -> bool {
-        let Some(looks) = self.items_shown.get(topic as usize) else {
+    fn is_reported(&self, topic: ItemId, lines: &[ArrowId], is_infrastructure: bool) -> bool {
+        let Some(looks) = self.items_shown.get(topic) else {
             return true;
         };
         let needs_line = |k: &u32| {
@@ -128,8 +125,8 @@ impl Drawn {
     }
 
     /// The windows in which the look of a topic or one of its arrows changes.
-    fn turns(&self, topic: u32, lines: &[usize]) -> BTreeSet<u32> {
-        let own = self.items_shown.get(topic as usize).into_iter();
+    fn turns(&self, topic: ItemId, lines: &[ArrowId]) -> BTreeSet<u32> {
+        let own = self.items_shown.get(topic).into_iter();
         let lines = lines.iter().filter_map(|at| self.arrows_shown.get(*at));
         own.chain(lines)
             .flat_map(Looks::runs)
@@ -138,7 +135,7 @@ impl Drawn {
     }
 
     /// The look of the first of these arrows that exists in a window; one with a mark takes precedence.
-    fn line(&self, lines: &[usize], window: u32) -> Option<&Shown> {
+    fn line(&self, lines: &[ArrowId], window: u32) -> Option<&Shown> {
         let lines = lines
             .iter()
             .filter_map(|at| self.arrows_shown.get(*at)?.at(window as usize));
@@ -151,13 +148,18 @@ impl Drawn {
     }
 
     /// The row of a topic in a box; that of a hub has the rate of this box alone.
-    fn row(&self, (topic, owner): (u32, u32), lines: &[usize], is_infrastructure: bool) -> CardRow {
-        let sends = |at: &usize| self.arrows[*at].to == topic;
-        let receives = |at: &usize| self.arrows[*at].from == topic;
+    fn row(
+        &self,
+        (topic, owner): (ItemId, ItemId),
+        lines: &[ArrowId],
+        is_infrastructure: bool,
+    ) -> CardRow {
+        let sends = |at: &ArrowId| self.arrows[*at].to == topic;
+        let receives = |at: &ArrowId| self.arrows[*at].from == topic;
         let mut writer = LooksWriter::default();
         for window in self.turns(topic, lines) {
             let line = self.line(lines, window);
-            let look = self.items_shown[topic as usize].at(window as usize);
+            let look = self.items_shown[topic].at(window as usize);
             let look = look.zip(line).map(|(look, line)| {
                 // A connection that appeared or vanished is also the change of the row.
                 let reported = if look.mark.is_some() { look } else { line };
@@ -176,18 +178,18 @@ impl Drawn {
             owner,
             ways: [lines.iter().any(sends), lines.iter().any(receives)],
             is_infrastructure,
-            item: self.items[topic as usize].clone(),
+            item: self.items[topic].clone(),
             shown: writer.finish(),
         }
     }
 
     /// Hides a box of unnamed publishers in windows without any of its topics, apart from hubs, as it would
     /// be empty. Returns the boxes that are never shown.
-    fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<u32> {
+    fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<ItemId> {
         let mut never = BTreeSet::new();
-        for (looks, at) in self.items_shown.iter_mut().zip(0_u32..) {
+        for (at, looks) in self.items.ids().zip(self.items_shown.iter_mut()) {
             let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
-            let is_unnamed = is_unnamed(&self.items[at as usize].name);
+            let is_unnamed = is_unnamed(&self.items[at].name);
             if !is_unnamed || self.arrows.iter().any(is_linked) {
                 continue;
             }
@@ -218,11 +220,11 @@ impl Drawn {
     /// head at each end that is used.
     pub(super) fn join_twins(&mut self) {
         let mut places = BTreeMap::new();
-        for (at, arrow) in self.arrows.iter().enumerate() {
+        for (at, arrow) in self.arrows.with_ids() {
             places.entry((arrow.from, arrow.to)).or_insert(at);
         }
         let mut gone = BTreeSet::new();
-        for there in 0..self.arrows.len() {
+        for there in self.arrows.ids() {
             let (from, to) = (self.arrows[there].from, self.arrows[there].to);
             let is_publish = self.arrows[there].kind == ArrowKind::Publish;
             let back = places.get(&(to, from)).copied();
@@ -231,7 +233,7 @@ impl Drawn {
             };
             gone.insert(back);
             let members = self.arrows[back].members.clone();
-            let topic = Arc::clone(&self.items[to as usize].name);
+            let topic = Arc::clone(&self.items[to].name);
             let arrow = &mut self.arrows[there];
             arrow.kind = ArrowKind::Bundle;
             arrow.topics = vec![topic];
@@ -242,41 +244,41 @@ impl Drawn {
                     both_ways([there, back].map(|at| &self.arrows_shown[at]));
             }
         }
-        keep(&mut self.arrows, |at| !gone.contains(&at));
-        keep(&mut self.arrows_shown, |at| !gone.contains(&at));
+        self.arrows.retain(|at| !gone.contains(&at));
+        self.arrows_shown.retain(|at| !gone.contains(&at));
         for (looks, id) in self.arrows_shown.iter_mut().zip(0..) {
             looks.renumber(id);
         }
     }
 
     /// Removes the topics of these rows and the boxes that are never shown, and renumbers everything.
-    pub(super) fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<u32>) {
+    pub(super) fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<ItemId>) {
         let gone: BTreeSet<_> = rows
             .iter()
             .map(|row| (row.item.kind, row.item.name.clone()))
             .collect();
-        let stays: Vec<bool> = (self.items.iter().zip(0_u32..))
-            .map(|(item, at)| {
+        let stays: ById<ItemId, bool> = (self.items.with_ids())
+            .map(|(at, item)| {
                 !never.contains(&at) && !gone.contains(&(item.kind, item.name.clone()))
             })
             .collect();
         let mut next = 0;
         let place = |stays: &bool| {
             next += u32::from(*stays);
-            next - u32::from(*stays)
+            ItemId(next - u32::from(*stays))
         };
-        let places: Vec<u32> = stays.iter().map(place).collect();
-        keep(&mut self.items, |at| stays[at]);
-        keep(&mut self.items_shown, |at| stays[at]);
-        for arrow in &mut self.arrows {
-            arrow.from = places[arrow.from as usize];
-            arrow.to = places[arrow.to as usize];
+        let places: ById<ItemId, ItemId> = stays.iter().map(place).collect();
+        self.items.retain(|at| stays[at]);
+        self.items_shown.retain(|at| stays[at]);
+        for arrow in self.arrows.iter_mut() {
+            arrow.from = places[arrow.from];
+            arrow.to = places[arrow.to];
         }
         rows.retain(|row| !never.contains(&row.owner));
         for row in rows {
-            row.owner = places[row.owner as usize];
+            row.owner = places[row.owner];
         }
-        for shown in [&mut self.items_shown, &mut self.arrows_shown] {
+        for shown in [&mut *self.items_shown, &mut *self.arrows_shown] {
             for (looks, id) in shown.iter_mut().zip(0..) {
                 looks.renumber(id);
             }
@@ -322,15 +324,6 @@ fn both_ways(ways: [&Looks; 2]) -> Looks {
     writer.finish()
 }
 
-/// Keeps the elements at these indices.
-fn keep<T>(all: &mut Vec<T>, stays: impl Fn(usize) -> bool) {
-    let mut at = 0;
-    all.retain(|_| {
-        at += 1;
-        stays(at - 1)
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -352,7 +345,7 @@ mod tests {
                 [true, false] => "→",
                 _ => "←",
             };
-            let owner = name(&view.items[row.owner as usize]);
+            let owner = name(&view.items[row.owner]);
             let marks = (0..windows.len()).map(|k| match row.shown.at(k).map(|s| s.mark) {
                 None => ' ',
                 Some(None) => '.',
@@ -424,7 +417,11 @@ mod tests {
             ..ViewOptions::default()
         };
         let (view, _) = view(&mission(&["/a>/t /b</t", "/a>/t /b</t /a</t"]), &options);
-        let heads = |at: usize, k: usize| view.arrows_shown[at].at(k).map(|s| s.topics[0].ways);
+        let heads = |at: u32, k: usize| {
+            view.arrows_shown[ArrowId(at)]
+                .at(k)
+                .map(|s| s.topics[0].ways)
+        };
         assert_eq!(view.arrows.len(), 2);
         assert_eq!(
             [heads(0, 0), heads(0, 1)],

@@ -303,7 +303,7 @@ mod tests {
             frame.fitting(|_| true),
             frame.crowds.iter().map(crowd).collect(),
             coloured
-                .map(|shown| view.items[shown.id as usize].name.to_string())
+                .map(|shown| view.items[shown.item()].name.to_string())
                 .collect(),
         )
     }
@@ -376,7 +376,7 @@ mod tests {
             let item = seen
                 .items
                 .iter()
-                .find(|s| &*view.items[s.id as usize].name == name);
+                .find(|s| &*view.items[s.item()].name == name);
             item.map(|shown| (shown.mark, shown.events.len()))
         };
         assert_eq!(view.frames[1].crowds.len(), 1);

@@ -10,9 +10,9 @@ use super::marks::WindowMarks;
 use super::stable::{Lengths, stable};
 use super::state::{LivingItems, Now};
 use super::turn::{WindowTurn, marked, with_ends};
-use super::{Counts, Frame, MemberState, Shown, ViewOptions};
+use super::{ArrowId, Counts, Frame, ItemId, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
-use crate::graph::Element;
+use crate::graph::{ById, Element, Id};
 use crate::mission::event_log::Parts;
 use crate::mission::{Mission, Window};
 
@@ -20,8 +20,8 @@ use crate::mission::{Mission, Window};
 #[derive(Default)]
 pub(crate) struct Frames {
     pub(crate) list: Vec<Frame>,
-    pub(crate) items: Vec<Looks>,
-    pub(crate) arrows: Vec<Looks>,
+    pub(crate) items: ById<ItemId, Looks>,
+    pub(crate) arrows: ById<ArrowId, Looks>,
 }
 
 /// The windows one after the other. In windows without headlines, only elements whose numbers changed are
@@ -114,51 +114,51 @@ struct ShownWindows<'a> {
     now: Now<'a>,
     turn: WindowTurn,
     member_lists: Vec<Vec<MemberState>>,
-    items: Cast,
-    arrows: Cast,
+    items: Cast<ItemId>,
+    arrows: Cast<ArrowId>,
 }
 
 /// The items, or the arrows: the looks of each so far.
 #[derive(Default)]
-struct Cast {
-    shown: Vec<LooksWriter>,
+struct Cast<I> {
+    shown: ById<I, LooksWriter>,
     /// The ids of those with other numbers than in the previous window.
-    touched: Vec<u32>,
-    is_touched: Vec<bool>,
+    touched: Vec<I>,
+    is_touched: ById<I, bool>,
 }
 
-impl Cast {
-    fn new(count: usize) -> Self {
+impl<I: Id> Cast<I> {
+    fn new<T>(all: &ById<I, T>) -> Self {
         Self {
-            shown: (0..count).map(|_| LooksWriter::default()).collect(),
+            shown: all.iter().map(|_| LooksWriter::default()).collect(),
             touched: Vec::new(),
-            is_touched: vec![false; count],
+            is_touched: ById::like(all, false),
         }
     }
 
-    fn touch(&mut self, id: u32) {
-        if let Some(is_touched) = self.is_touched.get_mut(id as usize)
+    fn touch(&mut self, id: I) {
+        if let Some(is_touched) = self.is_touched.get_mut(id)
             && !std::mem::replace(is_touched, true)
         {
             self.touched.push(id);
         }
     }
 
-    fn take_touched(&mut self) -> Vec<u32> {
+    fn take_touched(&mut self) -> Vec<I> {
         let all = std::mem::take(&mut self.touched);
         for id in &all {
-            self.is_touched[*id as usize] = false;
+            self.is_touched[*id] = false;
         }
         all
     }
 
-    fn show(&mut self, window: u32, id: u32, shown: Option<Shown>) {
-        if let Some(writer) = self.shown.get_mut(id as usize) {
+    fn show(&mut self, window: u32, id: I, shown: Option<Shown>) {
+        if let Some(writer) = self.shown.get_mut(id) {
             writer.show(window, shown);
         }
     }
 
-    fn finish(self, lengths: &Lengths) -> Vec<Looks> {
+    fn finish(self, lengths: &Lengths) -> ById<I, Looks> {
         let all = self.shown.into_iter();
         all.map(|raw| stable(&raw.finish(), lengths)).collect()
     }
@@ -176,8 +176,8 @@ impl<'a> ShownWindows<'a> {
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
             member_lists: Vec::new(),
-            items: Cast::new(viewed.items.len()),
-            arrows: Cast::new(viewed.arrows.len()),
+            items: Cast::new(&viewed.items),
+            arrows: Cast::new(&viewed.arrows),
         }
     }
 
@@ -218,10 +218,10 @@ impl<'a> ShownWindows<'a> {
         self.arrows.take_touched();
         let items = self.turn.items(self.viewed, &self.now);
         let arrows = self.turn.arrows(self.viewed, &self.now, &items);
-        for (id, shown) in (0..).zip(arrows) {
+        for (id, shown) in self.viewed.arrows.ids().zip(arrows) {
             self.arrows.show(at, id, shown);
         }
-        for (id, shown) in (0..).zip(items) {
+        for (id, shown) in self.viewed.items.ids().zip(items) {
             self.items.show(at, id, shown.marked);
         }
     }
@@ -235,17 +235,17 @@ impl<'a> ShownWindows<'a> {
             };
         }
         for id in self.items.take_touched() {
-            let is_there = self.turn.after.items[id as usize];
+            let is_there = self.turn.after.items[id];
             let shown = is_there.then(|| self.now.item(id)).flatten();
             let reported = self.turn.changed.items.get(&id);
             let shown = shown.and_then(|shown| marked(shown, (true, true), reported));
             self.items.show(at, id, shown);
         }
         for id in self.arrows.take_touched() {
-            let arrow = &self.viewed.arrows[id as usize];
-            let is_item = |id: u32| self.turn.after.items[id as usize];
+            let arrow = &self.viewed.arrows[id];
+            let is_item = |id: ItemId| self.turn.after.items[id];
             let ends = is_item(arrow.from) && is_item(arrow.to);
-            let is_there = ends && self.turn.after.arrows[id as usize];
+            let is_there = ends && self.turn.after.arrows[id];
             let shown = is_there.then(|| self.now.arrow(id)).flatten();
             let shown = shown.and_then(|shown| {
                 let changed = &self.turn.changed;
@@ -300,10 +300,12 @@ mod tests {
     }
 
     fn text(view: &View, items: &[Shown], arrows: &[Shown]) -> String {
-        let name = |id: u32| view.items[id as usize].name.to_string();
-        let items = items.iter().map(|s| format!("{}{}", sign(s), name(s.id)));
+        let name = |id: ItemId| view.items[id].name.to_string();
+        let items = items
+            .iter()
+            .map(|s| format!("{}{}", sign(s), name(s.item())));
         let arrows = arrows.iter().map(|s| {
-            let arrow = &view.arrows[s.id as usize];
+            let arrow = &view.arrows[s.arrow()];
             format!("{}{}>{}", sign(s), name(arrow.from), name(arrow.to))
         });
         items.chain(arrows).collect::<Vec<_>>().join(" ")

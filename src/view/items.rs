@@ -11,8 +11,8 @@ use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
-use super::{Arrow, ArrowKind, Item, ItemKind, LineWidth, Mode, ViewOptions};
-use crate::graph::{ById, Edge, EdgeId, Element, Elements, NodeId, TopicId};
+use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, LineWidth, Mode, ViewOptions};
+use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, TopicId};
 use crate::mission::Mission;
 
 /// The part of the picture that shows an edge of the graph.
@@ -21,11 +21,11 @@ pub(crate) enum EdgePlace {
     /// It is not drawn.
     Hidden,
     /// It is this item, or part of it.
-    Item(u32),
+    Item(ItemId),
     /// It is part of this arrow.
-    Arrow(u32),
+    Arrow(ArrowId),
     /// It is inside this item.
-    Inside(u32),
+    Inside(ItemId),
 }
 
 /// Every box and arrow, and the mapping from the graph's elements to them.
@@ -34,19 +34,19 @@ pub(crate) struct Viewed {
     pub(crate) selection: Selection,
     /// Equal namespaces that are drawn as one.
     pub(crate) fleets: Fleets,
-    pub(crate) items: Vec<Item>,
-    pub(crate) arrows: Vec<Arrow>,
+    pub(crate) items: ById<ItemId, Item>,
+    pub(crate) arrows: ById<ArrowId, Arrow>,
     /// Per node of the mission, its item.
-    pub(crate) node: ById<NodeId, Option<u32>>,
+    pub(crate) node: ById<NodeId, Option<ItemId>>,
     /// Per topic of the mission, its item.
-    pub(crate) topic: ById<TopicId, Option<u32>>,
+    pub(crate) topic: ById<TopicId, Option<ItemId>>,
     /// The part that shows each publication. In mode *nodes* a publication may be part of several arrows,
     /// which only `pairs` lists.
     pub(crate) publish: ById<EdgeId, EdgePlace>,
     /// The part that shows each subscription.
     pub(crate) subscribe: ById<EdgeId, EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
-    pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
+    pub(crate) pairs: ById<ArrowId, Vec<(EdgeId, EdgeId)>>,
     /// Per topic of the mission, its name in a bundle: that of its group, if it is in one.
     pub(crate) bundled: ById<TopicId, Arc<str>>,
     /// Node and topic of each publication.
@@ -54,7 +54,7 @@ pub(crate) struct Viewed {
     /// Node and topic of each subscription.
     pub(crate) subscribed: ById<EdgeId, (NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
-    pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
+    pub(crate) carriers: BTreeMap<Element, Vec<ArrowId>>,
     /// Per topic, whether bundles draw it.
     pub(super) drawn: ById<TopicId, bool>,
     /// The number of items at the end of the list that are listed as words, because no line leads to them.
@@ -78,7 +78,7 @@ fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
     Fleets::new(elements, options)
 }
 
-pub(super) type ArrowEnds = (u32, u32, ArrowKind);
+pub(super) type ArrowEnds = (ItemId, ItemId, ArrowKind);
 
 impl Viewed {
     pub(crate) fn new(mission: &Mission, options: &ViewOptions) -> Self {
@@ -128,7 +128,7 @@ impl Viewed {
         }
         if options.line_width == LineWidth::Bytes {
             let sizes = sizes(mission);
-            for arrow in &mut viewed.arrows {
+            for arrow in viewed.arrows.iter_mut() {
                 let topics = arrow
                     .members
                     .iter()
@@ -217,8 +217,8 @@ impl Viewed {
             .partition(|(key, members)| !is_in_words(key, members));
         self.in_words = in_words.len();
         members.extend(in_words);
-        let places: BTreeMap<&ItemKey, u32> =
-            members.iter().map(|(key, _)| *key).zip(0..).collect();
+        let keys = members.iter().map(|(key, _)| *key);
+        let places: BTreeMap<&ItemKey, ItemId> = keys.zip((0..).map(ItemId)).collect();
         let place = |key: &Option<ItemKey>| key.as_ref().and_then(|key| places.get(key).copied());
         self.node = nodes.iter().map(place).collect();
         self.topic = topics.iter().map(place).collect();
@@ -269,7 +269,8 @@ impl Viewed {
                 arrows.entry(ends.clone()).or_default().push(element);
             }
         }
-        let places: BTreeMap<&ArrowEnds, u32> = arrows.keys().zip(0..).collect();
+        let ids = (0..).map(ArrowId);
+        let places: BTreeMap<&ArrowEnds, ArrowId> = arrows.keys().zip(ids).collect();
         let place = |ends: &Option<ArrowEnds>| match ends {
             None => EdgePlace::Hidden,
             Some((from, to, _)) if from == to => EdgePlace::Inside(*from),
@@ -284,11 +285,11 @@ impl Viewed {
     }
 
     /// The items of an edge's node and topic.
-    pub(super) fn ends(&self, edge: &Edge) -> Option<(u32, u32)> {
+    pub(super) fn ends(&self, edge: &Edge) -> Option<(ItemId, ItemId)> {
         Some((self.item_of_node(edge.node)?, self.topic[edge.topic]?))
     }
 
-    fn item_of_node(&self, node: NodeId) -> Option<u32> {
+    fn item_of_node(&self, node: NodeId) -> Option<ItemId> {
         self.node.get(node).copied().flatten()
     }
 
@@ -367,7 +368,7 @@ impl Viewed {
 
     /// Gives a bundle the direction of most of its topics.
     fn turn(&self, ends: &mut ArrowEnds, pairs: &[(EdgeId, EdgeId)]) {
-        let topics = |from: u32| {
+        let topics = |from: ItemId| {
             let of = pairs
                 .iter()
                 .filter(|(p, _)| self.item_of_sender(*p) == Some(from));
@@ -380,12 +381,12 @@ impl Viewed {
     }
 
     /// Whether an item has a box.
-    pub(super) fn is_drawn(&self, item: u32) -> bool {
-        (item as usize) < self.items.len() - self.in_words
+    pub(super) fn is_drawn(&self, item: ItemId) -> bool {
+        item.at() < self.items.len() - self.in_words
     }
 
     /// The item of the node that publishes.
-    fn item_of_sender(&self, publish: EdgeId) -> Option<u32> {
+    fn item_of_sender(&self, publish: EdgeId) -> Option<ItemId> {
         self.item_of_node(self.published.get(publish)?.0)
     }
 
@@ -419,7 +420,7 @@ impl Viewed {
 
     /// Records the arrows that each topic's publications are part of.
     fn set_carriers(&mut self, elements: &Elements) {
-        for (arrow, id) in self.arrows.iter().zip(0..) {
+        for (id, arrow) in self.arrows.with_ids() {
             for member in &arrow.members {
                 self.carriers.entry(*member).or_default().push(id);
                 let edge = match member {
@@ -448,8 +449,8 @@ impl Viewed {
         self.carriers.get(&topic).is_some_and(|all| all.len() == 1)
     }
 
-    fn is_namespace(&self, item: u32) -> bool {
-        let item = self.items.get(item as usize);
+    fn is_namespace(&self, item: ItemId) -> bool {
+        let item = self.items.get(item);
         item.is_some_and(|item| item.kind == ItemKind::Namespace)
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::items::{EdgePlace, Viewed};
 use super::lasting::Part;
-use super::{Headline, ItemKind, Lasting, Mark};
+use super::{ArrowId, Headline, ItemId, ItemKind, Lasting, Mark};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Id};
 use crate::mission::EventLog;
@@ -29,8 +29,8 @@ pub(crate) struct Changed {
 pub(crate) struct WindowMarks {
     pub(crate) headlines: Vec<Headline>,
     pub(crate) lasting: Vec<Lasting>,
-    pub(crate) items: BTreeMap<u32, Changed>,
-    pub(crate) arrows: BTreeMap<u32, Changed>,
+    pub(crate) items: BTreeMap<ItemId, Changed>,
+    pub(crate) arrows: BTreeMap<ArrowId, Changed>,
 }
 
 impl WindowMarks {
@@ -104,7 +104,7 @@ impl WindowMarks {
     }
 
     fn add(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
-        let item = |item: Option<&Option<u32>>| item.copied().flatten().map(EdgePlace::Item);
+        let item = |item: Option<&Option<ItemId>>| item.copied().flatten().map(EdgePlace::Item);
         let place = match what {
             Element::Node(id) => item(viewed.node.get(id)),
             Element::Topic(id) => item(viewed.topic.get(id)),
@@ -144,8 +144,8 @@ enum Reach {
 }
 
 impl Reach {
-    fn of_item(viewed: &Viewed, id: u32) -> Self {
-        match viewed.items.get(id as usize) {
+    fn of_item(viewed: &Viewed, id: ItemId) -> Self {
+        match viewed.items.get(id) {
             Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
             Some(item) if item.is_replica => Self::Part,
             // Runs of one node, of which one exists at a time.
@@ -155,19 +155,16 @@ impl Reach {
         }
     }
 
-    fn of_arrow(viewed: &Viewed, id: u32) -> Self {
-        let members = viewed
-            .arrows
-            .get(id as usize)
-            .map_or(0, |a| a.members.len());
-        let is_role = |id: u32| {
-            let item = viewed.items.get(id as usize);
+    fn of_arrow(viewed: &Viewed, id: ArrowId) -> Self {
+        let members = viewed.arrows.get(id).map_or(0, |a| a.members.len());
+        let is_role = |id: ItemId| {
+            let item = viewed.items.get(id);
             item.is_some_and(|i| i.kind == ItemKind::Node && i.members.len() > 1 && !i.is_replica)
         };
-        let ends = viewed.arrows.get(id as usize).map(|a| [a.from, a.to]);
+        let ends = viewed.arrows.get(id).map(|a| [a.from, a.to]);
         let topics = ends.is_some_and(|ends| ends.into_iter().any(is_role));
         let members = if topics { 1 } else { members };
-        let joined = viewed.pairs.get(id as usize).map_or(members, Vec::len);
+        let joined = viewed.pairs.get(id).map_or(members, Vec::len);
         if joined > 1 { Self::Part } else { Self::Whole }
     }
 }
@@ -217,7 +214,7 @@ impl EventSign {
 
     /// Records the event for an item or arrow; of several marks on the same one, the most informative one
     /// stays.
-    fn keep(&self, all: &mut BTreeMap<u32, Changed>, id: u32, reach: Reach) {
+    fn keep<I: Ord>(&self, all: &mut BTreeMap<I, Changed>, id: I, reach: Reach) {
         let reported = all.entry(id).or_default();
         reported.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
         reported.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);

@@ -443,11 +443,8 @@ mod tests {
         assert_eq!(member_lists[0], [Here, Here, Here, Away]);
         assert_eq!(member_lists[1], [Here, Here, Here, Joined]);
         assert_eq!(member_lists[2], [Left, Here, Here, Here]);
-        let odom = seen
-            .items
-            .iter()
-            .position(|i| &*i.name == "/rN/odom")
-            .unwrap();
+        let mut items = seen.items.with_ids();
+        let (odom, _) = items.find(|(_, i)| &*i.name == "/rN/odom").unwrap();
         let shown = seen.items_shown[odom].at(1).unwrap();
         assert_eq!((shown.each, shown.hz), (4, Some(8.0)));
         assert_eq!(shown.mark, Some(Mark::Inside));

@@ -76,7 +76,7 @@ impl Runs {
             runs.collect::<Vec<_>>()
         };
         let mut items = runs(&view.items_shown, None);
-        let mut arrows = runs(&view.arrows_shown, Some(&view.arrows[..]));
+        let mut arrows = runs(&view.arrows_shown, Some(&view.arrows));
         // The most frequent value gets the shortest number.
         let both = || items.iter().chain(&arrows);
         let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes));
@@ -328,7 +328,8 @@ impl Serialize for ElementRuns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::ArrowKind;
+    use crate::graph::ById;
+    use crate::view::{ArrowKind, ItemId};
 
     /// One element over the windows: present with this mark and rate, or absent.
     type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
@@ -344,16 +345,16 @@ mod tests {
         };
         let story: Vec<_> = story.iter().map(shown).collect();
         let view = View {
-            arrows: vec![Arrow {
-                from: 0,
-                to: 0,
+            arrows: ById::from(vec![Arrow {
+                from: ItemId(0),
+                to: ItemId(0),
                 kind: ArrowKind::Publish,
                 members: Vec::new(),
                 topics: Vec::new(),
                 is_service: false,
                 kilobytes: None,
-            }],
-            arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))],
+            }]),
+            arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))].into(),
             ..View::default()
         };
         Runs::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
@@ -411,7 +412,7 @@ mod tests {
         };
         let story = [shown(Some(7.1)), shown(None), shown(Some(7.1))];
         let view = View {
-            items_shown: vec![Looks::of(story.iter().map(Some))],
+            items_shown: vec![Looks::of(story.iter().map(Some))].into(),
             ..View::default()
         };
         let label = |shown: &Shown, _: Option<&Arrow>| {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Counts, TopicRow};
+use super::{ArrowId, Counts, ItemId, TopicRow};
 use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::mission::event_log::EventId;
@@ -125,6 +125,18 @@ pub struct Members {
     pub nodes: usize,
     /// The number of topics.
     pub topics: usize,
+}
+
+impl Shown {
+    /// The item that looks like this.
+    pub fn item(&self) -> ItemId {
+        ItemId(self.id)
+    }
+
+    /// The arrow that looks like this.
+    pub fn arrow(&self) -> ArrowId {
+        ArrowId(self.id)
+    }
 }
 
 impl Members {

@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
-use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions, sum};
+use super::{
+    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions,
+    sum,
+};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::{ById, EdgeId, Element, NodeId, PerElement, Row, State, TopicId};
@@ -64,36 +67,35 @@ impl One {
 /// The items and arrows with an existing element at a point in time.
 #[derive(Default)]
 pub(crate) struct LivingItems {
-    pub(crate) items: Vec<bool>,
-    pub(crate) arrows: Vec<bool>,
+    pub(crate) items: ById<ItemId, bool>,
+    pub(crate) arrows: ById<ArrowId, bool>,
     /// Per arrow, the topics of a bundle that exist.
-    pub(crate) topics: Vec<Vec<bool>>,
+    pub(crate) topics: ById<ArrowId, Vec<bool>>,
 }
 
 impl LivingItems {
     pub(crate) fn of(viewed: &Viewed, alive: &Alive) -> Self {
-        let is = |list: &[bool], id: u32| list.get(id as usize) == Some(&true);
         let lives = |element: &Element| alive.is(*element);
         let items = viewed
             .items
             .iter()
             .map(|item| item.members.iter().any(lives));
-        let items: Vec<bool> = items.collect();
+        let items: ById<ItemId, bool> = items.collect();
         let pair = |(p, s): &(EdgeId, EdgeId)| {
             alive.is(Element::Publish(*p)) && alive.is(Element::Subscribe(*s))
         };
-        let arrow = |(at, arrow): (usize, &super::Arrow)| {
+        let arrow = |(id, arrow): (ArrowId, &super::Arrow)| {
             let members = || arrow.members.iter().any(lives);
             let itself = viewed
                 .pairs
-                .get(at)
+                .get(id)
                 .map_or_else(members, |pairs| pairs.iter().any(pair));
-            itself && is(&items, arrow.from) && is(&items, arrow.to)
+            itself && items[arrow.from] && items[arrow.to]
         };
-        let arrows = viewed.arrows.iter().enumerate().map(arrow).collect();
-        let topics = |(at, arrow): (usize, &super::Arrow)| {
+        let arrows = viewed.arrows.with_ids().map(arrow).collect();
+        let topics = |(id, arrow): (ArrowId, &super::Arrow)| {
             let mut lives = vec![false; arrow.topics.len()];
-            let pairs = viewed.pairs.get(at).filter(|_| !lives.is_empty());
+            let pairs = viewed.pairs.get(id).filter(|_| !lives.is_empty());
             for both in pairs.into_iter().flatten().filter(|both| pair(both)) {
                 if let Some((topic, _)) = viewed.row(arrow, *both) {
                     lives[topic as usize] = true;
@@ -101,7 +103,7 @@ impl LivingItems {
             }
             lives
         };
-        let topics = viewed.arrows.iter().enumerate().map(topics).collect();
+        let topics = viewed.arrows.with_ids().map(topics).collect();
         Self {
             items,
             arrows,
@@ -248,8 +250,8 @@ impl<'a> Now<'a> {
     }
 
     /// The look of an item; `None` if no part of it exists. Ghosts are excluded.
-    pub(crate) fn item(&self, id: u32) -> Option<Shown> {
-        let item = self.viewed.items.get(id as usize)?;
+    pub(crate) fn item(&self, id: ItemId) -> Option<Shown> {
+        let item = self.viewed.items.get(id)?;
         let mut slot = None;
         for member in &item.members {
             let one = match member {
@@ -267,7 +269,7 @@ impl<'a> Now<'a> {
                 Element::Publish(_) | Element::Subscribe(_) => None,
             };
             if let Some(one) = one {
-                gather(&mut slot, id, &one);
+                gather(&mut slot, id.0, &one);
             }
         }
         let mut shown = slot?;
@@ -301,8 +303,8 @@ impl<'a> Now<'a> {
     }
 
     /// The look of an arrow, whether or not its ends are present.
-    pub(crate) fn arrow(&self, id: u32) -> Option<Shown> {
-        let arrow = self.viewed.arrows.get(id as usize)?;
+    pub(crate) fn arrow(&self, id: ArrowId) -> Option<Shown> {
+        let arrow = self.viewed.arrows.get(id)?;
         let slot = match arrow.kind {
             ArrowKind::Direct(_) | ArrowKind::Bundle => self.direct(id, arrow),
             ArrowKind::Publish | ArrowKind::Subscribe => self.edges(id, arrow),
@@ -315,7 +317,7 @@ impl<'a> Now<'a> {
         })
     }
 
-    fn edges(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
+    fn edges(&self, id: ArrowId, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         let shows = |one: &One| shows_topic(one.state, self.options);
         for member in &arrow.members {
@@ -330,7 +332,7 @@ impl<'a> Now<'a> {
                 Element::Node(_) | Element::Topic(_) => None,
             };
             if let Some(one) = one {
-                gather(&mut slot, id, &one);
+                gather(&mut slot, id.0, &one);
             }
         }
         slot
@@ -338,12 +340,12 @@ impl<'a> Now<'a> {
 
     /// An arrow from node to node: present in a window with both the publication and the subscription, with
     /// the rate of the publication, or of the topic if that is unknown.
-    fn direct(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
+    fn direct(&self, id: ArrowId, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         let is_bundle = arrow.kind == ArrowKind::Bundle;
         let (mut last, mut carried, mut services) = (None, BTreeSet::new(), BTreeSet::new());
         let mut rows: BTreeMap<u32, (Option<Shown>, [bool; 2])> = BTreeMap::new();
-        for (publish, subscribe) in self.viewed.pairs.get(id as usize)? {
+        for (publish, subscribe) in self.viewed.pairs.get(id)? {
             let (Some(p), Some(s)) = (
                 self.one(Element::Publish(*publish)),
                 self.one(Element::Subscribe(*subscribe)),
@@ -374,7 +376,7 @@ impl<'a> Now<'a> {
                 is_paused: p.is_paused,
                 is_starved: s.is_starved,
             };
-            gather(&mut slot, id, &joined);
+            gather(&mut slot, id.0, &joined);
             if let Some((topic, _)) = row {
                 if self
                     .mission
@@ -419,7 +421,7 @@ impl<'a> Now<'a> {
     }
 
     /// The item that shows an element, and the arrows.
-    pub(crate) fn shown_by(&self, what: Element) -> (Option<u32>, &[u32]) {
+    pub(crate) fn shown_by(&self, what: Element) -> (Option<ItemId>, &[ArrowId]) {
         let carriers = || {
             self.viewed
                 .carriers
@@ -463,7 +465,7 @@ fn has_nodes(item: &Item) -> bool {
     matches!(item.members.first(), Some(Element::Node(_)))
 }
 
-fn is_single(viewed: &Viewed, item: u32) -> bool {
-    let item = viewed.items.get(item as usize);
+fn is_single(viewed: &Viewed, item: ItemId) -> bool {
+    let item = viewed.items.get(item);
     item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
 }

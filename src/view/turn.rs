@@ -3,7 +3,8 @@
 use super::items::Viewed;
 use super::marks::{Changed, WindowMarks};
 use super::state::{LivingItems, Now};
-use super::{ArrowKind, Counts, ItemKind, Mark, Shown, TopicRow};
+use super::{ArrowId, ArrowKind, Counts, ItemId, ItemKind, Mark, Shown, TopicRow};
+use crate::graph::ById;
 use crate::mission::event_log::{Detail, Event, EventId, Kind};
 
 /// The items and arrows that exist before and after a window, and the changes in between.
@@ -22,12 +23,10 @@ pub(super) struct Marked {
 }
 
 impl WindowTurn {
-    pub(super) fn items(&self, viewed: &Viewed, now: &Now<'_>) -> Vec<Marked> {
-        let ids = (0..).zip(&viewed.items);
-        let item = |(id, item): (u32, &super::Item)| {
+    pub(super) fn items(&self, viewed: &Viewed, now: &Now<'_>) -> ById<ItemId, Marked> {
+        let item = |(id, item): (ItemId, &super::Item)| {
             let shown = now.item(id);
-            let at = id as usize;
-            let there = (self.before.items[at], self.after.items[at]);
+            let there = (self.before.items[id], self.after.items[id]);
             Marked {
                 is_there: shown.is_some(),
                 marked: shown.and_then(|shown| {
@@ -38,7 +37,7 @@ impl WindowTurn {
                 }),
             }
         };
-        ids.map(item).collect()
+        viewed.items.with_ids().map(item).collect()
     }
 
     /// An arrow appears and vanishes with its ends, unless it has events of its own.
@@ -46,18 +45,17 @@ impl WindowTurn {
         &self,
         viewed: &Viewed,
         now: &Now<'_>,
-        items: &[Marked],
+        items: &ById<ItemId, Marked>,
     ) -> Vec<Option<Shown>> {
-        let arrow = |(id, arrow): (u32, &super::Arrow)| {
-            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end as usize));
+        let arrow = |(id, arrow): (ArrowId, &super::Arrow)| {
+            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end));
             let (from, to) = (from?, to?);
             let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
             let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
-            let at = id as usize;
             // A node that restarts keeps its arrows, even if it is away when the window ends.
             let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
             let is_kept = ends.iter().any(is_back);
-            let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
+            let there = (self.before.arrows[id], self.after.arrows[id] || is_kept);
             let reported = self.changed.arrows.get(&id).cloned();
             let ends = ends.map(|end| Some((end.mark, &end.events[..])));
             let reported = reported.or_else(|| with_ends(there, ends));
@@ -71,7 +69,7 @@ impl WindowTurn {
                 ..self.with_topics(viewed, now, arrow, shown)
             })
         };
-        (0..).zip(&viewed.arrows).map(arrow).collect()
+        viewed.arrows.with_ids().map(arrow).collect()
     }
 
     /// A changed bundle with the changes of its topics, unless it appeared or vanished as a whole.
@@ -86,7 +84,7 @@ impl WindowTurn {
             return shown;
         }
         let lives = |items: &LivingItems, row: &TopicRow| {
-            let all = items.topics.get(shown.id as usize);
+            let all = items.topics.get(ArrowId(shown.id));
             all.and_then(|all| all.get(row.topic as usize)) == Some(&true)
         };
         for row in &mut shown.topics {

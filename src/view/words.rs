@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::bundles::{also_here, drawn_in_pages};
 use super::cards::Drawn;
-use super::{Item, ItemKind, View, ViewOptions, cluster};
-use crate::graph::Element;
+use super::{ArrowId, Item, ItemId, ItemKind, View, ViewOptions, cluster};
+use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 /// The drawn part of a view. Its windows are left out.
@@ -14,8 +14,8 @@ pub(crate) struct DrawnPart {
     /// The boxes and arrows that are drawn, and the other items as words.
     pub(crate) view: View,
     /// Whether each item, and each arrow, of the view is drawn.
-    pub(crate) items: Vec<bool>,
-    pub(crate) arrows: Vec<bool>,
+    pub(crate) items: ById<ItemId, bool>,
+    pub(crate) arrows: ById<ArrowId, bool>,
 }
 
 /// The part of a mission's view that is drawn; `None` for all of it, which includes views most of whose nodes would be
@@ -31,21 +31,21 @@ pub(crate) fn drawn_part(
         _ => false,
     };
     let is_hidden = |item: &Item| item.members.iter().all(is_hidden);
-    let hidden: Vec<bool> = view.items.iter().map(is_hidden).collect();
+    let hidden: ById<ItemId, bool> = view.items.iter().map(is_hidden).collect();
     let arrows = view.arrows.iter();
-    let ends = arrows.map(|arrow| [arrow.from as usize, arrow.to as usize]);
-    let arrows: Vec<bool> = ends
+    let ends = arrows.map(|arrow| [arrow.from, arrow.to]);
+    let arrows: ById<ArrowId, bool> = ends
         .clone()
         .map(|ends| !ends.iter().any(|at| hidden[*at]))
         .collect();
     let lined = ends.zip(&arrows).filter(|(_, drawn)| **drawn);
-    let lined: BTreeSet<usize> = lined.flat_map(|(ends, _)| ends).collect();
-    let is_node = |at: usize| view.items[at].kind == ItemKind::Node;
-    let items: Vec<bool> = (0..hidden.len())
+    let lined: BTreeSet<ItemId> = lined.flat_map(|(ends, _)| ends).collect();
+    let is_node = |at: ItemId| view.items[at].kind == ItemKind::Node;
+    let items: ById<ItemId, bool> = (hidden.ids())
         .map(|at| !hidden[at] && (!is_node(at) || lined.contains(&at)))
         .collect();
     let nodes = |is_drawn: bool| {
-        (0..items.len())
+        (items.ids())
             .filter(|at| is_node(*at) && items[*at] == is_drawn)
             .count()
     };
@@ -54,17 +54,14 @@ pub(crate) fn drawn_part(
     }
     let mut part = Drawn {
         items: view.items.clone(),
-        arrows: filtered(&view.arrows, &arrows),
+        arrows: filtered(&view.arrows, &arrows).into(),
         items_shown: view.items_shown.clone(),
-        arrows_shown: filtered(&view.arrows_shown, &arrows),
+        arrows_shown: filtered(&view.arrows_shown, &arrows).into(),
     };
     let is_word: Vec<bool> = items.iter().map(|drawn| !drawn).collect();
     let words = filtered(&view.items, &is_word);
     let shown = filtered(&view.items_shown, &is_word);
-    let gone = (0..)
-        .zip(&items)
-        .filter(|(_, drawn)| !**drawn)
-        .map(|(at, _)| at);
+    let gone = items.ids().filter(|at| !items[*at]);
     part.drop_items(&mut Vec::new(), &gone.collect());
     let namespaces = cluster::clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
     Some(DrawnPart {
@@ -111,7 +108,7 @@ mod tests {
             assert!(
                 [arrow.from, arrow.to]
                     .iter()
-                    .all(|end| (*end as usize) < kept.len())
+                    .all(|end| part.view.items.get(*end).is_some())
             );
         }
         let also = part.view.also.iter().flat_map(|also| &also.items);

@@ -10,8 +10,9 @@ use crate::draw::paint::xml::{Xml, units};
 use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
+use crate::graph::Id as _;
 use crate::view::runs::word;
-use crate::view::{Mark, View};
+use crate::view::{ArrowId, ItemId, Mark, View};
 
 /// A graph in SVG.
 #[derive(Debug)]
@@ -54,18 +55,18 @@ impl<'a> Classes<'a> {
         }
     }
 
-    /// Writes the arrow with this index in the view.
-    pub(crate) fn arrow(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
-        let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
-        let name = |id: u32| &*self.view.items[id as usize].name;
+    /// Writes an arrow of the view.
+    pub(crate) fn arrow(&self, xml: &mut Xml, id: ArrowId, look: &dyn ElementLook) {
+        let (part, arrow) = (&self.union.arrows[id.at()], &self.view.arrows[id]);
+        let name = |id: ItemId| &*self.view.items[id].name;
         let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
         let what = format!("edge {}", arrow.class());
         Self::element(xml, part, &what, &ends, look, 0.8);
     }
 
-    /// Writes the item with this index in the view.
-    pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
-        let (part, item) = (&self.union.items[at], &self.view.items[at]);
+    /// Writes an item of the view.
+    pub(crate) fn item(&self, xml: &mut Xml, id: ItemId, look: &dyn ElementLook) {
+        let (part, item) = (&self.union.items[id.at()], &self.view.items[id]);
         Self::element(xml, part, item.class(), &[("name", &item.name)], look, 1.0);
     }
 

@@ -15,7 +15,7 @@ use crate::draw::picture::options;
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Evidence;
-use crate::graph::{Element, Elements, State};
+use crate::graph::{ById, Element, Elements, Id as _, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
 use crate::view::{Arrow, Item, ItemKind, Looks, Mark, SeenWindow, Shown, View};
@@ -109,7 +109,7 @@ impl<'a> DotView<'a> {
         }
         for shown in &seen.items {
             let at = shown.id as usize;
-            let item = self.view.items.get(at);
+            let item = self.view.items.get(shown.item());
             if let Some(item) = item.filter(|item| item.cluster == home) {
                 let (id, text) = (&self.ids.items[at], profile.1(at, item, shown));
                 let _ = writeln!(out, "{indent}{id} [{text}];");
@@ -177,18 +177,18 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
             cluster: item.cluster,
         }
     });
-    let mut widest: Vec<Option<f64>> = vec![None; view.arrows.len()];
+    let mut widest = ById::like(&view.arrows, None::<f64>);
     for shown in view.arrows_shown.iter().flat_map(Looks::distinct) {
-        let arrow = view.arrows.get(shown.id as usize);
+        let arrow = view.arrows.get(shown.arrow());
         let label = arrow.and_then(|arrow| label(arrow, shown));
-        if let (Some(label), Some(most)) = (label, widest.get_mut(shown.id as usize)) {
+        if let (Some(label), Some(most)) = (label, widest.get_mut(shown.arrow())) {
             let lines = label.lines().map(width).fold(0.0, f64::max);
             *most = Some(most.unwrap_or(0.0).max(lines));
         }
     }
     let links = view.arrows.iter().zip(widest).map(|(arrow, widest)| Link {
-        from: arrow.from as usize,
-        to: arrow.to as usize,
+        from: arrow.from.at(),
+        to: arrow.to.at(),
         label: widest.map(|w| Size::new(w + 8.0, LINE)),
         ..Link::default()
     });

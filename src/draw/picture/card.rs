@@ -10,7 +10,7 @@ use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Text};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::State;
+use crate::graph::{Id as _, State};
 use crate::view::{CardRow, Mark, Shown, View};
 
 /// The height of a row, relative to the size of its text.
@@ -45,7 +45,7 @@ struct Line {
 pub(crate) fn cards(view: &View, style: &Style, fonts: &Fonts) -> Vec<Card> {
     let mut cards = vec![Card::default(); view.items.len()];
     for (at, row) in view.rows.iter().enumerate() {
-        let card = &mut cards[row.owner as usize];
+        let card = &mut cards[row.owner.at()];
         let name = (at, name(view, row, fonts, style.topic.size));
         let sign = match row.ways {
             [true, true] => "↔",
@@ -87,7 +87,7 @@ fn is_quiet(row: &CardRow) -> bool {
 
 /// The name of a topic as drawn: relative to the frame around the node.
 fn name(view: &View, row: &CardRow, fonts: &Fonts, size: f64) -> String {
-    let space = view.items[row.owner as usize].cluster;
+    let space = view.items[row.owner].cluster;
     let inside = space.map_or("", |at| &*view.namespaces[at].name);
     let name = fitted(short_name(&row.item.label, inside), fonts, size);
     if row.item.is_service {
@@ -198,7 +198,7 @@ impl Boxes<'_> {
         let look = options::of_box(style, &style.topic, shown);
         let middle = place.centre().y;
         // The colour of the whole card already shows it.
-        let owner = view.items_shown.get(row.owner as usize);
+        let owner = view.items_shown.get(row.owner);
         let owner = owner.and_then(|shown| view.calm_at(shown, k)?.mark);
         let is_new = |mark: &Mark| mark.has_color() && owner.map(Mark::class) != Some(mark.class());
         if let Some(mark) = shown.mark.filter(is_new) {

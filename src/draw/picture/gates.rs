@@ -10,8 +10,9 @@ use super::topics;
 use crate::base::geometry::Size;
 use crate::draw::style::Edge;
 use crate::draw::text::Fonts;
+use crate::graph::{ById, Id as _};
 use crate::layout::Layout;
-use crate::view::{Arrow, ArrowKind, Looks, Shown, TopicRow, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, ItemId, Looks, Shown, TopicRow, View};
 
 /// The lines between the boxes of a namespace and one box outside of it, drawn as one while they are
 /// unchanged.
@@ -19,18 +20,18 @@ use crate::view::{Arrow, ArrowKind, Looks, Shown, TopicRow, View};
 pub(crate) struct Gate {
     /// The namespace: an index into [`View::namespaces`].
     space: usize,
-    /// The line whose route is used for all: an index into [`View::arrows`].
-    pub(crate) lead: usize,
+    /// The line whose route is used for all.
+    pub(crate) lead: ArrowId,
     /// Every line, and whether it begins inside.
-    members: Vec<(usize, bool)>,
+    members: Vec<(ArrowId, bool)>,
     /// The lines as one, with the ends of the lead.
     pub(crate) arrow: Arrow,
 }
 
 /// The gates of a view. Lines to topics, which are drawn as boxes, have none.
 pub(crate) fn gates(view: &View) -> Vec<Gate> {
-    let mut found: BTreeMap<(usize, u32), Vec<(usize, bool)>> = BTreeMap::new();
-    for (at, arrow) in view.arrows.iter().enumerate() {
+    let mut found: BTreeMap<(usize, ItemId), Vec<(ArrowId, bool)>> = BTreeMap::new();
+    for (at, arrow) in view.arrows.with_ids() {
         if let Some((space, is_outward)) =
             crossed(view, arrow).filter(|_| is_between_nodes(view, arrow))
         {
@@ -40,13 +41,13 @@ pub(crate) fn gates(view: &View) -> Vec<Gate> {
         }
     }
     let found = found.into_iter().filter(|(_, members)| members.len() > 1);
-    let gate = |((space, _), members): (_, Vec<(usize, bool)>)| {
-        let quiet = |at: usize| {
+    let gate = |((space, _), members): (_, Vec<(ArrowId, bool)>)| {
+        let quiet = |at: ArrowId| {
             let shown = view.arrows_shown.get(at);
             shown.map_or(0, |shown| quiet_windows(shown, view.frames.len()))
         };
         let longest = members.iter().rev().max_by_key(|(at, _)| quiet(*at));
-        let lead = longest.map_or(0, |(at, _)| *at);
+        let lead = longest.map_or(ArrowId(0), |(at, _)| *at);
         let arrows = || members.iter().map(|(at, _)| &view.arrows[*at]);
         let topics: BTreeSet<Arc<str>> = arrows().flat_map(|a| a.topics.iter().cloned()).collect();
         let edges: BTreeSet<_> = arrows().flat_map(|a| a.members.iter().copied()).collect();
@@ -80,8 +81,8 @@ fn is_quiet(shown: &Shown) -> bool {
 }
 
 fn is_between_nodes(view: &View, arrow: &Arrow) -> bool {
-    let is_node = |item: u32| {
-        let item = view.items.get(item as usize);
+    let is_node = |item: ItemId| {
+        let item = view.items.get(item);
         item.is_some_and(|item| item.kind.word() == "node")
     };
     arrow.kind == ArrowKind::Bundle && is_node(arrow.from) && is_node(arrow.to)
@@ -102,7 +103,7 @@ fn crossed(view: &View, arrow: &Arrow) -> Option<(usize, bool)> {
 
 impl Gate {
     /// The indices of its lines.
-    pub(crate) fn lines(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn lines(&self) -> impl Iterator<Item = ArrowId> {
         self.members.iter().map(|(at, _)| *at)
     }
 
@@ -114,8 +115,8 @@ impl Gate {
     }
 
     /// Whether each line is drawn separately in some window.
-    pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (usize, bool)> {
-        let changed = |at: usize| {
+    pub(crate) fn alone(&self, view: &View) -> impl Iterator<Item = (ArrowId, bool)> {
+        let changed = |at: ArrowId| {
             let shown = view.arrows_shown.get(at);
             shown.is_some_and(|shown| !shown.distinct().iter().all(is_quiet))
         };
@@ -129,8 +130,8 @@ impl Gate {
     pub(crate) fn shown<'a>(
         &self,
         view: &View,
-        look: impl Fn(usize) -> Option<&'a Shown>,
-    ) -> Option<(Shown, Vec<usize>)> {
+        look: impl Fn(ArrowId) -> Option<&'a Shown>,
+    ) -> Option<(Shown, Vec<ArrowId>)> {
         if look(self.lead).is_some_and(|shown| !is_quiet(shown)) {
             return None;
         }
@@ -204,15 +205,15 @@ impl Gate {
 /// its lines.
 pub(crate) fn share(
     (view, fonts, style): (&View, &Fonts, &Edge),
-    rooms: &mut [Option<Size>],
+    rooms: &mut ById<ArrowId, Option<Size>>,
     gates: &[(Gate, Vec<String>)],
-    forks: &[Option<usize>],
+    forks: &ById<ArrowId, Option<usize>>,
 ) {
     for (gate, names) in gates {
         for (at, is_alone) in gate.alone(view) {
             rooms[at] = rooms[at].filter(|_| is_alone);
         }
-        let look = |at: usize, window: u32| view.arrows_shown[at].at(window as usize);
+        let look = |at: ArrowId, window: u32| view.arrows_shown[at].at(window as usize);
         for window in gate.turns(view) {
             let shown = gate.shown(view, |at| look(at, window));
             let rows = shown.map(|(shown, _)| topics::rows(&shown, names));
@@ -223,8 +224,7 @@ pub(crate) fn share(
     let mut shared: BTreeMap<usize, Option<Size>> = BTreeMap::new();
     let forked = || {
         forks
-            .iter()
-            .enumerate()
+            .with_ids()
             .filter_map(|(at, fork)| Some((at, (*fork)?)))
     };
     for (at, fork) in forked() {
@@ -246,9 +246,9 @@ pub(crate) fn larger(a: Option<Size>, b: Option<Size>) -> Option<Size> {
 
 /// The fork of each line: the number of the first line from the same box with the same single topic, if there
 /// are several. Either all lines of a gate belong to one fork, or none do.
-pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<usize>> {
-    let mut forks: BTreeMap<(u32, &str), Vec<usize>> = BTreeMap::new();
-    let single = |at: usize| {
+pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> ById<ArrowId, Option<usize>> {
+    let mut forks: BTreeMap<(ItemId, &str), Vec<ArrowId>> = BTreeMap::new();
+    let single = |at: ArrowId| {
         let arrow = &view.arrows[at];
         let [topic] = &arrow.topics[..] else {
             return None;
@@ -258,11 +258,11 @@ pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<us
         let is_fork = looks.iter().all(is_sent) && is_between_nodes(view, arrow);
         is_fork.then_some((arrow.from, &**topic))
     };
-    let mut gate_of: BTreeMap<usize, &Gate> = BTreeMap::new();
+    let mut gate_of: BTreeMap<ArrowId, &Gate> = BTreeMap::new();
     for (gate, _) in gates {
         gate_of.extend(gate.members.iter().map(|(at, _)| (*at, gate)));
     }
-    for at in 0..view.arrows.len() {
+    for at in view.arrows.ids() {
         let gate = gate_of.get(&at);
         let mut others = gate.iter().flat_map(|gate| &gate.members);
         if let Some(key) = single(at)
@@ -271,10 +271,10 @@ pub(crate) fn forks(view: &View, gates: &[(Gate, Vec<String>)]) -> Vec<Option<us
             forks.entry(key).or_default().push(at);
         }
     }
-    let mut of = vec![None; view.arrows.len()];
+    let mut of = ById::like(&view.arrows, None);
     for members in forks.values().filter(|members| members.len() > 1) {
         for at in members {
-            of[*at] = Some(members[0]);
+            of[*at] = Some(members[0].at());
         }
     }
     of

@@ -6,26 +6,32 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::arrows::Arrows;
 use super::{Picture, measured};
 use crate::draw::scene::{Group, Piece};
-use crate::view::SeenWindow;
+use crate::graph::Id as _;
+use crate::view::{ArrowId, SeenWindow};
 
 impl Picture<'_> {
     /// The lines of a window, and their labels; changed ones last, so that they are on top.
     pub(super) fn lines(&self, seen: &SeenWindow) -> [Vec<Group>; 2] {
         let measured = &self.measured;
         let links = &measured.graph.plan.links;
-        let look = |at: usize| measured::find(&seen.arrows, at);
+        let look = |id: ArrowId| measured::find(&seen.arrows, id.at());
         let mut drawn = Vec::new();
         let mut in_gates = BTreeSet::new();
         for (gate, path) in &self.gates {
             if let Some((shown, lines)) = gate.shown(measured.view, look) {
                 in_gates.extend(lines);
-                drawn.push((&gate.arrow, path, Cow::Owned(shown), links[gate.lead].fork));
+                drawn.push((
+                    &gate.arrow,
+                    path,
+                    Cow::Owned(shown),
+                    links[gate.lead.at()].fork,
+                ));
             }
         }
-        for &at in self.order.iter().filter(|at| !in_gates.contains(at)) {
-            let (arrow, path) = (&measured.view.arrows[at], &self.tracks[at]);
-            if let Some(shown) = look(at) {
-                drawn.push((arrow, path, Cow::Borrowed(shown), links[at].fork));
+        for &id in self.order.iter().filter(|id| !in_gates.contains(id)) {
+            let (arrow, path) = (&measured.view.arrows[id], &self.tracks[id.at()]);
+            if let Some(shown) = look(id) {
+                drawn.push((arrow, path, Cow::Borrowed(shown), links[id.at()].fork));
             }
         }
         drawn.sort_by_key(|(.., shown, _)| shown.mark.is_some());
@@ -41,7 +47,7 @@ impl Picture<'_> {
         };
         let mut groups = [Vec::new(), Vec::new()];
         for (arrow, path, shown, fork) in &drawn {
-            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id.at()));
             let (line, mut label) = arrows.parts(arrow, path, shown, ends);
             let named = fork.and_then(|fork| last.get(&fork)).map(|at| drawn[*at].1);
             if named.is_some_and(|other| {

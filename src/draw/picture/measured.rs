@@ -11,10 +11,10 @@ use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::State;
+use crate::graph::{ById, Id as _, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::looks::both;
-use crate::view::{Arrow, ArrowKind, Item, ItemKind, Looks, Shown, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemKind, Looks, Shown, View};
 
 /// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
@@ -125,14 +125,14 @@ impl MeasuredGraph {
             .collect();
         let forks = gates::forks(view, &gates);
         gates::share((view, fonts, &style.edge), &mut rooms, &gates, &forks);
-        let through: BTreeSet<usize> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
-        let links = view.arrows.iter().zip(&rooms).zip(&forks).enumerate();
-        let links = links.map(|(at, ((arrow, room), fork))| Link {
-            from: arrow.from as usize,
-            to: arrow.to as usize,
+        let through: BTreeSet<ArrowId> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
+        let links = view.arrows.with_ids().zip(&rooms).zip(&forks);
+        let links = links.map(|(((id, arrow), room), fork)| Link {
+            from: arrow.from.at(),
+            to: arrow.to.at(),
             label: *room,
             fork: *fork,
-            is_outside: through.contains(&at),
+            is_outside: through.contains(&id),
         });
         let clusters = view
             .namespaces
@@ -247,7 +247,7 @@ impl Measurer<'_> {
         let mut widest = vec![None; self.view.items.len()];
         for shown in self.view.items_shown.iter().flat_map(Looks::distinct) {
             let at = shown.id as usize;
-            let Some(item) = self.view.items.get(at) else {
+            let Some(item) = self.view.items.get(shown.item()) else {
                 continue;
             };
             if let Some(line) = second_line(shown, shown_rates[at]) {
@@ -260,7 +260,7 @@ impl Measurer<'_> {
     }
 
     /// The space for the widest label that each arrow shows in some window.
-    fn rooms(&self, topics: &[Vec<String>]) -> Vec<Option<Size>> {
+    fn rooms(&self, topics: &[Vec<String>]) -> ById<ArrowId, Option<Size>> {
         let style = &self.style.edge;
         let reported = shown_by_arrows(self.view);
         let nothing = Looks::default();
@@ -275,7 +275,7 @@ impl Measurer<'_> {
             let mut widest = None;
             if arrow.kind == ArrowKind::Bundle {
                 // The box of a topic has its name and its rate.
-                let to = self.view.items.get(arrow.to as usize)?;
+                let to = self.view.items.get(arrow.to)?;
                 if to.kind.word() == "topic" {
                     return None;
                 }
@@ -285,7 +285,7 @@ impl Measurer<'_> {
                 return rooms.fold(None, |a, b| larger(a, Some(b)));
             }
             // A subscription shows its rate if its topic has another.
-            let topic = self.view.items_shown.get(arrow.from as usize);
+            let topic = self.view.items_shown.get(arrow.from);
             let topic = topic.filter(|_| is_reported && arrow.kind == ArrowKind::Subscribe);
             let looks = both(
                 if is_reported { looks } else { &nothing },
@@ -328,9 +328,9 @@ pub(crate) enum ShownRates {
 /// The rates that each item shows: all those of a topic, unless several publishers share it; then only those that
 /// changed.
 pub(crate) fn shown_rates(view: &View) -> Vec<ShownRates> {
-    let mut senders = vec![0_usize; view.items.len()];
+    let mut senders = ById::like(&view.items, 0_usize);
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        if let Some(senders) = senders.get_mut(arrow.to as usize) {
+        if let Some(senders) = senders.get_mut(arrow.to) {
             *senders += 1;
         }
     }
@@ -347,7 +347,7 @@ fn shown_by_arrows(view: &View) -> Vec<bool> {
     let shown_rates = shown_rates(view);
     let reported = |arrow: &Arrow| {
         arrow.kind != ArrowKind::Publish
-            || shown_rates.get(arrow.to as usize) != Some(&ShownRates::Rates)
+            || shown_rates.get(arrow.to.at()) != Some(&ShownRates::Rates)
     };
     view.arrows.iter().map(reported).collect()
 }

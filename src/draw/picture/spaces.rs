@@ -51,7 +51,7 @@ pub(crate) fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
 /// The first window in which each namespace has content.
 pub(crate) fn first_seen(view: &View) -> Vec<usize> {
     let mut first = vec![usize::MAX; view.namespaces.len()];
-    for (item, looks) in (0..).zip(&view.items_shown) {
+    for (item, looks) in view.items_shown.with_ids() {
         let seen = looks.runs().find(|(_, shown)| shown.is_some());
         let seen = seen.map_or(usize::MAX, |(window, _)| window as usize);
         for at in view.around(item) {

@@ -9,7 +9,7 @@ use crate::base::words;
 use crate::draw::style::Edge;
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
-use crate::view::{Arrow, Mark, Shown, TopicRow, View};
+use crate::view::{Arrow, ItemId, Mark, Shown, TopicRow, View};
 
 /// The most topics that have a row each; if there are more, only those that changed, or the one with the
 /// highest rate.
@@ -107,7 +107,7 @@ fn last(name: &str) -> &str {
 
 /// The name without the namespace whose frame contains one of the arrow's ends.
 fn relative<'a>(view: &View, arrow: &Arrow, name: &'a str) -> &'a str {
-    let inside = |item: u32| {
+    let inside = |item: ItemId| {
         let mut rests = view.around(item).filter_map(|at| {
             name.strip_prefix(&*view.namespaces[at].name)?
                 .strip_prefix('/')
@@ -214,7 +214,7 @@ pub(crate) fn fitted(name: &str, fonts: &Fonts, size: f64) -> String {
 mod tests {
     use super::*;
     use crate::view::testing::mission;
-    use crate::view::{Mode, ViewOptions, view};
+    use crate::view::{ArrowId, Mode, ViewOptions, view};
 
     /// The words on the only line of a window, for a line to the right.
     fn words(window: &str) -> Vec<String> {
@@ -224,8 +224,8 @@ mod tests {
         };
         let (view, _) = view(&mission(&[window]), &options);
         assert_eq!(view.arrows.len(), 1, "{:?}", view.arrows);
-        let names = names(&view, &view.arrows[0]);
-        let rows = rows(view.arrows_shown[0].at(0).unwrap(), &names);
+        let names = names(&view, &view.arrows[ArrowId(0)]);
+        let rows = rows(view.arrows_shown[ArrowId(0)].at(0).unwrap(), &names);
         rows.iter().map(|row| row.words(false, true)).collect()
     }
 

@@ -13,7 +13,7 @@ use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Confidence;
 use crate::graph::State;
-use crate::view::{Arrow, ItemKind, Looks, Mark, Shown};
+use crate::view::{Arrow, ArrowId, ItemId, ItemKind, Looks, Mark, Shown};
 
 /// The whole graph, every element once, drawn as active; a painter omits the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,8 +22,8 @@ pub struct Union {
     pub size: Size,
     /// The boxes around namespaces, outer ones first.
     pub spaces: Vec<Group>,
-    /// The arrows in painting order: indices in the view.
-    pub order: Vec<usize>,
+    /// The arrows in painting order.
+    pub order: Vec<ArrowId>,
     /// A part per arrow of the view. Its last text, if there is one, is its rate.
     pub arrows: Vec<UnionElement>,
     /// A part per item of the view.
@@ -160,7 +160,7 @@ impl Picture<'_> {
                 let Some(mark) = shown.and_then(|shown| shown.mark) else {
                     continue;
                 };
-                let item = |id: u32| view.items_shown.get(id as usize)?.at(window as usize);
+                let item = |id: ItemId| view.items_shown.get(id)?.at(window as usize);
                 if is_badged(mark, [arrow.from, arrow.to].map(item)) {
                     marks.insert(mark);
                 }

@@ -8,14 +8,15 @@ use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Weight;
+use crate::graph::{ById, Id as _};
 use crate::view::words::DrawnPart;
-use crate::view::{ItemKind, Looks, View};
+use crate::view::{ArrowId, ItemId, ItemKind, Looks, View};
 
 impl Picture<'_> {
     /// The union of the view of which this picture's view is a part.
     pub(crate) fn union_with_words(&self, whole: &View, part: &DrawnPart) -> Union {
         let mut union = self.union();
-        let arrows: Vec<usize> = places(&part.arrows, true).collect();
+        let arrows: ById<ArrowId, ArrowId> = places(&part.arrows, true).collect();
         union.order = union.order.iter().map(|at| arrows[*at]).collect();
         union.order.extend(places(&part.arrows, false));
         union.arrows = spread(union.arrows, &part.arrows);
@@ -35,7 +36,10 @@ impl Picture<'_> {
             for ((word, rect), item) in words.zip(&also.items) {
                 around = around.union(&rect);
                 if let Some(at) = indices.get(&(item.kind, &*item.name)) {
-                    let looks = whole.items_shown.get(*at).map_or(&[][..], Looks::distinct);
+                    let looks = whole
+                        .items_shown
+                        .get(ItemId::of(*at))
+                        .map_or(&[][..], Looks::distinct);
                     union.items[*at] = UnionElement {
                         group: self.word(word, rect),
                         rect,
@@ -73,8 +77,8 @@ impl Picture<'_> {
 }
 
 /// The indices of the elements that are drawn, or of the others.
-fn places(drawn: &[bool], is_drawn: bool) -> impl Iterator<Item = usize> {
-    let all = drawn.iter().enumerate();
+fn places(drawn: &ById<ArrowId, bool>, is_drawn: bool) -> impl Iterator<Item = ArrowId> {
+    let all = drawn.with_ids();
     all.filter(move |(_, drawn)| **drawn == is_drawn)
         .map(|(at, _)| at)
 }

@@ -63,7 +63,8 @@ fn two_nodes() -> (Mission, View) {
         items_shown: vec![
             Looks::of(marks.iter().map(|_| Some(&driver))),
             Looks::of(planner.iter().map(Option::as_ref)),
-        ],
+        ]
+        .into(),
         frames: marks.into_iter().enumerate().map(frame).collect(),
         ..View::default()
     };

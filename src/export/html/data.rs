@@ -16,7 +16,7 @@ use crate::draw::figure::marks::Sign;
 use crate::draw::picture::change_counts;
 use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
-use crate::graph::{Element, Elements};
+use crate::graph::{Element, Elements, Id as _};
 use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
 use crate::mission::info::is_ros1;
@@ -174,7 +174,7 @@ impl PageClock {
 fn places(drawn: &PageGraph<'_>) -> BTreeMap<Element, u32> {
     let mut places = BTreeMap::new();
     let items = drawn.view.items.iter().map(|item| &item.members);
-    let arrows = drawn.order.iter().map(|at| &drawn.view.arrows[*at].members);
+    let arrows = drawn.order.iter().map(|id| &drawn.view.arrows[*id].members);
     for (members, place) in items.chain(arrows).zip(0..) {
         for member in members {
             places.entry(*member).or_insert(place);
@@ -191,7 +191,7 @@ fn graph<'a>(
     words: &mut Words,
 ) -> GraphData<'a> {
     let (view, runs) = (drawn.view, &drawn.runs);
-    let order = || drawn.order.iter().map(|at| &view.arrows[*at]);
+    let order = || drawn.order.iter().map(|id| &view.arrows[*id]);
     let of_items = view.items.iter().map(|i| (&i.members, true));
     let of_arrows = order().map(|a| (&a.members, false));
     let facts = of_items
@@ -209,7 +209,7 @@ fn graph<'a>(
             ArrowKind::Direct(topic) => visible(topic).into_owned(),
             _ => String::new(),
         };
-        (arrow.from, arrow.to, carried)
+        (arrow.from.0, arrow.to.0, carried)
     };
     GraphData {
         facts: facts.collect(),
@@ -226,7 +226,7 @@ fn graph<'a>(
         runs: runs
             .items
             .iter()
-            .chain(drawn.order.iter().map(|at| &runs.arrows[*at]))
+            .chain(drawn.order.iter().map(|id| &runs.arrows[id.at()]))
             .collect(),
         members: if std::ptr::eq(drawn, &raw const page.whole) {
             Vec::new()

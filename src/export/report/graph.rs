@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::view::{Looks, Mark, SeenWindow, Shown, View};
+use crate::view::{ArrowId, ItemId, Looks, Mark, SeenWindow, Shown, View};
 
 /// The most edges that are drawn.
 const MOST_EDGES: usize = 60;
@@ -18,13 +18,13 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let arrows = ends(&view.arrows_shown, last);
     let is_changed =
         |ends: &BTreeMap<u32, Shown>, id: u32| ends.get(&id).is_some_and(|s| s.mark.is_some());
-    let mut wanted: Vec<(u8, u32)> = Vec::new();
-    for (arrow, id) in view.arrows.iter().zip(0..) {
+    let mut wanted: Vec<(u8, ArrowId)> = Vec::new();
+    for (id, arrow) in view.arrows.with_ids() {
         let ends = [arrow.from, arrow.to]
             .iter()
-            .filter(|end| is_changed(&items, **end))
+            .filter(|end| is_changed(&items, end.0))
             .count();
-        let own = is_changed(&arrows, id);
+        let own = is_changed(&arrows, id.0);
         match (own, ends) {
             (false, 0) => {}
             (true, _) => wanted.push((0, id)),
@@ -34,19 +34,19 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     wanted.sort_unstable();
     let left_out = wanted.len().saturating_sub(MOST_EDGES);
     wanted.truncate(MOST_EDGES);
-    let mut drawn: Vec<u32> = wanted.iter().map(|(_, id)| *id).collect();
+    let mut drawn: Vec<ArrowId> = wanted.iter().map(|(_, id)| *id).collect();
     drawn.sort_unstable();
-    let mut boxes: BTreeSet<u32> = BTreeSet::new();
+    let mut boxes: BTreeSet<ItemId> = BTreeSet::new();
     for id in &drawn {
-        let arrow = &view.arrows[*id as usize];
+        let arrow = &view.arrows[*id];
         boxes.extend([arrow.from, arrow.to]);
     }
     let changed_items = items
         .iter()
         .filter(|(_, s)| s.mark.is_some())
-        .map(|(id, _)| *id);
+        .map(|(id, _)| ItemId(*id));
     // A box whose edges are left out would look unconnected.
-    let linked: BTreeSet<u32> = view.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
+    let linked: BTreeSet<ItemId> = view.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
     for id in changed_items.filter(|id| !linked.contains(id)) {
         if boxes.len() < MOST_ITEMS {
             boxes.insert(id);
@@ -59,8 +59,8 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
         ids.filter_map(|id| ends.get(&id).cloned()).collect()
     };
     let seen = SeenWindow {
-        items: pick(&items, &mut boxes.into_iter()),
-        arrows: pick(&arrows, &mut drawn.into_iter()),
+        items: pick(&items, &mut boxes.into_iter().map(|id| id.0)),
+        arrows: pick(&arrows, &mut drawn.into_iter().map(|id| id.0)),
     };
     Some((seen, left_out))
 }

@@ -31,7 +31,7 @@ fn only_what_changed_and_its_neighbours_are_drawn() {
     let mut names: Vec<&str> = seen
         .items
         .iter()
-        .map(|s| &*view.items[s.id as usize].name)
+        .map(|s| &*view.items[s.item()].name)
         .collect();
     names.sort_unstable();
     assert_eq!(

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::names::quoted;
 use super::{DotView, label, line, pen_width};
 use crate::draw::style::Body;
-use crate::graph::State;
+use crate::graph::{Id as _, State};
 use crate::view::{Arrow, Item, ItemKind, SeenWindow, Shown};
 
 const FONTS: &str = "Helvetica,Arial,sans-serif";
@@ -40,7 +40,7 @@ pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> St
     let whole = (None, &*drawing.view.inhabited(seen), " ");
     drawing.members(&mut out, seen, whole, (&space, &item));
     for shown in &seen.arrows {
-        if let Some(arrow) = drawing.view.arrows.get(shown.id as usize) {
+        if let Some(arrow) = drawing.view.arrows.get(shown.arrow()) {
             edge(drawing, &mut out, arrow, shown);
         }
     }
@@ -82,7 +82,7 @@ fn look<'a>(drawing: &'a DotView<'_>, kind: ItemKind) -> (&'static str, &'a Body
 
 fn edge(drawing: &DotView<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
     let ids = &drawing.ids.items;
-    let (Some(from), Some(to)) = (ids.get(arrow.from as usize), ids.get(arrow.to as usize)) else {
+    let (Some(from), Some(to)) = (ids.get(arrow.from.at()), ids.get(arrow.to.at())) else {
         return;
     };
     let _ = write!(

@@ -10,9 +10,9 @@ use std::fmt::Write as _;
 use super::names::{escape_name, quoted};
 use super::{DotView, label, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
-use crate::graph::Element;
+use crate::graph::{Element, Id as _};
 use crate::layout::{Layout, Route};
-use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, SeenWindow, Shown};
+use crate::view::{Arrow, ArrowKind, Item, ItemId, ItemKind, Mark, SeenWindow, Shown};
 
 /// The length of an arrow's head in points, as Graphviz draws it.
 const HEAD: f64 = 10.0;
@@ -92,15 +92,15 @@ impl RqtWriter<'_> {
     }
 
     fn arrow(&self, out: &mut String, shown: &Shown) {
-        let at = shown.id as usize;
-        let (Some(arrow), Some(route)) =
-            (self.drawing.view.arrows.get(at), self.layout.routes.get(at))
-        else {
+        let at = shown.arrow();
+        let (Some(arrow), Some(route)) = (
+            self.drawing.view.arrows.get(at),
+            self.layout.routes.get(at.at()),
+        ) else {
             return;
         };
         let ids = &self.drawing.ids.items;
-        let (Some(from), Some(to)) = (ids.get(arrow.from as usize), ids.get(arrow.to as usize))
-        else {
+        let (Some(from), Some(to)) = (ids.get(arrow.from.at()), ids.get(arrow.to.at())) else {
             return;
         };
         let _ = write!(
@@ -146,8 +146,8 @@ impl RqtWriter<'_> {
 
     /// The tooltip in the style of `rqt_graph`: a line per value. Qt interprets it as rich text.
     fn tooltip(&self, arrow: &Arrow, shown: &Shown) -> String {
-        let name = |at: u32| {
-            let item = self.drawing.view.items.get(at as usize);
+        let name = |id: ItemId| {
+            let item = self.drawing.view.items.get(id);
             rich(item.map_or("", |item| item.name.as_ref()))
         };
         let (from, to) = (name(arrow.from), name(arrow.to));
@@ -193,10 +193,10 @@ impl RqtWriter<'_> {
 
     /// The route of an edge: its tip, then its curve up to the arrow's head.
     fn spline(&self, arrow: &Arrow, route: &Route) -> String {
-        let place = |at: u32| {
+        let place = |id: ItemId| {
             self.layout
                 .boxes
-                .get(at as usize)
+                .get(id.at())
                 .map(Rect::centre)
                 .unwrap_or_default()
         };
