@@ -1,5 +1,6 @@
 //! Writes a mission as JSON, schema `bagreel.mission/3`, window by window without a second copy in memory.
 
+use std::cell::RefCell;
 use std::io::{BufWriter, Write};
 
 use serde::Serialize;
@@ -13,7 +14,7 @@ use super::raw::{BagJson, NodeJson, NoticeJson, PublishJson, SubscribeJson, Topi
 use super::runs::JsonColumns;
 use super::sending::{SendingJson, senders};
 use crate::bag::Report;
-use crate::graph::{Element, Elements, Graph};
+use crate::graph::{Element, Elements, GraphsIter};
 use crate::mission::{Mission, Places, Window};
 
 /// The schema that is written and read.
@@ -164,11 +165,11 @@ impl Serialize for Windows<'_> {
         let mission = self.0.mission;
         let mut seq = serializer.serialize_seq(None)?;
         // Not a `List`, which would need a second iterator over the graphs: each has a cursor for every element.
-        let mut graphs = (!self.0.is_runs()).then(|| mission.graphs.iter());
+        let graphs = (!self.0.is_runs()).then(|| RefCell::new(mission.graphs.iter()));
         for window in &mission.windows {
             seq.serialize_element(&WindowOf {
                 window,
-                graph: graphs.as_mut().and_then(Iterator::next),
+                graphs: graphs.as_ref(),
                 elements: &mission.elements,
             })?;
         }
@@ -179,35 +180,62 @@ impl Serialize for Windows<'_> {
 /// A window, with its elements unless they are in columns.
 struct WindowOf<'a> {
     window: &'a Window,
-    graph: Option<Graph>,
+    /// Before the graph of this window.
+    graphs: Option<&'a RefCell<GraphsIter<'a>>>,
     elements: &'a Elements,
 }
 
 impl Serialize for WindowOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let (window, all) = (self.window, self.elements);
+        let (window, elements) = (self.window, self.elements);
         let mut map = serializer.serialize_map(None)?;
         head(window, &mut map)?;
-        if let Some(graph) = &self.graph {
-            let nodes = graph.nodes();
-            let nodes = nodes.map(|(id, s)| NodeJson::new(&all.nodes[id], Some(s)));
-            map.serialize_entry("nodes", &List(nodes))?;
-            let topics = graph.topics();
-            let topics = topics.map(|(id, s)| TopicJson::new(&all.topics[id], Some(s)));
-            map.serialize_entry("topics", &List(topics))?;
-            let publishes = graph.publishes();
-            let publishes =
-                publishes.map(|(id, s)| PublishJson::new(&all.publishes[id], all, Some(s)));
-            map.serialize_entry("publishes", &List(publishes))?;
-            let subscribes = graph.subscribes();
-            let subscribes =
-                subscribes.map(|(id, s)| PublishJson::new(&all.subscribes[id], all, Some(s)));
-            map.serialize_entry("subscribes", &List(subscribes.map(SubscribeJson::from)))?;
+        if let Some(graphs) = self.graphs {
+            let keys = ["nodes", "topics", "publishes", "subscribes"];
+            for (kind, key) in keys.into_iter().enumerate() {
+                let states = States {
+                    graphs,
+                    kind,
+                    elements,
+                };
+                map.serialize_entry(key, &states)?;
+            }
+            graphs.borrow_mut().pass();
         }
         let changes = window.changes.iter().zip(&window.events);
-        let changes = changes.map(|(change, event)| ChangeRow::new(change, *event, all));
+        let changes = changes.map(|(change, event)| ChangeRow::new(change, *event, elements));
         map.serialize_entry("changes", &List(changes))?;
         map.end()
+    }
+}
+
+/// The elements of one kind in a window. They are written one by one, since a graph of very many takes more memory than
+/// the mission.
+struct States<'a> {
+    graphs: &'a RefCell<GraphsIter<'a>>,
+    kind: usize,
+    elements: &'a Elements,
+}
+
+impl Serialize for States<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let all = self.elements;
+        let mut seq = serializer.serialize_seq(None)?;
+        for state in self.graphs.borrow_mut().of_kind(self.kind) {
+            let seen = Some(&state);
+            match state.what {
+                Element::Node(id) => seq.serialize_element(&NodeJson::new(&all.nodes[id], seen)),
+                Element::Topic(id) => seq.serialize_element(&TopicJson::new(&all.topics[id], seen)),
+                Element::Publish(id) => {
+                    seq.serialize_element(&PublishJson::new(&all.publishes[id], all, seen))
+                }
+                Element::Subscribe(id) => {
+                    let edge = PublishJson::new(&all.subscribes[id], all, seen);
+                    seq.serialize_element(&SubscribeJson::from(edge))
+                }
+            }?;
+        }
+        seq.end()
     }
 }
 
