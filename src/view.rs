@@ -398,11 +398,8 @@ impl View {
     /// For each namespace with a box, whether anything inside it is visible.
     pub(crate) fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let mut inhabited = vec![false; self.namespaces.len()];
-        for at in seen
-            .items
-            .iter()
-            .flat_map(|shown| self.around(shown.item()))
-        {
+        let items = seen.items.iter().map(Shown::item);
+        for at in items.flat_map(|item| self.around(item)) {
             inhabited[at] = true;
         }
         inhabited

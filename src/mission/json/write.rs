@@ -180,7 +180,7 @@ impl Serialize for Windows<'_> {
 /// A window, with its elements unless they are in columns.
 struct WindowOf<'a> {
     window: &'a Window,
-    /// Before the graph of this window.
+    /// The graphs, of which the next one is that of this window.
     graphs: Option<&'a RefCell<GraphsIter<'a>>>,
     elements: &'a Elements,
 }
