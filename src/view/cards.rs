@@ -44,17 +44,18 @@ impl Drawn {
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
     pub(super) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
-        let mut lines: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
+        let mut lines: ById<ItemId, Vec<ArrowId>> = ById::like(&self.items, Vec::new());
         for (at, arrow) in self.arrows.with_ids() {
             if let Some((topic, _)) = self.topic_of(arrow) {
-                lines.entry(topic).or_default().push(at);
+                lines[topic].push(at);
             }
         }
         let mut rows = Vec::new();
-        let mut gone = BTreeSet::new();
-        for (topic, lines) in lines {
+        let mut items_stay = ById::like(&self.items, true);
+        let mut arrows_stay = ById::like(&self.arrows, true);
+        for (topic, lines) in lines.with_ids().filter(|(_, lines)| !lines.is_empty()) {
             let mut owners: BTreeMap<ItemId, Vec<ArrowId>> = BTreeMap::new();
-            for at in &lines {
+            for at in lines {
                 let end = self.topic_of(&self.arrows[*at]).map(|(_, owner)| owner);
                 owners.entry(end.unwrap_or(topic)).or_default().push(*at);
             }
@@ -62,19 +63,27 @@ impl Drawn {
                 && is_infrastructure(&self.items[topic].name)
                 || self.is_hub(owners.keys());
             if (owners.len() == 1 || is_infrastructure)
-                && self.is_reported(topic, &lines, is_infrastructure)
+                && self.is_reported(topic, lines, is_infrastructure)
             {
                 let own = owners.into_iter();
                 rows.extend(
                     own.map(|(owner, lines)| self.row((topic, owner), &lines, is_infrastructure)),
                 );
-                gone.extend(lines);
+                items_stay[topic] = false;
+                for at in lines {
+                    arrows_stay[*at] = false;
+                }
             }
         }
-        self.arrows.retain(|at| !gone.contains(&at));
-        self.arrows_shown.retain(|at| !gone.contains(&at));
-        let never = self.hide_unnamed(&rows);
-        self.drop_items(&mut rows, &never);
+        self.keep_arrows(&arrows_stay);
+        for never in self.hide_unnamed(&rows) {
+            items_stay[never] = false;
+        }
+        rows.retain(|row| items_stay[row.owner]);
+        let places = self.keep_items(&items_stay);
+        for row in &mut rows {
+            row.owner = places[row.owner];
+        }
         rows.sort_by(|a, b| {
             let key = |row: &CardRow| {
                 (
@@ -185,8 +194,8 @@ impl Drawn {
 
     /// Hides a box of unnamed publishers in windows without any of its topics, apart from hubs, as it would
     /// be empty. Returns the boxes that are never shown.
-    fn hide_unnamed(&mut self, rows: &[CardRow]) -> BTreeSet<ItemId> {
-        let mut never = BTreeSet::new();
+    fn hide_unnamed(&mut self, rows: &[CardRow]) -> Vec<ItemId> {
+        let mut never = Vec::new();
         for (at, looks) in self.items.ids().zip(self.items_shown.iter_mut()) {
             let is_linked = |arrow: &Arrow| arrow.from == at || arrow.to == at;
             let is_unnamed = is_unnamed(&self.items[at].name);
@@ -210,7 +219,7 @@ impl Drawn {
             }
             *looks = writer.finish();
             if looks.distinct().is_empty() {
-                never.insert(at);
+                never.push(at);
             }
         }
         never
@@ -219,19 +228,15 @@ impl Drawn {
     /// Combines the two arrows of a box that both publishes and subscribes to a topic into one line, with a
     /// head at each end that is used.
     pub(super) fn join_twins(&mut self) {
-        let mut places = BTreeMap::new();
-        for (at, arrow) in self.arrows.with_ids() {
-            places.entry((arrow.from, arrow.to)).or_insert(at);
-        }
-        let mut gone = BTreeSet::new();
+        let mut stays = ById::like(&self.arrows, true);
         for there in self.arrows.ids() {
             let (from, to) = (self.arrows[there].from, self.arrows[there].to);
             let is_publish = self.arrows[there].kind == ArrowKind::Publish;
-            let back = places.get(&(to, from)).copied();
-            let Some(back) = back.filter(|_| is_publish && from != to) else {
+            let back = self.subscription(to, from);
+            let Some(back) = back.filter(|_| is_publish) else {
                 continue;
             };
-            gone.insert(back);
+            stays[back] = false;
             let members = self.arrows[back].members.clone();
             let topic = Arc::clone(&self.items[to].name);
             let arrow = &mut self.arrows[there];
@@ -244,24 +249,29 @@ impl Drawn {
                     both_ways([there, back].map(|at| &self.arrows_shown[at]));
             }
         }
-        self.arrows.retain(|at| !gone.contains(&at));
-        self.arrows_shown.retain(|at| !gone.contains(&at));
+        self.keep_arrows(&stays);
         for (looks, id) in self.arrows_shown.iter_mut().zip(0..) {
             looks.renumber(id);
         }
     }
 
-    /// Removes the topics of these rows and the boxes that are never shown, and renumbers everything.
-    pub(super) fn drop_items(&mut self, rows: &mut Vec<CardRow>, never: &BTreeSet<ItemId>) {
-        let gone: BTreeSet<_> = rows
-            .iter()
-            .map(|row| (row.item.kind, row.item.name.clone()))
-            .collect();
-        let stays: ById<ItemId, bool> = (self.items.with_ids())
-            .map(|(at, item)| {
-                !never.contains(&at) && !gone.contains(&(item.kind, item.name.clone()))
-            })
-            .collect();
+    /// The arrow of a subscription; arrows are sorted by their ends.
+    fn subscription(&self, topic: ItemId, node: ItemId) -> Option<ArrowId> {
+        let ends = |arrow: &Arrow| (arrow.from, arrow.to);
+        let first = self.arrows.partition_point(|a| ends(a) < (topic, node));
+        let all = self.arrows.with_ids().skip(first);
+        let mut all = all.take_while(|(_, arrow)| ends(arrow) == (topic, node));
+        let found = all.find(|(_, arrow)| arrow.kind == ArrowKind::Subscribe);
+        found.map(|(id, _)| id)
+    }
+
+    fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
+        self.arrows.retain(|at| stays[at]);
+        self.arrows_shown.retain(|at| stays[at]);
+    }
+
+    /// Removes all other boxes, to which no arrow may lead, and renumbers everything. Returns the new ids.
+    pub(super) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
         let mut next = 0;
         let place = |stays: &bool| {
             next += u32::from(*stays);
@@ -274,15 +284,12 @@ impl Drawn {
             arrow.from = places[arrow.from];
             arrow.to = places[arrow.to];
         }
-        rows.retain(|row| !never.contains(&row.owner));
-        for row in rows {
-            row.owner = places[row.owner];
-        }
         for shown in [&mut *self.items_shown, &mut *self.arrows_shown] {
             for (looks, id) in shown.iter_mut().zip(0..) {
                 looks.renumber(id);
             }
         }
+        places
     }
 }
 

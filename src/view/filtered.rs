@@ -48,7 +48,7 @@ impl Keep {
     fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed) -> Self {
         let nodes = numbered(viewed.node.iter().map(Option::is_some));
         let topics = viewed.topic.with_ids().map(|(id, item)| {
-            let is_carried = viewed.carriers.contains_key(&Element::Topic(id));
+            let is_carried = !viewed.carriers(Element::Topic(id)).is_empty();
             match options.mode {
                 Mode::Nodes => is_carried,
                 Mode::Bundles => item.is_some() || is_carried,

@@ -217,8 +217,8 @@ impl<'a> ShownWindows<'a> {
         self.items.take_touched();
         self.arrows.take_touched();
         let items = self.turn.items(self.viewed, &self.now);
-        let arrows = self.turn.arrows(self.viewed, &self.now, &items);
-        for (id, shown) in self.viewed.arrows.ids().zip(arrows) {
+        for id in self.viewed.arrows.ids() {
+            let shown = self.turn.arrow(self.viewed, &self.now, &items, id);
             self.arrows.show(at, id, shown);
         }
         for (id, shown) in self.viewed.items.ids().zip(items) {

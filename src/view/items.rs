@@ -12,7 +12,7 @@ use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, LineWidth, Mode, ViewOptions};
-use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, TopicId};
+use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, PerElement, TopicId};
 use crate::mission::Mission;
 
 /// The part of the picture that shows an edge of the graph.
@@ -54,7 +54,7 @@ pub(crate) struct Viewed {
     /// Node and topic of each subscription.
     pub(crate) subscribed: ById<EdgeId, (NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
-    pub(crate) carriers: BTreeMap<Element, Vec<ArrowId>>,
+    carriers: PerElement<Vec<ArrowId>>,
     /// Per topic, whether bundles draw it.
     pub(super) drawn: ById<TopicId, bool>,
     /// The number of items at the end of the list that are listed as words, because no line leads to them.
@@ -196,44 +196,43 @@ impl Viewed {
         if options.is_picture {
             self.set_apart(mission, options, (&nodes, &mut topics));
         }
-        let mut members: BTreeMap<&ItemKey, Vec<Element>> = BTreeMap::new();
         let own = nodes.with_ids().map(|(id, key)| (key, Element::Node(id)));
         let others = topics.with_ids().map(|(id, key)| (key, Element::Topic(id)));
-        for (key, what) in own.chain(others) {
-            if let Some(key) = key {
-                members.entry(key).or_default().push(what);
-            }
-        }
-        let is_in_words = |key: &ItemKey, members: &[Element]| {
-            let is = |what: &Element| match what {
+        let shown = own.chain(others);
+        let shown = shown.filter_map(|(key, what)| Some((key.as_ref()?, what)));
+        let is_in_words = |members: &[(&ItemKey, Element)]| {
+            let is = |(key, what): &(&ItemKey, Element)| match what {
+                _ if key.0 == ItemKind::Namespace => false,
                 Element::Node(id) => self.nodes_in_words[*id],
                 Element::Topic(id) => self.topics_in_words[*id],
                 Element::Publish(_) | Element::Subscribe(_) => false,
             };
-            key.0 != ItemKind::Namespace && members.iter().all(is)
+            members.iter().all(is)
         };
-        let (mut members, in_words): (Vec<_>, Vec<_>) = members
-            .into_iter()
-            .partition(|(key, members)| !is_in_words(key, members));
+        let shown = sorted(shown.collect());
+        let (boxes, in_words): (Vec<_>, Vec<_>) = together(&shown).partition(|m| !is_in_words(m));
         self.in_words = in_words.len();
-        members.extend(in_words);
-        let keys = members.iter().map(|(key, _)| *key);
-        let places: BTreeMap<&ItemKey, ItemId> = keys.zip((0..).map(ItemId)).collect();
-        let place = |key: &Option<ItemKey>| key.as_ref().and_then(|key| places.get(key).copied());
-        self.node = nodes.iter().map(place).collect();
-        self.topic = topics.iter().map(place).collect();
-        self.items = members
-            .into_iter()
-            .map(|((kind, name), members)| Item {
+        self.node = ById::like(&elements.nodes, None);
+        self.topic = ById::like(&elements.topics, None);
+        for members in boxes.into_iter().chain(in_words) {
+            let (kind, name) = members[0].0;
+            let id = self.items.push(Item {
                 kind: *kind,
                 name: Arc::clone(name),
                 label: Arc::clone(name),
                 is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
-                is_service: members.iter().all(|what| elements.is_service(*what)),
+                is_service: members.iter().all(|(_, what)| elements.is_service(*what)),
                 cluster: None,
-                members,
-            })
-            .collect();
+                members: members.iter().map(|(_, what)| *what).collect(),
+            });
+            for (_, what) in members {
+                match what {
+                    Element::Node(node) => self.node[*node] = Some(id),
+                    Element::Topic(topic) => self.topic[*topic] = Some(id),
+                    Element::Publish(_) | Element::Subscribe(_) => {}
+                }
+            }
+        }
         if !options.exact_names {
             roles::label(&mut self.items, elements);
             roles::label_unknown(&mut self.items, elements);
@@ -241,47 +240,36 @@ impl Viewed {
     }
 
     fn set_arrows(&mut self, elements: &Elements) {
-        let mut arrows: BTreeMap<ArrowEnds, Vec<Element>> = BTreeMap::new();
-        let publish: ById<EdgeId, Option<ArrowEnds>> = elements
-            .publishes
-            .iter()
-            .map(|edge| {
-                let (node, topic) = self.ends(edge)?;
-                Some((node, topic, ArrowKind::Publish))
-            })
-            .collect();
-        let subscribe: ById<EdgeId, Option<ArrowEnds>> = elements
-            .subscribes
-            .iter()
-            .map(|edge| {
-                let (node, topic) = self.ends(edge)?;
-                Some((topic, node, ArrowKind::Subscribe))
-            })
-            .collect();
-        let all = publish
-            .with_ids()
-            .map(|(id, ends)| (ends, Element::Publish(id)));
-        let others = subscribe
-            .with_ids()
-            .map(|(id, ends)| (ends, Element::Subscribe(id)));
-        for (ends, element) in all.chain(others) {
-            if let Some(ends) = ends.as_ref().filter(|(from, to, _)| from != to) {
-                arrows.entry(ends.clone()).or_default().push(element);
+        self.publish = ById::like(&elements.publishes, EdgePlace::Hidden);
+        self.subscribe = ById::like(&elements.subscribes, EdgePlace::Hidden);
+        let mut lines = Vec::new();
+        for (what, edge) in elements.edges() {
+            match self.ends(edge) {
+                None => {}
+                Some((node, topic)) if node == topic => {
+                    self.set_place(what, EdgePlace::Inside(node));
+                }
+                Some((node, topic)) if matches!(what, Element::Publish(_)) => {
+                    lines.push(((node, topic, ArrowKind::Publish), what));
+                }
+                Some((node, topic)) => lines.push(((topic, node, ArrowKind::Subscribe), what)),
             }
         }
-        let ids = (0..).map(ArrowId);
-        let places: BTreeMap<&ArrowEnds, ArrowId> = arrows.keys().zip(ids).collect();
-        let place = |ends: &Option<ArrowEnds>| match ends {
-            None => EdgePlace::Hidden,
-            Some((from, to, _)) if from == to => EdgePlace::Inside(*from),
-            Some(ends) => places
-                .get(ends)
-                .map_or(EdgePlace::Hidden, |at| EdgePlace::Arrow(*at)),
-        };
-        self.publish = publish.iter().map(place).collect();
-        self.subscribe = subscribe.iter().map(place).collect();
-        let arrows = arrows.into_iter();
-        self.arrows = arrows.map(|(ends, m)| arrow(elements, ends, m)).collect();
+        for members in together(&sorted(lines)) {
+            let all = members.iter().map(|(_, what)| *what).collect();
+            let id = self.arrows.push(arrow(elements, members[0].0.clone(), all));
+            for (_, what) in members {
+                self.set_place(*what, EdgePlace::Arrow(id));
+            }
+        }
+    }
+
+    fn set_place(&mut self, edge: Element, place: EdgePlace) {
+        match edge {
+            Element::Publish(id) => self.publish[id] = place,
+            Element::Subscribe(id) => self.subscribe[id] = place,
+            Element::Node(_) | Element::Topic(_) => {}
+        }
     }
 
     /// The items of an edge's node and topic.
@@ -420,19 +408,25 @@ impl Viewed {
 
     /// Records the arrows that each topic's publications are part of.
     fn set_carriers(&mut self, elements: &Elements) {
+        self.carriers = PerElement::new(elements, |_| Vec::new());
         for (id, arrow) in self.arrows.with_ids() {
             for member in &arrow.members {
-                self.carriers.entry(*member).or_default().push(id);
-                let edge = match member {
-                    Element::Publish(publish) => elements.publishes.get(*publish),
+                let topic = match member {
+                    Element::Publish(publish) => Some(self.published[*publish].1),
                     _ => None,
                 };
-                if let Some(edge) = edge {
-                    let topic = self.carriers.entry(Element::Topic(edge.topic)).or_default();
-                    topic.push(id);
+                for what in [Some(*member), topic.map(Element::Topic)] {
+                    if let Some(all) = what.and_then(|what| self.carriers.of_mut(what)) {
+                        all.push(id);
+                    }
                 }
             }
         }
+    }
+
+    /// The arrows that carry an edge; those that carry a topic from its publishers.
+    pub(crate) fn carriers(&self, what: Element) -> &[ArrowId] {
+        self.carriers.of(what).map_or(&[], Vec::as_slice)
     }
 
     /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not reported
@@ -446,13 +440,24 @@ impl Viewed {
 
     /// Whether a single arrow carries a topic from its publishers.
     pub(crate) fn has_single_sender(&self, topic: Element) -> bool {
-        self.carriers.get(&topic).is_some_and(|all| all.len() == 1)
+        self.carriers(topic).len() == 1
     }
 
     fn is_namespace(&self, item: ItemId) -> bool {
         let item = self.items.get(item);
         item.is_some_and(|item| item.kind == ItemKind::Namespace)
     }
+}
+
+/// Elements by the item or arrow that shows them, those of one in their order.
+fn sorted<K: Ord>(mut shown: Vec<(K, Element)>) -> Vec<(K, Element)> {
+    shown.sort_by(|a, b| a.0.cmp(&b.0));
+    shown
+}
+
+/// The elements of each item or arrow.
+fn together<K: Eq>(shown: &[(K, Element)]) -> impl Iterator<Item = &[(K, Element)]> {
+    shown.chunk_by(|a, b| a.0 == b.0)
 }
 
 pub(super) fn arrow(

@@ -126,7 +126,7 @@ impl WindowMarks {
 
     /// Marks the arrows that carry a topic or publication.
     fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
-        for id in viewed.carriers.get(&what).into_iter().flatten() {
+        for id in viewed.carriers(what) {
             sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
     }

@@ -1,6 +1,7 @@
 //! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once
 //! for all.
 
+use std::cell::LazyCell;
 use std::cmp::Reverse;
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,28 +52,27 @@ pub(crate) struct Fleets {
     drawn: BTreeMap<Arc<str>, usize>,
 }
 
-/// A hash for each element that a namespace contains or is linked to, without the name of the namespace.
-type Inside = BTreeSet<u64>;
+/// A hash for each element that a namespace contains or is linked to, without the name of the namespace, sorted.
+type Inside = Vec<u64>;
 
 impl Fleets {
     /// The fleets among these elements, except namespaces that are kept open.
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
-        let mut by_stem: BTreeMap<&str, BTreeMap<&str, Inside>> = BTreeMap::new();
         let kept = options.expand.iter().chain(&options.collapse);
         let kept: BTreeSet<&str> = kept.map(|k| k.trim_end_matches('/')).collect();
-        for (space, what) in described(elements) {
-            if !kept.contains(space) {
-                let inside = by_stem.entry(stem(space)).or_default();
-                inside.entry(space).or_default().insert(what);
-            }
-        }
-        let single = single_names(elements);
+        let mut described = described(elements);
+        described.retain(|(space, _)| !kept.contains(space));
+        described.sort_unstable_by_key(|(space, what)| (stem(space), *space, *what));
+        described.dedup();
+        let single = LazyCell::new(|| single_names(elements));
         let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
-        for (stem, spaces) in by_stem {
-            let many = spaces.len();
+        for spaces in described.chunk_by(|a, b| stem(a.0) == stem(b.0)) {
             let mut alike: BTreeMap<Inside, Vec<&str>> = BTreeMap::new();
-            for (space, inside) in spaces {
-                alike.entry(inside).or_default().push(space);
+            let mut many = 0;
+            for space in spaces.chunk_by(|a, b| a.0 == b.0) {
+                let inside = space.iter().map(|(_, what)| *what).collect();
+                alike.entry(inside).or_default().push(space[0].0);
+                many += 1;
             }
             // The largest, or of several the one whose first name comes first; members that differ stay
             // beside it.
@@ -83,8 +83,11 @@ impl Fleets {
             if let Some(members) =
                 largest.filter(|m| (FEWEST..=MOST).contains(&m.len()) && is_rule(m))
             {
-                found.push((stem, members));
+                found.push((stem(members[0]), members));
             }
+        }
+        if found.is_empty() {
+            return Self::default();
         }
         keep_linked(&mut found, &partners(elements));
         let known = Known::new(elements);

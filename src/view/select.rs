@@ -1,7 +1,5 @@
 //! The choice of visible nodes and topics, in the order of `rqt_graph`'s own steps.
 
-use std::collections::BTreeSet;
-
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::ViewOptions;
 use crate::graph::{ById, Elements, NodeId, Topic, TopicId};
@@ -56,10 +54,9 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
         .map(|n| (!options.ns_filter.passes(n.name.as_str())).then_some(Reason::NsFilter))
         .collect();
     let ends = ends(elements, &nodes, &recorders);
-    let names: BTreeSet<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
     let topics = elements.topics.iter().zip(&ends);
     let topics = topics.map(|(t, ends)| {
-        let reason = topic_reason(t.name.as_str(), *ends, &names, options);
+        let reason = topic_reason(t.name.as_str(), *ends, elements, options);
         let is_hidden = options.hide.services && t.is_service();
         let reason = reason.or(is_hidden.then_some(Reason::Services));
         reason.or_else(|| is_only_recorded(t, *ends).then_some(Reason::Recorder))
@@ -104,12 +101,13 @@ fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
 fn topic_reason(
     name: &str,
     ends: TopicDegrees,
-    names: &BTreeSet<&str>,
+    elements: &Elements,
     options: &ViewOptions,
 ) -> Option<Reason> {
     let hide = options.hide;
     let all = ends.publishers + ends.subscribers;
-    let exists = |other: &str| names.contains(other) && options.topic_filter.passes(other);
+    let exists =
+        |other: &str| elements.topic(other).is_some() && options.topic_filter.passes(other);
     if !options.topic_filter.passes(name) {
         Some(Reason::TopicFilter)
     } else if hide.dead && ends.subscribers == 0 {

@@ -422,15 +422,9 @@ impl<'a> Now<'a> {
 
     /// The item that shows an element, and the arrows.
     pub(crate) fn shown_by(&self, what: Element) -> (Option<ItemId>, &[ArrowId]) {
-        let carriers = || {
-            self.viewed
-                .carriers
-                .get(&what)
-                .map_or(&[][..], Vec::as_slice)
-        };
         let is_direct = self.options.mode.is_direct();
         let edge = |place: Option<&'a EdgePlace>| match place {
-            _ if is_direct => carriers(),
+            _ if is_direct => self.viewed.carriers(what),
             Some(EdgePlace::Arrow(id)) => std::slice::from_ref(id),
             _ => &[],
         };
@@ -438,7 +432,7 @@ impl<'a> Now<'a> {
             Element::Node(id) => (self.viewed.node.get(id).copied().flatten(), &[]),
             Element::Topic(id) => {
                 let item = self.viewed.topic.get(id).copied().flatten();
-                (item, carriers())
+                (item, self.viewed.carriers(what))
             }
             Element::Publish(id) => (None, edge(self.viewed.publish.get(id))),
             Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id))),

@@ -41,35 +41,33 @@ impl WindowTurn {
     }
 
     /// An arrow appears and vanishes with its ends, unless it has events of its own.
-    pub(super) fn arrows(
+    pub(super) fn arrow(
         &self,
         viewed: &Viewed,
         now: &Now<'_>,
         items: &ById<ItemId, Marked>,
-    ) -> Vec<Option<Shown>> {
-        let arrow = |(id, arrow): (ArrowId, &super::Arrow)| {
-            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end));
-            let (from, to) = (from?, to?);
-            let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
-            let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
-            // A node that restarts keeps its arrows, even if it is away when the window ends.
-            let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
-            let is_kept = ends.iter().any(is_back);
-            let there = (self.before.arrows[id], self.after.arrows[id] || is_kept);
-            let reported = self.changed.arrows.get(&id).cloned();
-            let ends = ends.map(|end| Some((end.mark, &end.events[..])));
-            let reported = reported.or_else(|| with_ends(there, ends));
-            let shown = marked(shown, there, reported.as_ref())?;
-            if arrow.kind != ArrowKind::Bundle {
-                return Some(shown);
-            }
-            let inside = self.inside(&shown);
-            Some(Shown {
-                inside,
-                ..self.with_topics(viewed, now, arrow, shown)
-            })
-        };
-        viewed.arrows.with_ids().map(arrow).collect()
+        id: ArrowId,
+    ) -> Option<Shown> {
+        let arrow = viewed.arrows.get(id)?;
+        let [from, to] = [items.get(arrow.from)?, items.get(arrow.to)?];
+        let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
+        let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
+        // A node that restarts keeps its arrows, even if it is away when the window ends.
+        let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
+        let is_kept = ends.iter().any(is_back);
+        let there = (self.before.arrows[id], self.after.arrows[id] || is_kept);
+        let reported = self.changed.arrows.get(&id).cloned();
+        let ends = ends.map(|end| Some((end.mark, &end.events[..])));
+        let reported = reported.or_else(|| with_ends(there, ends));
+        let shown = marked(shown, there, reported.as_ref())?;
+        if arrow.kind != ArrowKind::Bundle {
+            return Some(shown);
+        }
+        let inside = self.inside(&shown);
+        Some(Shown {
+            inside,
+            ..self.with_topics(viewed, now, arrow, shown)
+        })
     }
 
     /// A changed bundle with the changes of its topics, unless it appeared or vanished as a whole.

@@ -61,8 +61,7 @@ pub(crate) fn drawn_part(
     let is_word: Vec<bool> = items.iter().map(|drawn| !drawn).collect();
     let words = filtered(&view.items, &is_word);
     let shown = filtered(&view.items_shown, &is_word);
-    let gone = items.ids().filter(|at| !items[*at]);
-    part.drop_items(&mut Vec::new(), &gone.collect());
+    part.keep_items(&items);
     let namespaces = cluster::clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
     Some(DrawnPart {
         view: View {
