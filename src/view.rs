@@ -66,7 +66,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let frames = frames::frames(mission, options, &viewed);
     let mut view = View {
         compares: mission.log.compares,
-        ..staged(viewed, options, frames)
+        ..assembled(viewed, options, frames)
     };
     if options.is_picture {
         crowds::gather(&mut view, mission);
@@ -77,10 +77,10 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
 /// The boxes, arrows and namespaces of [`view`] without the windows, to try whether they fit on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(mission, options);
-    staged(viewed, options, frames::Frames::default())
+    assembled(viewed, options, frames::Frames::default())
 }
 
-fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
+fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
     let mut list = frames.list;
     let mut drawn = cards::Drawn {
         items: viewed.items,

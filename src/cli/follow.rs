@@ -197,8 +197,8 @@ impl Follower<'_> {
 
     /// Prints the status messages of the connection.
     fn report(&self, terminal: &mut Terminal) {
-        let news = self.live.iter().flat_map(Live::news);
-        news.for_each(|text| terminal.status(&text));
+        let statuses = self.live.iter().flat_map(Live::new_statuses);
+        statuses.for_each(|text| terminal.status(&text));
     }
 
     /// Prints the new events; false if standard output was closed.
@@ -206,7 +206,7 @@ impl Follower<'_> {
         let (follow, feed, format) = (&self.follow, &mut self.feed, self.format);
         let lines = self.events.spend(terminal, || {
             let known = follow.so_far(MOST, Length::All)?;
-            Ok(known.map_or_else(Vec::new, |known| feed.news(&known, format)))
+            Ok(known.map_or_else(Vec::new, |known| feed.new_lines(&known, format)))
         });
         let mut lines = lines?;
         let more = lines.len().saturating_sub(MOST_LINES);
@@ -242,7 +242,7 @@ impl Follower<'_> {
             };
             let judged = expectation.as_ref().map(|expectation| {
                 let verdict = judge(expectation, &known.mission, false);
-                findings.news(&verdict, known.now, format)
+                findings.new_lines(&verdict, known.now, format)
             });
             if let Some(server) = server {
                 server.show(page(job, known.mission)?);

@@ -348,7 +348,7 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
-        source::rosout::settle(&mut self.facts);
+        source::rosout::interpret_lists(&mut self.facts);
         let Belief { span, jump } = believed(self.messages.days());
         self.notices
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));

@@ -59,7 +59,7 @@ type Watch = fn(&str, &mut Watched) -> io::Result<()>;
 pub(crate) struct Live {
     path: PathBuf,
     is_over: Arc<AtomicBool>,
-    news: Receiver<String>,
+    statuses: Receiver<String>,
     recorder: Option<JoinHandle<()>>,
     _folder: Temporary,
 }
@@ -110,7 +110,7 @@ impl Live {
         });
         let (file, heartbeat) = begun.map_err(Error::io("write", &path))?;
         let is_over = Arc::new(AtomicBool::new(false));
-        let (reported, news) = channel();
+        let (reported, statuses) = channel();
         let watched = Watched {
             file,
             heartbeat,
@@ -129,7 +129,7 @@ impl Live {
         Ok(Some(Self {
             path,
             is_over,
-            news,
+            statuses,
             recorder: Some(recorder),
             _folder: folder,
         }))
@@ -141,8 +141,8 @@ impl Live {
     }
 
     /// The connection's status messages since the last call.
-    pub(crate) fn news(&self) -> impl Iterator<Item = String> + '_ {
-        self.news.try_iter()
+    pub(crate) fn new_statuses(&self) -> impl Iterator<Item = String> + '_ {
+        self.statuses.try_iter()
     }
 
     /// Ends the recording and writes the file's summary.

@@ -114,20 +114,20 @@ struct ShownWindows<'a> {
     now: Now<'a>,
     turn: WindowTurn,
     member_lists: Vec<Vec<MemberState>>,
-    items: Cast<ItemId>,
-    arrows: Cast<ArrowId>,
+    items: LooksSoFar<ItemId>,
+    arrows: LooksSoFar<ArrowId>,
 }
 
 /// The items, or the arrows: the looks of each so far.
 #[derive(Default)]
-struct Cast<I> {
+struct LooksSoFar<I> {
     shown: ById<I, LooksWriter>,
     /// The ids of those with other numbers than in the previous window.
     touched: Vec<I>,
     is_touched: ById<I, bool>,
 }
 
-impl<I: Id> Cast<I> {
+impl<I: Id> LooksSoFar<I> {
     fn new<T>(all: &ById<I, T>) -> Self {
         Self {
             shown: all.iter().map(|_| LooksWriter::default()).collect(),
@@ -176,8 +176,8 @@ impl<'a> ShownWindows<'a> {
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
             member_lists: Vec::new(),
-            items: Cast::new(&viewed.items),
-            arrows: Cast::new(&viewed.arrows),
+            items: LooksSoFar::new(&viewed.items),
+            arrows: LooksSoFar::new(&viewed.arrows),
         }
     }
 
@@ -268,7 +268,7 @@ fn member_lists(
     after: &Alive,
     is_first: bool,
 ) -> Vec<Vec<MemberState>> {
-    let attendance = |elements: &Vec<Element>| {
+    let state = |elements: &Vec<Element>| {
         let is = |alive: &Alive| elements.iter().any(|e| alive.is(*e));
         match (is(before), is(after)) {
             (false, true) if is_first => MemberState::Here,
@@ -280,7 +280,7 @@ fn member_lists(
     };
     let fleets = viewed.fleets.all.iter();
     fleets
-        .map(|fleet| fleet.elements.iter().map(attendance).collect())
+        .map(|fleet| fleet.elements.iter().map(state).collect())
         .collect()
 }
 

@@ -88,7 +88,7 @@ impl Follower {
         if growth == Growth::More
             && let Some(known) = self.follow.so_far(u64::MAX, Length::All).unwrap()
         {
-            for line in self.feed.news(&known, LogFormat::Text) {
+            for line in self.feed.new_lines(&known, LogFormat::Text) {
                 self.printed += &line.text(None);
             }
         }

@@ -125,7 +125,7 @@ pub(super) fn observations(
 ) -> Vec<String> {
     let (mut collector, want) = receive(topic, kind, publisher, payload);
     assert_eq!(want, Want::Payload);
-    source::rosout::settle(&mut collector.facts);
+    source::rosout::interpret_lists(&mut collector.facts);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
     let facts = &collector.facts;
     let line = |observation: Observation| {
@@ -181,7 +181,7 @@ fn one_python_record_makes_a_node_one_of_rospy() {
         facts.add(0, said, Some(Stamp(5)));
     }
     facts.rospy.insert(script);
-    source::rosout::settle(&mut facts);
+    source::rosout::interpret_lists(&mut facts);
     let observations: Vec<Observation> = facts.list.iter().map(|fact| fact.observation).collect();
     assert_eq!(
         observations,

@@ -57,7 +57,7 @@ pub(crate) fn read(
 }
 
 /// Interprets the lists of roscpp nodes as lists of publications.
-pub(crate) fn settle(facts: &mut Observations) {
+pub(crate) fn interpret_lists(facts: &mut Observations) {
     let rospy = std::mem::take(&mut facts.rospy);
     for fact in &mut facts.list {
         if let Observation::Lists(node, topic) = fact.observation

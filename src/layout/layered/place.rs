@@ -17,7 +17,7 @@ pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Ve
     table.pack();
     for sweep in 0..SWEEPS {
         for rank in table.ranks(sweep) {
-            table.settle(table.row(rank), sweep, |_, place| place);
+            table.place_together(table.row(rank), sweep, |_, place| place);
         }
     }
     table.straighten_borders();
@@ -136,7 +136,12 @@ impl<'a> Table<'a> {
 
     /// Places items of a row together, as near to their goals (weighted squares) as the gaps between them allow, and each
     /// of them within `limits`.
-    fn settle(&mut self, together: Range<usize>, sweep: usize, limits: impl Fn(f64, f64) -> f64) {
+    fn place_together(
+        &mut self,
+        together: Range<usize>,
+        sweep: usize,
+        limits: impl Fn(f64, f64) -> f64,
+    ) {
         let mut monotone = std::mem::take(&mut self.monotone);
         let wishes = together.clone().map(|at| {
             let (goal, weight) = self.goal(at, sweep);
@@ -261,7 +266,7 @@ impl<'a> Table<'a> {
                     let low = low.map(|at| self.across[at] + self.gap[at]);
                     let high = self.after(stretch.end - 1);
                     let high = high.map(|at| self.across[at] - self.gap[at - 1]);
-                    self.settle(stretch.clone(), sweep, |offset, place| {
+                    self.place_together(stretch.clone(), sweep, |offset, place| {
                         let place = high.map_or(place, |high| place.min(high - (total - offset)));
                         low.map_or(place, |low| place.max(low + offset))
                     });

@@ -28,8 +28,8 @@ pub(crate) fn explain(
         if let Some(old) = at.checked_sub(1).map(|old| spans[old]) {
             let span = spans[at];
             structure(differ, span, elements, &turns, &mut list);
-            let news = Span::new(old.end.max(span.start), span.end);
-            list.extend(values(log, news));
+            let added = Span::new(old.end.max(span.start), span.end);
+            list.extend(values(log, added));
         }
         list.into_iter().unzip()
     };
@@ -129,9 +129,9 @@ fn structure(
 }
 
 /// The changes of a window in events that are not about existence: rates, hand-overs, restarts, values.
-fn values(log: &EventLog, news: Span) -> impl Iterator<Item = (Change, EventId)> + '_ {
+fn values(log: &EventLog, added: Span) -> impl Iterator<Item = (Change, EventId)> + '_ {
     let inside = log.events.with_ids().filter(move |(_, e)| {
-        news.contains(
+        added.contains(
             e.until
                 .filter(|_| e.kind == Kind::Restarted)
                 .unwrap_or(e.time),

@@ -56,7 +56,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
             watch: &mut *watch,
         };
         let report = reader.read(range, &mut one)?;
-        one.settle();
+        one.count_missing();
         lost.notices.extend(of_report(&report, &lost.notices));
         stop(watch)?;
     }
@@ -344,7 +344,7 @@ struct OfBag<'a> {
 
 impl OfBag<'_> {
     /// Counts announced messages that were not delivered.
-    fn settle(&mut self) {
+    fn count_missing(&mut self) {
         let mut reasons: BTreeMap<usize, &str> = BTreeMap::new();
         for (at, source) in self.sources.iter().enumerate() {
             match &source.table {

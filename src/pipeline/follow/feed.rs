@@ -81,7 +81,7 @@ const SURE_NS: i64 = CLOSING_NS;
 
 impl Feed {
     /// The new lines in `known`, in the order of the log.
-    pub fn news(&mut self, known: &SoFar, format: LogFormat) -> Vec<LogLine> {
+    pub fn new_lines(&mut self, known: &SoFar, format: LogFormat) -> Vec<LogLine> {
         let mission = &known.mission;
         // Elements that begin with the kept messages existed before.
         let from = known.from.plus(TOGETHER_NS);
@@ -202,7 +202,7 @@ pub(crate) struct FindingFeed {
 
 impl FindingFeed {
     /// The lines about findings that have become certain, and about those that no longer apply.
-    pub(crate) fn news(
+    pub(crate) fn new_lines(
         &mut self,
         verdict: &Verdict,
         now: Stamp,
