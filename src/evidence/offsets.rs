@@ -53,9 +53,12 @@ pub(crate) fn offsets(recorded: &Recorded) -> io::Result<Vec<ClockOffset>> {
             *time = time.filter(|time| *time == timed.time);
         })?;
     }
+    let filled = (0..bags.len()).filter(|bag| !bags[*bag].is_empty());
+    let filled: Vec<usize> = filled.collect();
     let mut found = Vec::new();
-    for bag in 1..bags.len() {
-        let apart = (0..bag).find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
+    for (at, bag) in filled.iter().copied().enumerate() {
+        let mut before = filled[..at].iter().copied();
+        let apart = before.find_map(|other| Some((other, apart(&bags[other], &bags[bag])?)));
         if let Some((other, (ahead, messages))) = apart
             && ahead.abs() > NEAR_NS
         {

@@ -21,7 +21,7 @@ pub(crate) type Traffic = BTreeMap<Name, Senders>;
 /// The senders of one topic.
 #[derive(Debug)]
 pub(crate) struct Senders {
-    /// The indices of the topic's streams.
+    /// The indices of the topic's streams, sorted.
     pub(crate) streams: Vec<usize>,
     /// The first and the last message of each stream; `None` without messages.
     pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
@@ -31,6 +31,13 @@ pub(crate) struct Senders {
     pub(crate) of: Vec<usize>,
     /// The longest pauses of all senders together.
     pub(crate) pauses: Vec<Span>,
+}
+
+impl Senders {
+    /// The place of a stream among those of the topic; there is one per file of a split recording.
+    pub(crate) fn place(&self, stream: usize) -> Option<usize> {
+        self.streams.binary_search(&stream).ok()
+    }
 }
 
 /// The messages of one sender on one topic, over all its streams: a split recording has one per part.

@@ -62,7 +62,7 @@ pub(crate) fn tracks(
                 let Some(senders) = traffic.get(&stream.topic) else {
                     continue;
                 };
-                let place = senders.streams.iter().position(|s| s == at).unwrap_or(0);
+                let place = senders.place(*at).unwrap_or(0);
                 let with = node.and_then(|node| forwarded.get(&(node, stream.topic)));
                 let (with_start, with_end) = with.copied().unwrap_or_default();
                 let topic = stream.connection.topic.as_str();
@@ -84,7 +84,7 @@ pub(crate) fn tracks(
             Validity::First(at) => {
                 let stream = &findings.streams[*at];
                 if let Some(senders) = traffic.get(&stream.topic)
-                    && let Some(place) = senders.streams.iter().position(|s| s == at)
+                    && let Some(place) = senders.place(*at)
                     && let Some((first, _)) = senders.traces[place]
                 {
                     track.bound_all(&[first], &[]);
@@ -193,10 +193,7 @@ fn confidence(inference: &Inference, findings: &Findings, traffic: &Traffic) -> 
         return inference.confidence;
     };
     let senders = traffic.get(&findings.streams[at].topic);
-    let sent = senders.and_then(|senders| {
-        let place = senders.streams.iter().position(|s| *s == at)?;
-        senders.traces[place]
-    });
+    let sent = senders.and_then(|senders| senders.traces[senders.place(at)?]);
     match sent {
         Some(_) => inference.confidence,
         None => inference.confidence.max(Confidence::Declared),
