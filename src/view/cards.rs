@@ -250,9 +250,6 @@ impl Drawn {
             }
         }
         self.keep_arrows(&stays);
-        for (looks, id) in self.arrows_shown.iter_mut().zip(0..) {
-            looks.renumber(id);
-        }
     }
 
     /// The arrow of a subscription; arrows are sorted by their ends.
@@ -265,12 +262,14 @@ impl Drawn {
         found.map(|(id, _)| id)
     }
 
-    fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
+    /// Removes all other arrows and renumbers those that stay.
+    pub(super) fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
         self.arrows.retain(|at| stays[at]);
         self.arrows_shown.retain(|at| stays[at]);
+        renumber(&mut self.arrows_shown);
     }
 
-    /// Removes all other boxes, to which no arrow may lead, and renumbers everything. Returns the new ids.
+    /// Removes all other boxes, to which no arrow may lead, and renumbers those that stay. Returns the new ids.
     pub(super) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
         let mut next = 0;
         let place = |stays: &bool| {
@@ -284,12 +283,15 @@ impl Drawn {
             arrow.from = places[arrow.from];
             arrow.to = places[arrow.to];
         }
-        for shown in [&mut *self.items_shown, &mut *self.arrows_shown] {
-            for (looks, id) in shown.iter_mut().zip(0..) {
-                looks.renumber(id);
-            }
-        }
+        renumber(&mut self.items_shown);
         places
+    }
+}
+
+/// Sets the ids of these looks to their indices.
+fn renumber(all: &mut [Looks]) {
+    for (looks, id) in all.iter_mut().zip(0..) {
+        looks.renumber(id);
     }
 }
 

@@ -68,12 +68,11 @@ impl Fleets {
         let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
         for spaces in described.chunk_by(|a, b| stem(a.0) == stem(b.0)) {
             let mut alike: BTreeMap<Inside, Vec<&str>> = BTreeMap::new();
-            let mut many = 0;
             for space in spaces.chunk_by(|a, b| a.0 == b.0) {
                 let inside = space.iter().map(|(_, what)| *what).collect();
                 alike.entry(inside).or_default().push(space[0].0);
-                many += 1;
             }
+            let many: usize = alike.values().map(Vec::len).sum();
             // The largest, or of several the one whose first name comes first; members that differ stay
             // beside it.
             let largest = alike.into_values().max_by_key(|m| (m.len(), Reverse(m[0])));

@@ -54,13 +54,14 @@ pub(crate) fn drawn_part(
     }
     let mut part = Drawn {
         items: view.items.clone(),
-        arrows: filtered(&view.arrows, &arrows).into(),
+        arrows: view.arrows.clone(),
         items_shown: view.items_shown.clone(),
-        arrows_shown: filtered(&view.arrows_shown, &arrows).into(),
+        arrows_shown: view.arrows_shown.clone(),
     };
     let is_word: Vec<bool> = items.iter().map(|drawn| !drawn).collect();
     let words = filtered(&view.items, &is_word);
     let shown = filtered(&view.items_shown, &is_word);
+    part.keep_arrows(&arrows);
     part.keep_items(&items);
     let namespaces = cluster::clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
     Some(DrawnPart {
