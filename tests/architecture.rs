@@ -16,7 +16,7 @@ const STATIONS: &[&str] = &[
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
-        &["budget", "cast", "columns", "ids", "leftovers", "rhythm", "words"],
+        &["budget", "cast", "columns", "ids", "leftovers", "rhythm", "runs", "varint", "words"],
         &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],

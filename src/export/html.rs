@@ -24,7 +24,7 @@ use crate::draw::text;
 use crate::draw::topic_timeline::Overview;
 use crate::export::sequence::Sequence;
 use crate::graph::Id as _;
-use crate::view::runs::{ElementRuns, Runs, at};
+use crate::view::runs::{ElementRuns, ViewRuns};
 use crate::view::{ArrowId, ItemId, View};
 
 const PAGE: &str = include_str!("html/player/page.html");
@@ -67,7 +67,7 @@ pub(crate) struct HtmlPage<'a> {
 pub(crate) struct PageGraph<'a> {
     pub view: &'a View,
     pub union: Union,
-    pub runs: Runs,
+    pub runs: ViewRuns,
     /// The arrows in painting order.
     pub order: Vec<ArrowId>,
 }
@@ -81,7 +81,7 @@ impl<'a> PageGraph<'a> {
             union.order.clone()
         };
         Self {
-            runs: Runs::of(view, rate_label),
+            runs: ViewRuns::of(view, rate_label),
             view,
             union,
             order,
@@ -310,20 +310,22 @@ fn timeline(overview: &Overview) -> String {
 
 /// The state of an element in one window.
 struct Still<'a> {
-    runs: &'a Runs,
+    runs: &'a ViewRuns,
     life: &'a ElementRuns,
     window: u32,
 }
 
 impl ElementLook for Still<'_> {
     fn class(&self) -> String {
-        self.runs.classes[at(&self.life.classes, self.window) as usize].clone()
+        let class = self.life.classes.at(self.window).unwrap_or(0);
+        self.runs.classes[class as usize].clone()
     }
 
     fn text(&self) -> String {
         let lists = [&self.life.lifecycles, &self.life.rates];
-        let list = lists[usize::from(lists[0].is_empty())];
-        self.runs.labels[at(list, self.window) as usize].clone()
+        let list = lists[usize::from(lists[0].0.is_empty())];
+        let label = list.at(self.window).unwrap_or(0);
+        self.runs.labels[label as usize].clone()
     }
 }
 

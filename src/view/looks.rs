@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Mark, Members, Shown, sum};
+use crate::base::runs::Runs;
 use crate::evidence::Confidence;
 use crate::graph::State;
 
@@ -65,8 +66,8 @@ impl TopicRow {
 pub struct Looks {
     /// Each look only once unless it is marked.
     distinct: Vec<Shown>,
-    /// Pairs of a window and the index of the look from then on, or [`AWAY`]; sorted.
-    runs: Vec<(u32, u32)>,
+    /// The index of the look, or [`AWAY`].
+    runs: Runs<u32>,
 }
 
 /// The index that means absence.
@@ -75,9 +76,8 @@ const AWAY: u32 = u32::MAX;
 impl Looks {
     /// The look in a window; `None` if it is absent.
     pub fn at(&self, window: usize) -> Option<&Shown> {
-        let after = self.runs.partition_point(|run| run.0 as usize <= window);
-        let (_, look) = self.runs.get(after.checked_sub(1)?)?;
-        self.distinct.get(*look as usize)
+        let look = self.runs.at(u32::try_from(window).unwrap_or(u32::MAX))?;
+        self.distinct.get(look as usize)
     }
 
     /// Every look that it ever has, in no particular order.
@@ -89,7 +89,8 @@ impl Looks {
     /// first of these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
         let look = |place: u32| self.distinct.get(place as usize);
-        self.runs.iter().map(move |run| (run.0, look(run.1)))
+        let runs = self.runs.0.iter();
+        runs.map(move |(window, place)| (*window, look(*place)))
     }
 
     /// Sets the id of all its looks.
@@ -100,7 +101,7 @@ impl Looks {
     }
 
     /// The windows from which its looks apply, with the index of each look or [`AWAY`].
-    pub(super) fn places(&self) -> &[(u32, u32)] {
+    pub(super) fn places(&self) -> &Runs<u32> {
         &self.runs
     }
 
@@ -178,14 +179,11 @@ impl LooksWriter {
 
     /// Adds the index of the look from this window on.
     pub(super) fn turn(&mut self, window: u32, place: u32) {
-        let runs = &mut self.looks.runs;
-        if runs.last().map_or(AWAY, |last| last.1) != place {
-            runs.push((window, place));
-        }
+        self.looks.runs.push(window, place, AWAY);
     }
 
     pub(super) fn finish(mut self) -> Looks {
-        self.looks.runs.shrink_to_fit();
+        self.looks.runs.0.shrink_to_fit();
         self.looks.distinct.shrink_to_fit();
         self.looks
     }
@@ -278,7 +276,7 @@ mod tests {
         let (slow, fast) = (shown(1.0, None), shown(2.0, None));
         let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
         let looks = Looks::of(all.map(Option::as_ref));
-        assert_eq!((looks.distinct().len(), looks.places().len()), (2, 2));
+        assert_eq!((looks.distinct().len(), looks.places().0.len()), (2, 2));
     }
 
     #[test]

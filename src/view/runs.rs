@@ -7,41 +7,33 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Serialize, Serializer};
 
 use crate::base::cast;
+use crate::base::runs::Runs;
 use crate::base::words;
 use crate::evidence::Confidence;
 use crate::graph::State;
 use crate::view::{Arrow, Looks, Mark, Shown, TopicRow, View};
 
-/// A value of a table that applies from a window on, until the next run of the same list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Run {
-    /// The first window: an index into [`View::frames`].
-    pub from: u32,
-    /// The value: an index into the table.
-    pub value: u32,
-}
-
-/// The values of one item or arrow over the windows. Lists are sorted by window; before its first run a list has value
-/// 0.
+/// The values of one item or arrow over the windows (indices into [`View::frames`]); before its first run a list has
+/// value 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ElementRuns {
-    /// Its class words: indices into [`Runs::classes`].
-    pub classes: Vec<Run>,
-    /// Its rate: indices into [`Runs::labels`]. While it is absent, the last value stays.
-    pub rates: Vec<Run>,
-    /// Its lifecycle state: indices into [`Runs::labels`]. While it is absent, the last value stays.
-    pub lifecycles: Vec<Run>,
-    /// Windows in which its rate changed, each with the old and the new rate: indices into [`Runs::labels`].
+    /// Its class words: indices into [`ViewRuns::classes`].
+    pub classes: Runs<u32>,
+    /// Its rate: indices into [`ViewRuns::labels`]. While it is absent, the last value stays.
+    pub rates: Runs<u32>,
+    /// Its lifecycle state: indices into [`ViewRuns::labels`]. While it is absent, the last value stays.
+    pub lifecycles: Runs<u32>,
+    /// Windows in which its rate changed, each with the old and the new rate: indices into [`ViewRuns::labels`].
     /// Such a value applies to one window.
-    pub turns: Vec<Run>,
-    /// Its messages per second in each window, as decimal numbers: indices into [`Runs::labels`]. While it is absent,
+    pub turns: Runs<u32>,
+    /// Its messages per second in each window, as decimal numbers: indices into [`ViewRuns::labels`]. While it is absent,
     /// the last value stays.
-    pub hertz: Vec<Run>,
+    pub hertz: Runs<u32>,
 }
 
 /// The whole sequence of a view as runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Runs {
+pub(crate) struct ViewRuns {
     /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`:
     /// absent.
     pub classes: Vec<String>,
@@ -53,13 +45,7 @@ pub(crate) struct Runs {
     pub arrows: Vec<ElementRuns>,
 }
 
-/// The value of a list in a window, 0 before its first run.
-pub(crate) fn at(list: &[Run], window: u32) -> u32 {
-    let after = list.partition_point(|run| run.from <= window);
-    after.checked_sub(1).map_or(0, |last| list[last].value)
-}
-
-impl Runs {
+impl ViewRuns {
     /// The runs of a view. `label` writes the rate of an element in a window, and the topics that an arrow carries;
     /// empty for none.
     pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
@@ -79,9 +65,10 @@ impl Runs {
         let mut arrows = runs(&view.arrows_shown, Some(&view.arrows));
         // The most frequent value gets the shortest number.
         let both = || items.iter().chain(&arrows);
-        let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes));
-        let texts = |l: &'_ ElementRuns| [&l.rates[..], &l.lifecycles, &l.turns, &l.hertz].concat();
-        let all_texts: Vec<Run> = both().flat_map(texts).collect();
+        let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes.0));
+        let texts =
+            |l: &'_ ElementRuns| [&l.rates.0[..], &l.lifecycles.0, &l.turns.0, &l.hertz.0].concat();
+        let all_texts: Vec<(u32, u32)> = both().flat_map(texts).collect();
         let new_labels = labels.by_frequency(&all_texts);
         for life in items.iter_mut().chain(&mut arrows) {
             renumber(&mut life.classes, &new_classes);
@@ -101,7 +88,7 @@ impl Runs {
     }
 }
 
-impl Runs {
+impl ViewRuns {
     /// All class words that occur.
     pub(crate) fn words(&self) -> BTreeSet<&str> {
         self.classes
@@ -194,10 +181,10 @@ impl<T: Ord + Clone> ValueTable<T> {
     }
 
     /// The new index of each old one: the first stays, then by frequency, then by age.
-    fn by_frequency<'a>(&self, runs: impl IntoIterator<Item = &'a Run>) -> Vec<u32> {
+    fn by_frequency<'a>(&self, runs: impl IntoIterator<Item = &'a (u32, u32)>) -> Vec<u32> {
         let mut uses = vec![0_u64; self.places.len()];
-        for run in runs {
-            uses[run.value as usize] += 1;
+        for (_, value) in runs {
+            uses[*value as usize] += 1;
         }
         let mut order: Vec<usize> = (0..uses.len()).collect();
         order.sort_by_key(|old| (*old > 0, Reverse(uses[*old])));
@@ -217,9 +204,9 @@ impl<T: Ord + Clone> ValueTable<T> {
     }
 }
 
-fn renumber(list: &mut [Run], new: &[u32]) {
-    for run in list {
-        run.value = new[run.value as usize];
+fn renumber(runs: &mut Runs<u32>, new: &[u32]) {
+    for (_, value) in &mut runs.0 {
+        *value = new[*value as usize];
     }
 }
 
@@ -240,18 +227,18 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
         let mut last_hz = None;
         for (window, shown) in looks.runs() {
             let Some(shown) = shown else {
-                push(&mut life.classes, window, 0);
+                life.classes.push(window, 0, 0);
                 continue;
             };
             let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
             let class = self.classes.place(Some(LookClass::of(shown, arrow)));
-            push(&mut life.classes, window, class);
+            life.classes.push(window, class, 0);
             let each = shown.hz.map(|hz| hz / shown.each.max(1) as f64);
             let number = *numbers.entry(each.map(f64::to_bits)).or_insert_with(|| {
                 let text = each.map(|hz| words::significant(hz, 6).to_string());
                 self.labels.place(text.unwrap_or_default())
             });
-            push(&mut life.hertz, window, number);
+            life.hertz.push(window, number, 0);
             if shown.mark == Some(Mark::Removed) {
                 continue;
             }
@@ -259,18 +246,17 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 let rows: Vec<_> = shown.topics.iter().map(TopicRow::key).collect();
                 (hz.to_bits(), count, shown.each, rows)
             });
-            if hz != last_hz || (life.rates.is_empty() && arrow.is_some()) {
+            if hz != last_hz || (life.rates.0.is_empty() && arrow.is_some()) {
                 last_hz.clone_from(&hz);
                 let place = known.entry(hz).or_insert_with(|| {
                     let text = (self.label)(shown, arrow);
                     self.labels.place(text)
                 });
-                push(&mut life.rates, window, *place);
+                life.rates.push(window, *place, 0);
             }
             if let Some((before, now)) = shown.rates {
                 let value = self.labels.place(words::rate_change(before, now));
-                let from = window;
-                life.turns.push(Run { from, value });
+                life.turns.0.push((window, value));
             }
             let members = shown
                 .members
@@ -278,38 +264,17 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 .map(|(n, word)| words::count(n, word));
             let lifecycle = shown.lifecycle.as_deref().or(members.as_deref());
             let lifecycle = lifecycle.unwrap_or_default();
-            if !lifecycle.is_empty() || !life.lifecycles.is_empty() {
+            if !lifecycle.is_empty() || !life.lifecycles.0.is_empty() {
                 let place = self.labels.place(lifecycle.to_owned());
-                push(&mut life.lifecycles, window, place);
+                life.lifecycles.push(window, place, 0);
             }
         }
         life
     }
 }
 
-/// Adds a value unless it equals the last one.
-fn push(list: &mut Vec<Run>, window: u32, value: u32) {
-    if list.last().map_or(0, |last| last.value) != value {
-        list.push(Run {
-            from: window,
-            value,
-        });
-    }
-}
-
-/// A list as flat numbers: windows since the previous run, value, windows since, value, …
-pub(crate) fn flat(list: &[Run]) -> Vec<u32> {
-    let mut before = 0;
-    let mut out = Vec::with_capacity(list.len() * 2);
-    for run in list {
-        out.extend([run.from - before, run.value]);
-        before = run.from;
-    }
-    out
-}
-
 impl Serialize for ElementRuns {
-    /// `[classes, rates, lifecycles, turns, hertz]`, each [`flat`]; empty lists at the end are left out.
+    /// `[classes, rates, lifecycles, turns, hertz]`, each [flat](Runs::flat); empty lists at the end are left out.
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let lists = [
             &self.classes,
@@ -318,9 +283,9 @@ impl Serialize for ElementRuns {
             &self.turns,
             &self.hertz,
         ];
-        let reported = lists.iter().rposition(|list| !list.is_empty());
+        let reported = lists.iter().rposition(|list| !list.0.is_empty());
         let lists = &lists[..reported.map_or(0, |last| last + 1)];
-        let all: Vec<Vec<u32>> = lists.iter().map(|list| flat(list)).collect();
+        let all: Vec<Vec<u32>> = lists.iter().map(|list| list.flat()).collect();
         all.serialize(to)
     }
 }
@@ -334,7 +299,7 @@ mod tests {
     /// One element over the windows: present with this mark and rate, or absent.
     type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
 
-    fn runs(story: Story<'_>) -> Runs {
+    fn runs(story: Story<'_>) -> ViewRuns {
         let shown = |there: &Option<(Option<Mark>, f64)>| {
             there.map(|(mark, hz)| Shown {
                 mark,
@@ -357,14 +322,14 @@ mod tests {
             arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))].into(),
             ..View::default()
         };
-        Runs::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
+        ViewRuns::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
     }
 
-    fn reported(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
+    fn reported(runs: &ViewRuns, windows: u32) -> Vec<(&str, &str)> {
         let life = &runs.arrows[0];
         let add = |w| {
-            let class = &runs.classes[at(&life.classes, w) as usize];
-            let label = &runs.labels[at(&life.rates, w) as usize];
+            let class = &runs.classes[life.classes.at(w).unwrap_or(0) as usize];
+            let label = &runs.labels[life.rates.at(w).unwrap_or(0) as usize];
             (class.as_str(), label.as_str())
         };
         (0..windows).map(add).collect()
@@ -418,8 +383,8 @@ mod tests {
         let label = |shown: &Shown, _: Option<&Arrow>| {
             format!("{:.1}", shown.written_rate().map_or(0.0, |rate| rate.0))
         };
-        let runs = Runs::of(&view, label);
-        let text = |list, w| &*runs.labels[at(list, w) as usize];
+        let runs = ViewRuns::of(&view, label);
+        let text = |list: &Runs<u32>, w| &*runs.labels[list.at(w).unwrap_or(0) as usize];
         let [item] = &runs.items[..] else { panic!() };
         assert_eq!(
             [0, 1, 2].map(|w| text(&item.rates, w)),
@@ -433,12 +398,5 @@ mod tests {
         let (slow, fast) = (Some((None, 1.0)), Some((None, 1000.0)));
         let runs = runs(&[slow, None, fast, None, fast, None, fast]);
         assert_eq!(runs.classes, ["off", "active w6", "active w1"]);
-    }
-
-    #[test]
-    fn lists_are_written_as_steps() {
-        let list = [(3, 1), (10, 0), (12, 5)].map(|(from, value)| Run { from, value });
-        assert_eq!(flat(&list), [3, 1, 7, 0, 2, 5]);
-        assert_eq!([2, 3, 11, 99].map(|w| at(&list, w)), [0, 1, 0, 5]);
     }
 }

@@ -88,9 +88,7 @@ pub(crate) fn stable(raw: &Looks, lengths: &Lengths) -> Looks {
 }
 
 fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
-    let ends = raw.places().iter().skip(1).map(|next| next.0);
-    let all = raw.places().iter().zip(ends.chain([windows]));
-    let run = |(&(from, place), to): (&(u32, u32), u32)| {
+    let run = |(from, to, place): (u32, u32, u32)| {
         let shown = raw.distinct().get(place as usize)?;
         Some(LookRun {
             from,
@@ -102,7 +100,7 @@ fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
             held: None,
         })
     };
-    all.filter_map(run).collect()
+    raw.places().spans(windows).filter_map(run).collect()
 }
 
 impl PresentLife {

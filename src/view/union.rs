@@ -20,11 +20,9 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 
 /// The look of one item or arrow in all windows together.
 fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
-    let ends = looks.runs().skip(1).map(|next| next.0);
-    let ends = ends.chain([lengths.windows()]);
     let mut slot = None;
-    for ((from, shown), to) in looks.runs().zip(ends) {
-        if let Some(shown) = shown {
+    for (from, to, place) in looks.places().spans(lengths.windows()) {
+        if let Some(shown) = looks.distinct().get(place as usize) {
             gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
         }
     }

@@ -1,6 +1,7 @@
 //! A sorted run of stamps as bytes: differences as variable-length numbers, then the sizes.
 
 use crate::base::time::Stamp;
+use crate::base::varint::{put, take};
 
 /// Writes sorted stamps with their sizes.
 pub(super) fn encode(run: &[(Stamp, u32)]) -> Vec<u8> {
@@ -20,40 +21,21 @@ pub(super) fn encode(run: &[(Stamp, u32)]) -> Vec<u8> {
 }
 
 /// Reads `count` stamps back; sizes are 0 if none were written.
-pub(super) fn decode(bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
-    let mut at = 0;
+pub(super) fn decode(mut bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
     let mut before = 0_i64;
     let mut run = Vec::with_capacity(count);
     for _ in 0..count {
-        before = before.wrapping_add(take(bytes, &mut at).cast_signed());
+        before = before.wrapping_add(number(&mut bytes).cast_signed());
         run.push((Stamp(before), 0));
     }
-    if at < bytes.len() {
+    if !bytes.is_empty() {
         for (_, size) in &mut run {
-            *size = u32::try_from(take(bytes, &mut at)).unwrap_or(u32::MAX);
+            *size = u32::try_from(number(&mut bytes)).unwrap_or(u32::MAX);
         }
     }
     run
 }
 
-/// Seven bits per byte, least significant first, the top bit set on all but the last.
-fn put(bytes: &mut Vec<u8>, mut number: u64) {
-    while number >= 0x80 {
-        bytes.push((number & 0x7f) as u8 | 0x80);
-        number >>= 7;
-    }
-    bytes.push((number & 0x7f) as u8);
-}
-
-fn take(bytes: &[u8], at: &mut usize) -> u64 {
-    let mut number = 0;
-    for shift in (0..64).step_by(7) {
-        let Some(byte) = bytes.get(*at) else { break };
-        *at += 1;
-        number |= u64::from(byte & 0x7f) << shift;
-        if byte & 0x80 == 0 {
-            break;
-        }
-    }
-    number
+fn number(bytes: &mut &[u8]) -> u64 {
+    u64::try_from(take(bytes)).unwrap_or(0)
 }

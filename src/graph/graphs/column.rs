@@ -2,6 +2,7 @@
 //! changes, and the differences from the previous window.
 
 use super::row::{Number, Row};
+use crate::base::varint::{put, take};
 use crate::evidence::Confidence;
 use crate::graph::State;
 
@@ -236,28 +237,6 @@ impl ColumnCursor<'_> {
             row.age = take_number(bytes, &mut halves[4]);
         }
     }
-}
-
-/// Writes a number with seven bits a byte, the lowest first.
-fn put(bytes: &mut Vec<u8>, value: impl Into<u128>) {
-    let mut value = value.into();
-    while value >= 0x80 {
-        bytes.push(value.to_le_bytes()[0] | 0x80);
-        value >>= 7;
-    }
-    bytes.push(value.to_le_bytes()[0]);
-}
-
-fn take(bytes: &mut &[u8]) -> u128 {
-    let mut value = 0;
-    for shift in (0..128).step_by(7) {
-        let byte = take_byte(bytes);
-        value |= u128::from(byte & 0x7F) << shift;
-        if byte < 0x80 {
-            break;
-        }
-    }
-    value
 }
 
 fn count(bytes: &mut &[u8]) -> u64 {
