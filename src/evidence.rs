@@ -28,7 +28,7 @@ pub(crate) mod values;
 
 pub use kinds::Evidence;
 pub use observation::{Confidence, EvidenceLine};
-pub(crate) use source::Source;
+pub use source::Source;
 
 use message::{definition, parameters};
 use source::Read::{Log, Parameters, Payload};

@@ -40,9 +40,10 @@ use std::path::{Path, PathBuf};
 use crate::base::error::{Error, Result};
 
 use self::still::StillKind;
+pub(crate) use encoder::Pack;
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
-pub(crate) use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Pack, Packet};
+pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
 pub(crate) use encoder::{Single, single};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
 use sequence::Sequence;
@@ -212,7 +213,7 @@ fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn 
 #[derive(Clone, Debug)]
 pub struct Output {
     /// The format.
-    pub format: &'static OutputFormat,
+    pub(crate) format: &'static OutputFormat,
     /// The file or files, or standard output.
     pub target: Target,
 }

@@ -10,7 +10,7 @@ pub mod base {
 pub mod evidence {
     #[cfg(feature = "source")]
     pub use crate::evidence::code;
-    pub use crate::evidence::{Confidence, Evidence, EvidenceLine, SOURCES};
+    pub use crate::evidence::{Confidence, Evidence, EvidenceLine, SOURCES, Source};
     pub use crate::evidence::{collector, conclude, topology};
 }
 
@@ -33,8 +33,9 @@ pub mod mission {
 #[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
-        ArrowId, CardRow, Counts, Frame, Headline, ItemId, Looks, Mark, SeenWindow, Shown, View,
-        ViewOptions, view,
+        AlsoHere, Arrow, ArrowId, ArrowKind, CardRow, Collapsible, Counts, Crowd, Frame, Headline,
+        Item, ItemId, ItemKind, Lasting, Looks, Mark, MemberState, Members, Namespace, Phrase,
+        SeenWindow, Shown, TopicRow, View, ViewOptions, view,
     };
 }
 
@@ -61,7 +62,12 @@ pub mod draw {
 /// See `src/export.rs`.
 #[cfg(feature = "render")]
 pub mod export {
-    pub use crate::export::{FORMATS, Output, Written, options, run, sequence};
+    pub use crate::export::palette::{Area, Palette};
+    pub use crate::export::tables::TableFormat;
+    pub use crate::export::{
+        DrawnFrame, Encoder, FORMATS, Needs, OneDrawing, Output, OutputFormat, Packet, Written,
+        options, run, sequence,
+    };
 }
 
 /// See `src/pipeline.rs`.

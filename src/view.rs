@@ -44,20 +44,18 @@ use crate::graph::{ById, Element};
 use crate::mission::Mission;
 
 pub use cards::CardRow;
-pub(crate) use collapse::{Collapsible, headlines};
-pub(crate) use crowds::Crowd;
-pub(crate) use filter::NameFilter;
+pub use collapse::Collapsible;
+pub(crate) use collapse::headlines;
+pub use crowds::Crowd;
+pub use filter::NameFilter;
 pub(crate) use filtered::filtered;
-pub(crate) use frame::Phrase;
-pub use frame::{Frame, Headline};
-pub(crate) use lasting::Lasting;
-pub use looks::Looks;
-pub(crate) use looks::TopicRow;
+pub use frame::{Frame, Headline, Phrase};
+pub use lasting::Lasting;
+pub use looks::{Looks, TopicRow};
 pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
-pub(crate) use shown::Members;
 use shown::sum;
-pub use shown::{Mark, Shown};
+pub use shown::{Mark, Members, Shown};
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {

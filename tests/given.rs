@@ -477,3 +477,41 @@ fn one_query_counts_bags_without_nodes_and_with_nodes_missing() {
     let counts = db.query_row(query, [], |row| Ok((row.get(0)?, row.get(1)?)));
     assert_eq!(counts, Ok((2, 2)), "{survey}");
 }
+
+/// What `--topology`, `--source` and `--font` set, set from Rust.
+#[test]
+fn a_program_gives_a_topology_source_code_and_a_font() {
+    use bagreel::values::{Fonts, SourceCode, Version, topology};
+    use bagreel::{Output, Reading, Render, read, render};
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let table = "Name,Publish,Subscribe,Node-start,Node-end\n/logger,[],['/scan'],0,10\n";
+    fs::write(file("graph.csv"), table).unwrap();
+    let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut reading = Reading::of([project.join("examples/courier.mcap")]);
+    let is_logger = |mission: &bagreel::Mission| {
+        let mut nodes = mission.elements.nodes.iter();
+        nodes.any(|node| node.name.as_str() == "/logger")
+    };
+    assert!(!is_logger(&read(&reading).unwrap()));
+    reading.conclude.topology = topology::read(&file("graph.csv")).unwrap();
+    reading.code = Some(SourceCode {
+        folder: file("missing"),
+        version: Version::Worktree,
+        infers: false,
+    });
+    assert!(read(&reading).is_err(), "the folder does not exist");
+    reading.code.as_mut().unwrap().folder = folder.path().to_owned();
+    assert!(is_logger(&read(&reading).unwrap()));
+
+    let picture = Output::named(file("graph.svg").as_os_str(), None).unwrap();
+    let mut job = Render::new(reading, vec![picture]).unwrap();
+    let font = project.join("styles/fonts/Inter-Regular.ttf");
+    let fonts = Fonts::bundled().with(fs::read(&font).unwrap(), &font);
+    job.drawing.fonts = fonts.unwrap();
+    assert_eq!(job.drawing.fonts.files().count(), 3);
+    assert_eq!(render(&job).unwrap().written[0].files, 1);
+    let picture = fs::read_to_string(file("graph.svg")).unwrap();
+    assert!(picture.contains("/logger"), "{picture}");
+}

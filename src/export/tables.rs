@@ -18,7 +18,7 @@ use crate::export::target::{Target, is_special};
 #[cfg(feature = "arrow")]
 use crate::mission::Mission;
 use mission::{RowTaker, TABLES, Table};
-pub(crate) use writer::TableFormat;
+pub use writer::TableFormat;
 use writer::Writer;
 
 /// Checks whether several files can be derived from this name.
