@@ -123,33 +123,13 @@ pub mod values {
     //! The types used by those of the front page: times and names, the elements of a graph, the events of a
     //! log, and options.
 
-    #[cfg(feature = "render")]
-    pub use crate::base::geometry::{Point, Rect, Size};
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Moment, Period, Span, Stamp};
-    #[cfg(feature = "render")]
-    pub use crate::draw::figure::{FigureKind, FigureOptions, RowKind};
-    #[cfg(feature = "render")]
-    pub use crate::draw::picture::PageOptions;
-    #[cfg(feature = "render")]
-    pub use crate::draw::strip::Choice;
-    #[cfg(feature = "render")]
-    pub use crate::draw::style::Color;
-    #[cfg(feature = "render")]
-    pub use crate::draw::text::{Fonts, Weight};
     #[cfg(feature = "source")]
     pub use crate::evidence::code::{SourceCode, Version};
     pub use crate::evidence::collector::{CollectOptions, Recorded};
     pub use crate::evidence::{Confidence, Evidence, EvidenceLine, conclude, topology};
-    #[cfg(feature = "render")]
-    pub use crate::export::Written;
-    #[cfg(feature = "render")]
-    pub use crate::export::options::{Profile, SequenceOptions};
-    #[cfg(feature = "render")]
-    pub use crate::export::tables::TableFormat;
-    #[cfg(feature = "render")]
-    pub use crate::export::target::Target;
     pub use crate::graph::diff::ValueKind;
     pub use crate::graph::history::{Bound, Life, Sender, Sending, Stretch};
     pub use crate::graph::window::{Align, Cut, Division, Length};
@@ -157,8 +137,6 @@ pub mod values {
         ById, Edge, EdgeId, Element, ElementState, Elements, Existence, Graphs, GraphsIter, Id,
         Measures, Node, NodeId, NodeLoad, State, Topic, TopicId,
     };
-    #[cfg(feature = "render")]
-    pub use crate::layout::{Engine, Orientation};
     pub use crate::mission::event_log::{
         Detail, Event, EventId, Interruption, InterruptionKind, Kind, Phase,
     };
@@ -166,11 +144,23 @@ pub mod values {
         BagInfo, ConfidenceCounts, EvidenceInfo, FigureInfo, NodeInfo, SurveyRow, TopicInfo,
     };
     pub use crate::mission::{JsonForm, Place, Places};
-    #[cfg(feature = "render")]
-    pub use crate::pipeline::{Body, Drawing, Purpose};
     pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};
     #[cfg(feature = "render")]
-    pub use crate::view::{Grouping, Hide, LineWidth, Mode, NameFilter, ViewOptions};
+    pub use crate::{
+        base::geometry::{Point, Rect, Size},
+        draw::figure::{FigureKind, FigureOptions, RowKind},
+        draw::picture::PageOptions,
+        draw::strip::Choice,
+        draw::style::Color,
+        draw::text::{Fonts, Weight},
+        export::Written,
+        export::options::{Profile, SequenceOptions},
+        export::tables::TableFormat,
+        export::target::Target,
+        layout::{Engine, Orientation},
+        pipeline::{Body, Drawing, Purpose},
+        view::{Grouping, Hide, LineWidth, Mode, NameFilter, ViewOptions},
+    };
 }
 
 #[cfg(feature = "render")]

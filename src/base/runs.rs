@@ -51,6 +51,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn runs_are_written_as_steps() {
+        let runs = Runs(vec![(3, 1), (10, 0), (12, 5)]);
+        assert_eq!(runs.flat(), [3, 1, 7, 0, 2, 5]);
+        let values = [2, 3, 11, 99].map(|window| runs.at(window));
+        assert_eq!(values, [None, Some(1), Some(0), Some(5)]);
+    }
+
+    #[test]
     fn equal_values_are_one_run() {
         let mut runs = Runs::default();
         for (window, value) in (0..).zip([0, 0, 0, 1, 1, 0, 5]) {

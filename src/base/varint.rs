@@ -10,6 +10,11 @@ pub(crate) fn put(bytes: &mut Vec<u8>, number: impl Into<u128>) {
     bytes.push((number & 0x7f) as u8);
 }
 
+/// Takes a number of up to 64 bits from the front; 0 if it is larger, or if there are no more bytes.
+pub(crate) fn take_u64(bytes: &mut &[u8]) -> u64 {
+    u64::try_from(take(bytes)).unwrap_or(0)
+}
+
 /// Takes a number from the front; 0 if there are no more bytes.
 pub(crate) fn take(bytes: &mut &[u8]) -> u128 {
     let mut number = 0;
@@ -41,5 +46,8 @@ mod tests {
         assert_eq!(numbers.map(|_| take(&mut rest)), numbers);
         assert_eq!((rest, take(&mut rest)), (&[][..], 0));
         assert_eq!(take(&mut &[0x80, 0x80][..]), 0);
+        let mut rest = &bytes[..];
+        let small = numbers.map(|number| u64::try_from(number).unwrap_or(0));
+        assert_eq!(numbers.map(|_| take_u64(&mut rest)), small);
     }
 }

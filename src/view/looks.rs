@@ -100,9 +100,11 @@ impl Looks {
         }
     }
 
-    /// The windows from which its looks apply, with the index of each look or [`AWAY`].
-    pub(super) fn places(&self) -> &Runs<u32> {
-        &self.runs
+    /// Its looks in order, each with its first window, the first window after it, and its index; the last applies to the
+    /// end of all `windows`.
+    pub(super) fn spans(&self, windows: u32) -> impl Iterator<Item = (u32, u32, u32, &Shown)> {
+        let look = |(from, to, place)| Some((from, to, place, self.distinct.get(place as usize)?));
+        self.runs.spans(windows).filter_map(look)
     }
 
     /// The looks in the windows of a sequence, one event per window.
@@ -276,7 +278,7 @@ mod tests {
         let (slow, fast) = (shown(1.0, None), shown(2.0, None));
         let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
         let looks = Looks::of(all.map(Option::as_ref));
-        assert_eq!((looks.distinct().len(), looks.places().0.len()), (2, 2));
+        assert_eq!((looks.distinct().len(), looks.runs().count()), (2, 2));
     }
 
     #[test]

@@ -88,19 +88,17 @@ pub(crate) fn stable(raw: &Looks, lengths: &Lengths) -> Looks {
 }
 
 fn runs(raw: &Looks, windows: u32) -> Vec<LookRun<'_>> {
-    let run = |(from, to, place): (u32, u32, u32)| {
-        let shown = raw.distinct().get(place as usize)?;
-        Some(LookRun {
-            from,
-            to,
-            place,
-            shown,
-            look: (shown.state, shown.confidence),
-            steady_hz: None,
-            held: None,
-        })
-    };
-    raw.places().spans(windows).filter_map(run).collect()
+    let runs = raw.spans(windows);
+    let runs = runs.map(|(from, to, place, shown)| LookRun {
+        from,
+        to,
+        place,
+        shown,
+        look: (shown.state, shown.confidence),
+        steady_hz: None,
+        held: None,
+    });
+    runs.collect()
 }
 
 impl PresentLife {

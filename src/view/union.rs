@@ -21,10 +21,8 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 /// The look of one item or arrow in all windows together.
 fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
     let mut slot = None;
-    for (from, to, place) in looks.places().spans(lengths.windows()) {
-        if let Some(shown) = looks.distinct().get(place as usize) {
-            gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
-        }
+    for (from, to, _, shown) in looks.spans(lengths.windows()) {
+        gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
     }
     let time = lengths.of(0, lengths.windows());
     let average = |sum: f64| if time > 0.0 { sum / time } else { 0.0 };

@@ -1,7 +1,7 @@
 //! A sorted run of stamps as bytes: differences as variable-length numbers, then the sizes.
 
 use crate::base::time::Stamp;
-use crate::base::varint::{put, take};
+use crate::base::varint::{put, take_u64};
 
 /// Writes sorted stamps with their sizes.
 pub(super) fn encode(run: &[(Stamp, u32)]) -> Vec<u8> {
@@ -25,17 +25,13 @@ pub(super) fn decode(mut bytes: &[u8], count: usize) -> Vec<(Stamp, u32)> {
     let mut before = 0_i64;
     let mut run = Vec::with_capacity(count);
     for _ in 0..count {
-        before = before.wrapping_add(number(&mut bytes).cast_signed());
+        before = before.wrapping_add(take_u64(&mut bytes).cast_signed());
         run.push((Stamp(before), 0));
     }
     if !bytes.is_empty() {
         for (_, size) in &mut run {
-            *size = u32::try_from(number(&mut bytes)).unwrap_or(u32::MAX);
+            *size = u32::try_from(take_u64(&mut bytes)).unwrap_or(u32::MAX);
         }
     }
     run
-}
-
-fn number(bytes: &mut &[u8]) -> u64 {
-    u64::try_from(take(bytes)).unwrap_or(0)
 }

@@ -2,7 +2,7 @@
 //! changes, and the differences from the previous window.
 
 use super::row::{Number, Row};
-use crate::base::varint::{put, take};
+use crate::base::varint::{put, take, take_u64};
 use crate::evidence::Confidence;
 use crate::graph::State;
 
@@ -175,7 +175,7 @@ impl ColumnCursor<'_> {
         }
         if self.away == 0 && self.bytes.first() == Some(&AWAY) {
             self.bytes = &self.bytes[1..];
-            self.away = count(&mut self.bytes);
+            self.away = take_u64(&mut self.bytes);
         }
         if self.away > 0 {
             self.away -= 1;
@@ -186,7 +186,7 @@ impl ColumnCursor<'_> {
         self.row(*tag);
         if self.bytes.first() == Some(&SAME) {
             self.bytes = &self.bytes[1..];
-            self.same = count(&mut self.bytes);
+            self.same = take_u64(&mut self.bytes);
         }
         Some(self.memory.row)
     }
@@ -237,10 +237,6 @@ impl ColumnCursor<'_> {
             row.age = take_number(bytes, &mut halves[4]);
         }
     }
-}
-
-fn count(bytes: &mut &[u8]) -> u64 {
-    u64::try_from(take(bytes)).unwrap_or(0)
 }
 
 fn take_byte(bytes: &mut &[u8]) -> u8 {
