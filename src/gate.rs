@@ -15,10 +15,11 @@ mod range;
 mod report;
 
 pub(crate) use baseline::{Written, update, write};
-pub(crate) use difference::{
-    DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, pairs, union,
-};
+pub use difference::{DiffFormat, DiffSubject, Difference, Where};
+pub(crate) use difference::{Side, differences, pairs, union};
 pub(crate) use expectation::{Expectation, read};
-pub(crate) use finding::{FindingKind, Severity};
-pub(crate) use judge::{Judgement, Verdict, judge};
-pub(crate) use report::{FORMATS, Format, Subject, explain};
+pub use finding::{Cause, Finding, FindingKind, Severity};
+pub(crate) use judge::judge;
+pub use judge::{CheckedFact, Judgement, Verdict};
+pub use report::CheckFormat;
+pub(crate) use report::{FORMATS, Subject, explain};

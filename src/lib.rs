@@ -67,7 +67,7 @@
 //! same bytes for the same bag.
 
 #![cfg_attr(
-    not(all(feature = "render", feature = "source")),
+    not(feature = "cli"),
     allow(
         dead_code,
         unreachable_pub,
@@ -99,7 +99,7 @@ mod draw;
 #[cfg(feature = "render")]
 mod export;
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "render")]
 mod gate;
 
 mod pipeline;
@@ -148,6 +148,7 @@ pub mod values {
     #[cfg(feature = "render")]
     pub use crate::{
         base::geometry::{Point, Rect, Size},
+        base::yaml::YamlPlace,
         draw::figure::{FigureKind, FigureOptions, RowKind},
         draw::picture::PageOptions,
         draw::strip::Choice,
@@ -157,6 +158,10 @@ pub mod values {
         export::options::{Profile, SequenceOptions},
         export::tables::TableFormat,
         export::target::Target,
+        gate::{
+            Cause, CheckFormat, CheckedFact, DiffFormat, DiffSubject, Difference, Finding,
+            FindingKind, Judgement, Severity, Verdict, Where,
+        },
         layout::{Engine, Orientation},
         pipeline::{Body, Drawing, Purpose},
         view::{Grouping, Hide, LineWidth, Mode, NameFilter, ViewOptions},
@@ -167,13 +172,15 @@ pub mod values {
 pub use pipeline::fleet;
 
 pub mod commands {
-    //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder.
+    //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the check
+    //! against an expectations file, the comparison of two missions.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
     #[cfg(feature = "render")]
     pub use crate::pipeline::{
-        Extract, Extracted, Survey, extract, is_survey, survey, survey_file,
+        Baseline, BaselineWritten, Check, Checked, Compared, Diff, Extract, Extracted, Report,
+        Survey, baseline, check, diff, extract, is_survey, survey, survey_file,
     };
 }
 
@@ -183,6 +190,10 @@ pub use cli::run as run_command;
 
 #[doc(hidden)]
 pub mod internals;
+
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/python.md")]
+struct BookPage;
 
 /// Reads bags, or a mission's JSON, into a mission.
 ///

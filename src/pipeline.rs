@@ -17,8 +17,8 @@ mod fit;
 pub mod fleet;
 #[cfg(feature = "cli")]
 pub mod follow;
-#[cfg(feature = "cli")]
-pub(crate) mod gate;
+#[cfg(feature = "render")]
+mod gate;
 mod inputs;
 #[cfg(feature = "cli")]
 pub(crate) mod live;
@@ -38,11 +38,15 @@ mod verify;
 #[cfg(feature = "render")]
 pub use draw::{Body, Drawing};
 #[cfg(feature = "render")]
-pub(crate) use export::render;
-#[cfg(feature = "render")]
 pub use export::{Render, Rendered};
 #[cfg(feature = "render")]
+pub(crate) use export::{render, show};
+#[cfg(feature = "render")]
 pub use extract::{Extract, Extracted, extract};
+#[cfg(feature = "render")]
+pub use gate::{
+    Baseline, BaselineWritten, Check, Checked, Compared, Diff, Report, baseline, check, diff,
+};
 pub use phases::Phases;
 #[cfg(feature = "render")]
 pub use purpose::Purpose;
@@ -50,10 +54,7 @@ pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]
 pub use survey::{Survey, is_survey, survey, survey_file};
 #[cfg(feature = "cli")]
-pub(crate) use {
-    export::{check, show},
-    read::mission_file,
-};
+pub(crate) use {export::check as check_outputs, read::mission_file};
 
 worded! {
     /// A stage of the work, for progress and timings.

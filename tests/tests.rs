@@ -30,6 +30,7 @@ mod given;
 mod hostile;
 mod info;
 mod layout;
+mod library;
 mod lines;
 mod live;
 mod marks;

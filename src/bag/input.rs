@@ -55,6 +55,15 @@ impl Input {
             Self::Stdin => "standard input".to_owned(),
         }
     }
+
+    /// The input as given; of a URL the public part.
+    pub(crate) fn given(&self) -> String {
+        match self {
+            Self::Path(path) => path.display().to_string(),
+            Self::Url(url) => public_url_of(url),
+            Self::Stdin => "-".to_owned(),
+        }
+    }
 }
 
 /// A URL that is safe to report: for web servers, without the password and the query, which may contain a signature

@@ -1,6 +1,6 @@
 //! YAML text as plain data, protected against documents with aliases that expand to far more than their size.
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "render")]
 mod placed;
 
 use serde::de::Deserialize;
@@ -8,7 +8,7 @@ use serde_saphyr::Location;
 
 use super::budget::{YAML, YAML_VALUES};
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "render")]
 pub(crate) use placed::{YamlData, YamlPart, parse_placed};
 pub(crate) use serde_json::Value;
 
@@ -52,11 +52,11 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
 
 /// A position in a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct YamlPlace {
+pub struct YamlPlace {
     /// The line, ≥ 1; 0 if unknown.
-    pub(crate) line: usize,
+    pub line: usize,
     /// The character in the line, ≥ 1; 0 if unknown.
-    pub(crate) column: usize,
+    pub column: usize,
 }
 
 impl From<Location> for YamlPlace {

@@ -99,7 +99,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     )?;
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
-    crate::pipeline::check(&job)?;
+    crate::pipeline::check_outputs(&job)?;
     let expectation = |path: &Path| {
         let text = file::read_text(path, budget::USER_TEXT)?;
         crate::gate::read(&text, path)

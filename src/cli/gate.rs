@@ -15,12 +15,10 @@ use crate::base::geometry::Size;
 use crate::base::nearest::suggestion;
 use crate::base::notice::Notices;
 use crate::base::words;
-use crate::export::Output;
 use crate::export::target::Target;
-use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Judgement, Severity, explain};
+use crate::gate::{CheckFormat, FORMATS, Judgement, Severity, explain};
 use crate::mission::Mission;
-use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
-use crate::pipeline::{Body, Drawing, Reading};
+use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
 
 /// Prints the differences between two missions, or between one and an expectation.
 pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
@@ -34,9 +32,8 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
     for reading in &job.readings {
         applies::check_inputs(given, reading)?;
     }
-    let done = gate::diff(&job, terminal)?;
-    let text = (args.format.write)(&job.subject, &done.differences);
-    print(&text, args.format.word, terminal)?;
+    let done = pipeline::diff(&job, terminal)?;
+    print(&job.report(&done, args.format), args.format.word, terminal)?;
     for remark in &done.remarks {
         terminal.note(remark);
     }
@@ -74,63 +71,19 @@ fn wrote<'a>(targets: impl Iterator<Item = &'a Target>, what: &str, terminal: &m
     }
 }
 
-fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
+fn diff_job(args: &DiffArgs) -> Result<Diff> {
     let one = |path: &PathBuf| judged(std::slice::from_ref(path), &args.time(), &args.graph);
-    let (mut reports, mut pictures) = (Vec::new(), Vec::new());
+    let mut job = Diff::new([one(&args.first)?, one(&args.second)?])?;
+    job.rate_change = args.rate_change;
     for output in &args.outputs {
-        let ending = output.to_string_lossy().to_ascii_lowercase();
-        let is_end = |f: &&DiffFormat| f.endings.iter().any(|end| ending.ends_with(end));
-        match DIFF_FORMATS.iter().find(is_end) {
-            Some(format) => reports.push((Target::parse(output), format)),
-            None => pictures.push(picture(output)?),
-        }
+        job.write(output)?;
     }
-    let mut drawing = Drawing::new()?;
-    drawing.style = look::style(&args.style)?;
+    job.drawing.style = look::style(&args.style)?;
     if let Some((width, height)) = args.size {
-        drawing.page.size = Size::new(f64::from(width), f64::from(height));
-        drawing.is_sized = true;
+        job.drawing.page.size = Size::new(f64::from(width), f64::from(height));
+        job.drawing.is_sized = true;
     }
-    let subject = subject(&args.first, &args.second);
-    drawing.body = Body::Graph;
-    drawing.page.rate_change = args.rate_change;
-    drawing.page.title = Some(format!("A: {} → B: {}", subject.first, subject.second));
-    Ok(DiffJob {
-        readings: [one(&args.first)?, one(&args.second)?],
-        rate_change: args.rate_change,
-        subject,
-        reports,
-        pictures,
-        drawing,
-    })
-}
-
-/// The names of two missions, without folders unless the names differ only in these.
-fn subject(first: &Path, second: &Path) -> DiffSubject {
-    let whole = |path: &Path| path.display().to_string();
-    let last = |path: &Path| {
-        let last = path.file_name();
-        last.map_or_else(|| whole(path), |name| name.to_string_lossy().into_owned())
-    };
-    let is_alike = last(first) == last(second);
-    let name = |path| if is_alike { whole(path) } else { last(path) };
-    DiffSubject {
-        first: name(first),
-        second: name(second),
-    }
-}
-
-/// A picture of both missions; tables contain times, which differ between the two.
-fn picture(output: &OsStr) -> Result<Output> {
-    let picture = Output::named(output, None)?;
-    if picture.format.is_viewed {
-        return Ok(picture);
-    }
-    let name = output.to_string_lossy();
-    Err(Error::usage(
-        format!("`{name}` cannot represent a comparison"),
-        "write differences as `d.txt`, `d.json` or `d.md`, or draw them: `d.svg`, `d.html`, `d.gif`",
-    ))
+    Ok(job)
 }
 
 /// Whether a path names an expectation.
@@ -147,11 +100,11 @@ fn against(
     (bag, expect): (&Path, &Path),
     terminal: &mut Terminal,
 ) -> Result<u8> {
-    let format = Format::from_word(args.format.word);
+    let format = CheckFormat::from_word(args.format.word);
     let check = CheckArgs {
         bags: vec![bag.to_owned()],
         expect: Some(expect.to_owned()),
-        format: format.unwrap_or(&crate::gate::FORMATS[0]),
+        format: format.unwrap_or(&FORMATS[0]),
         outputs: args.outputs.clone(),
         link: Vec::new(),
         undecidable: Undecidable::Allow,
@@ -169,19 +122,16 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
         .bags
         .iter()
         .map(|bag| judged(std::slice::from_ref(bag), &args.time, &args.graph));
-    let job = Baseline {
-        runs: runs.collect::<Result<_>>()?,
-        update: args.update.clone(),
-        only: args.only.clone(),
-        output: Target::parse(&args.output),
-    };
+    let mut job = Baseline::new(runs.collect::<Result<_>>()?, Target::parse(&args.output));
+    job.update.clone_from(&args.update);
+    job.only.clone_from(&args.only);
     for run in &job.runs {
         applies::check_inputs(given, run)?;
     }
     if job.output == Target::Stdout {
         terminal.make_room();
     }
-    let done = gate::baseline(&job, terminal)?;
+    let done = pipeline::baseline(&job, terminal)?;
     terminal.notices(&notices(&done.missions));
     if done.left_out > 0 {
         let names = words::count(done.left_out, "name");
@@ -224,20 +174,13 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
             "give the path of a graph.yaml",
         ));
     };
-    let job = Check {
-        reading: judged(&args.bags, &args.time, &args.graph)?,
-        tracked: tracked(&expect),
-        expect,
-        reports: args
-            .outputs
-            .iter()
-            .map(|o| report(o))
-            .collect::<Result<_>>()?,
-        bags: typed(&args.bags),
-        links: args.link.clone(),
-        is_strict: args.undecidable == Undecidable::Error,
-        append_to: summary(),
-    };
+    let mut job = Check::new(judged(&args.bags, &args.time, &args.graph)?, &expect);
+    job.tracked = tracked(&expect);
+    let reports = args.outputs.iter().map(|output| report(output));
+    job.reports = reports.collect::<Result<_>>()?;
+    job.links.clone_from(&args.link);
+    job.is_strict = args.undecidable == Undecidable::Error;
+    job.append_to = summary();
     let formats = job.reports.iter().map(|report| report.format.word);
     let formats: Vec<&str> = formats.chain([args.format.word]).collect();
     applies::check_check(given, &args.graph.infer, &formats)?;
@@ -250,32 +193,20 @@ pub(super) fn judge_closed(
     reading: Reading,
     what: &Path,
     expect: &Path,
-    format: Option<&'static Format>,
+    format: Option<&CheckFormat>,
     terminal: &mut Terminal,
 ) -> Result<u8> {
-    let job = Check {
-        reading,
-        tracked: tracked(expect),
-        expect: expect.to_owned(),
-        reports: Vec::new(),
-        bags: vec![what.display().to_string()],
-        links: Vec::new(),
-        is_strict: false,
-        append_to: None,
-    };
+    let mut job = Check::new(reading, expect);
+    job.tracked = tracked(expect);
+    job.bags = vec![what.display().to_string()];
     verdict(&job, format, terminal)
 }
 
 /// Runs the check, prints the findings if a format is given, and returns the exit code.
-fn verdict(job: &Check, format: Option<&Format>, terminal: &mut Terminal) -> Result<u8> {
-    let done = gate::check(job, terminal)?;
-    let subject = job.subject(&done.mission);
+fn verdict(job: &Check, format: Option<&CheckFormat>, terminal: &mut Terminal) -> Result<u8> {
+    let done = pipeline::check(job, terminal)?;
     if let Some(format) = format {
-        print(
-            &(format.write)(&subject, &done.verdict),
-            format.word,
-            terminal,
-        )?;
+        print(&job.report(&done, format), format.word, terminal)?;
     }
     terminal.notices(&done.mission.notices);
     let verdict = &done.verdict;
@@ -345,37 +276,13 @@ fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Readin
     reading(&inputs, &time, &ChangeArgs::default(), graph)
 }
 
-fn typed(bags: &[PathBuf]) -> Vec<String> {
-    bags.iter().map(|bag| bag.display().to_string()).collect()
-}
-
-/// A report to write: its format by prefix, by extension, or Markdown if it is a CI job's summary file.
-fn report(output: &OsStr) -> Result<ReportJob> {
-    let name = output.to_string_lossy();
-    let named = |word: &str| Format::from_word(word);
-    if let Some((format, path)) = name
-        .split_once(':')
-        .and_then(|(word, path)| Some((named(word)?, path)))
-    {
-        return Ok(ReportJob {
-            target: Target::parse(path),
-            format,
-        });
-    }
+/// A report to write; Markdown if it is a CI job's summary file, which has no extension.
+fn report(output: &OsStr) -> Result<Report> {
     let is_summary = summary().is_some_and(|path| path == Path::new(output));
-    let format = if is_summary {
-        named("markdown")
+    let name = output.to_string_lossy();
+    Report::parse(&if is_summary {
+        format!("markdown:{name}")
     } else {
-        Format::of_name(&name)
-    };
-    let unknown = || {
-        Error::usage(
-            format!("`{name}` has no known extension"),
-            "use the extension .md, .xml, .json, .sarif or .txt, or put the format in front: `gitlab:FILE`",
-        )
-    };
-    Ok(ReportJob {
-        target: Target::parse(output),
-        format: format.ok_or_else(unknown)?,
+        name.into_owned()
     })
 }

@@ -37,7 +37,7 @@ pub(super) fn render(
     let shows_bytes = job.drawing.view.line_width == LineWidth::Bytes;
     job.reading.collect.sizes = args.sizes.bytes || shows_bytes;
     applies::check_outputs(given, args, &job.outputs)?;
-    crate::pipeline::check(&job)?;
+    crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
     if job
         .outputs
@@ -72,7 +72,7 @@ pub(super) fn figure(
 ) -> Result<u8, Error> {
     let job = figure_job(args)?;
     applies::check_figure(&job.outputs)?;
-    crate::pipeline::check(&job)?;
+    crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
     make_room(&job, terminal);
     let done = crate::pipeline::render(&job, terminal)?;

@@ -11,12 +11,13 @@ use super::facts::Facts;
 use crate::mission::Mission;
 
 pub(crate) use pairs::pairs;
-pub(crate) use report::{DIFF_FORMATS, DiffFormat, DiffSubject};
+pub use report::{DiffFormat, DiffSubject};
 pub(crate) use union::{Side, union};
 
 /// Which of two missions contain an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Where {
+#[non_exhaustive]
+pub enum Where {
     /// Only in the first.
     First,
     /// Only in the second.
@@ -34,20 +35,22 @@ impl Where {
 
 /// One difference.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Difference {
+#[non_exhaustive]
+pub struct Difference {
     /// The kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
-    pub(crate) kind: &'static str,
+    pub kind: &'static str,
     /// The name of the node or topic it is about, or both names of an edge.
-    pub(crate) name: String,
+    pub name: String,
     /// The node or topic, or both as in `name`; the name of an event contains more.
-    pub(crate) element: String,
-    pub(crate) side: Where,
+    pub element: String,
+    /// The missions that contain it.
+    pub side: Where,
     /// The value in the first mission; empty for none.
-    pub(crate) first: String,
+    pub first: String,
     /// The value in the second mission; empty for none.
-    pub(crate) second: String,
+    pub second: String,
     /// Whether it is observable in both missions. An element without evidence in one is not absent from it.
-    pub(crate) is_known: bool,
+    pub is_known: bool,
 }
 
 impl Difference {

@@ -12,10 +12,11 @@ use crate::base::yaml::YamlPlace;
 /// The kinds of findings: the name, the meaning, and how it is decided.
 macro_rules! kinds {
     ($($kind:ident $word:literal: $meaning:literal, $more:literal;)+) => {
-        /// A kind of finding: its index in [`KINDS`].
+        /// A kind of finding.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        pub(crate) enum FindingKind {
-            $($kind,)+
+        #[non_exhaustive]
+        pub enum FindingKind {
+            $(#[doc = $meaning] $kind,)+
         }
 
         /// All kinds in order: the name, the meaning, and how it is decided.
@@ -130,13 +131,13 @@ kinds! {
 
 impl FindingKind {
     /// Its word.
-    pub(crate) fn word(self) -> &'static str {
+    pub fn word(self) -> &'static str {
         let row = KINDS.iter().find(|(kind, ..)| *kind == self);
         row.map_or("", |(_, word, ..)| word)
     }
 
     /// The kind of a word.
-    pub(crate) fn from_word(word: &str) -> Option<Self> {
+    pub fn from_word(word: &str) -> Option<Self> {
         let row = KINDS.iter().find(|(_, own, ..)| *own == word);
         row.map(|(kind, ..)| *kind)
     }
@@ -164,8 +165,11 @@ impl FindingKind {
 worded! {
     /// The severity of a finding, the worst first.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-    pub(crate) enum Severity {
+    #[non_exhaustive]
+    pub enum Severity {
+        /// The check fails.
         Error = "error",
+        /// Reported; the check passes.
         Warning = "warning",
         /// Not observable in the bag.
         Unknown = "unknown",
@@ -176,11 +180,12 @@ worded! {
 
 /// The cause of findings in the event log, by which they are grouped.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Cause {
+#[non_exhaustive]
+pub struct Cause {
     /// The time at which it happened, if known.
-    pub(crate) time: Option<Stamp>,
+    pub time: Option<Stamp>,
     /// The event as text: `/lidar stopped at 04:50`.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 impl Cause {
@@ -193,31 +198,34 @@ impl Cause {
 
 /// One finding. Control characters in its texts are escaped.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Finding {
-    pub(crate) kind: FindingKind,
-    pub(crate) severity: Severity,
+#[non_exhaustive]
+pub struct Finding {
+    /// Its kind.
+    pub kind: FindingKind,
+    /// Its severity.
+    pub severity: Severity,
     /// The position of the expectation in the file.
-    pub(crate) place: YamlPlace,
+    pub place: YamlPlace,
     /// The node or topic that it is about.
-    pub(crate) name: String,
+    pub name: String,
     /// The finding in one sentence.
-    pub(crate) text: String,
+    pub text: String,
     /// The observed value, in short.
-    pub(crate) seen: String,
+    pub seen: String,
     /// The expected value.
-    pub(crate) expected: String,
+    pub expected: String,
     /// The time range that it is about, if any.
-    pub(crate) when: Option<Span>,
+    pub when: Option<Span>,
     /// Lines with details.
-    pub(crate) details: Vec<String>,
+    pub details: Vec<String>,
     /// The cause, if known.
-    pub(crate) cause: Option<Cause>,
+    pub cause: Option<Cause>,
     /// Hints for the user.
-    pub(crate) help: Vec<String>,
+    pub help: Vec<String>,
     /// The name in the file that `baseline --update` would rewrite.
-    pub(crate) accept: Option<String>,
+    pub accept: Option<String>,
     /// The reason why it is accepted.
-    pub(crate) why: Option<String>,
+    pub why: Option<String>,
     /// The number of earlier findings in the file with the same [`Self::fingerprint`] input.
     pub(crate) nth: usize,
 }
@@ -287,7 +295,7 @@ impl Finding {
     }
 
     /// Twelve hex digits that are stable across runs and when lines of the file move.
-    pub(crate) fn fingerprint(&self) -> String {
+    pub fn fingerprint(&self) -> String {
         let look = self.look();
         match self.nth {
             0 => digest::hex(&look, 12),

@@ -19,30 +19,37 @@ use crate::base::nearest::nearest;
 use crate::base::words::visible;
 use crate::mission::Mission;
 
-/// One checked fact of the file.
+/// One checked fact of an expectations file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Checked {
+#[non_exhaustive]
+pub struct CheckedFact {
     /// Its title: `/scan hz`, or a rule's `id`.
-    pub(crate) title: String,
+    pub title: String,
     /// Its position in the file.
-    pub(crate) place: YamlPlace,
+    pub place: YamlPlace,
     /// The findings; none if it is met.
-    pub(crate) findings: Vec<Finding>,
+    pub findings: Vec<Finding>,
     /// Whether there was nothing to check, because its node or topic is absent.
-    pub(crate) is_moot: bool,
+    pub is_moot: bool,
 }
 
 /// The judgement of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Judgement {
+#[non_exhaustive]
+pub enum Judgement {
+    /// The mission meets it.
     Kept,
+    /// It has an error or a warning.
     Broken,
+    /// The bag does not show whether it is met.
     Undecidable,
+    /// There is nothing to check.
     Moot,
 }
 
-impl Checked {
-    pub(crate) fn judgement(&self) -> Judgement {
+impl CheckedFact {
+    /// The judgement that follows from its findings.
+    pub fn judgement(&self) -> Judgement {
         let any = |severity| self.findings.iter().any(|f| f.severity == severity);
         if any(Severity::Error) || any(Severity::Warning) {
             Judgement::Broken
@@ -56,28 +63,30 @@ impl Checked {
     }
 }
 
-/// All checked facts, in file order.
+/// The result of a check: all facts of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Verdict {
-    pub(crate) checks: Vec<Checked>,
+#[non_exhaustive]
+pub struct Verdict {
+    /// All checked facts, in file order.
+    pub checks: Vec<CheckedFact>,
 }
 
 impl Verdict {
     /// All findings, the worst first, then in file order.
-    pub(crate) fn findings(&self) -> Vec<&Finding> {
+    pub fn findings(&self) -> Vec<&Finding> {
         let mut all: Vec<&Finding> = self.checks.iter().flat_map(|c| &c.findings).collect();
         all.sort_by_key(|f| f.severity);
         all
     }
 
     /// The number of findings of this severity.
-    pub(crate) fn count(&self, severity: Severity) -> usize {
+    pub fn count(&self, severity: Severity) -> usize {
         let all = self.checks.iter().flat_map(|c| &c.findings);
         all.filter(|f| f.severity == severity).count()
     }
 
     /// The number of facts with this judgement.
-    pub(crate) fn facts(&self, judgement: Judgement) -> usize {
+    pub fn facts(&self, judgement: Judgement) -> usize {
         let all = self.checks.iter();
         all.filter(|c| c.judgement() == judgement).count()
     }
@@ -91,7 +100,7 @@ impl Verdict {
     }
 
     /// Whether nothing at all could be decided.
-    pub(crate) fn is_blind(&self) -> bool {
+    pub fn is_blind(&self) -> bool {
         self.facts(Judgement::Undecidable) > 0
             && self.facts(Judgement::Kept) + self.facts(Judgement::Broken) == 0
     }
@@ -139,7 +148,7 @@ struct Judge<'a> {
     names_nodes: bool,
     expectation: &'a Expectation,
     is_part: bool,
-    checks: Vec<Checked>,
+    checks: Vec<CheckedFact>,
     /// The number of names for which a similar one was searched.
     searched: Cell<usize>,
 }
@@ -163,7 +172,7 @@ impl Judge<'_> {
 
     /// Adds the findings of one fact.
     fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
-        self.checks.push(Checked {
+        self.checks.push(CheckedFact {
             title: title.into(),
             place,
             findings,
@@ -192,7 +201,7 @@ impl Judge<'_> {
 
     /// Adds a fact about an absent element.
     fn moot(&mut self, title: impl Into<String>, place: YamlPlace) {
-        self.checks.push(Checked {
+        self.checks.push(CheckedFact {
             title: title.into(),
             place,
             findings: Vec::new(),

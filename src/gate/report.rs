@@ -33,7 +33,7 @@ pub(crate) struct Subject<'a> {
 
 /// A format of a verdict.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Format {
+pub struct CheckFormat {
     /// Its name in `--format` and before a colon in `-o`.
     pub(crate) word: &'static str,
     /// Its file extensions.
@@ -44,14 +44,14 @@ pub(crate) struct Format {
 }
 
 /// All formats. Extensions are matched in this order.
-pub(crate) const FORMATS: &[Format] = &[
-    Format {
+pub(crate) const FORMATS: &[CheckFormat] = &[
+    CheckFormat {
         word: "text",
         endings: &[".txt"],
         what: "for people: findings with file and line, grouped by cause",
         write: text::write,
     },
-    Format {
+    CheckFormat {
         word: "gitlab",
         endings: &[
             "codequality.json",
@@ -61,31 +61,31 @@ pub(crate) const FORMATS: &[Format] = &[
         what: "GitLab's code quality; also called codequality",
         write: gitlab::write,
     },
-    Format {
+    CheckFormat {
         word: "json",
         endings: &[".json"],
         what: "everything, for programs",
         write: json::write,
     },
-    Format {
+    CheckFormat {
         word: "markdown",
         endings: &[".md", ".markdown"],
         what: "a summary for a pull request, with the graph around the changes",
         write: markdown::write,
     },
-    Format {
+    CheckFormat {
         word: "junit",
         endings: &[".xml"],
         what: "a test case for every fact of the file",
         write: junit::write,
     },
-    Format {
+    CheckFormat {
         word: "sarif",
         endings: &[".sarif", ".sarif.json"],
         what: "SARIF 2.1.0, for code scanning",
         write: sarif::write,
     },
-    Format {
+    CheckFormat {
         word: "github",
         endings: &[],
         what: "GitHub's annotations, then the text",
@@ -93,9 +93,9 @@ pub(crate) const FORMATS: &[Format] = &[
     },
 ];
 
-impl Format {
-    /// The format of a word.
-    pub(crate) fn from_word(word: &str) -> Option<&'static Self> {
+impl CheckFormat {
+    /// The format of a word: `text`, `json`, `markdown`, `junit`, `sarif`, `github` or `gitlab`.
+    pub fn from_word(word: &str) -> Option<&'static Self> {
         let word = match word {
             "codequality" => "gitlab",
             "md" => "markdown",

@@ -184,8 +184,8 @@ fn has_all_topics(output: &Output) -> bool {
     format.is_unfolded || format.is_viewed && !format.is_drawn
 }
 
-/// Draws and writes a mission if all outputs show the same drawing.
-fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+/// The drawing of a mission: pictures show topics as words on lines, while pages and graph files have each as an element.
+fn drawing_of(job: &Render, mission: &Mission) -> Drawing {
     let mut drawing = job.drawing.clone();
     let is_picture = !job.outputs.iter().any(has_all_topics);
     drawing.view.is_picture = is_picture;
@@ -194,8 +194,14 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     }
     drawing.page.title.get_or_insert_with(|| mission.title());
     if job.reading.phases.is_named() {
-        drawing.page.phases = captions(&mission);
+        drawing.page.phases = captions(mission);
     }
+    drawing
+}
+
+/// Draws and writes a mission if all outputs show the same drawing.
+fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+    let mut drawing = drawing_of(job, &mission);
     let figure = drawn_figure(job, &mission)?;
     // Data and figures need no positions.
     let is_graph = |o: &Output| {
@@ -251,12 +257,12 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         Some(_) => None,
         None => side_by_side(job, &mission, &view, &picture)?,
     };
-    let mut all = mission.notices.clone();
-    all.extend(unmatched(&mission.elements, &drawing.view));
-    all.extend(notices.iter());
     let remarks = figure.iter().flat_map(|(figure, _)| &figure.remarks);
     let remarks = remarks.chain(strip.iter().flat_map(|s| &s.remarks));
-    all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.clone())));
+    let remarks = remarks.map(|text| Notice::new(NoticeKind::Note, text.clone()));
+    let mut all = mission.notices.clone();
+    all.extend(unmatched(&mission.elements, &drawing.view));
+    all.extend(notices.iter().chain(remarks));
     let viewed = job.is_filtered.then(|| filtered(&mission, &options));
     let sequence = Sequence {
         mission: &mission,

@@ -1,71 +1,133 @@
 //! Checking: reads the expectation and the mission, compares them, writes the findings.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{Drawing, Reading, Render, Watch, read, show};
-use crate::base::error::Result;
+use super::{Body, Drawing, Reading, Render, Watch, read, show};
+use crate::bag::Input;
+use crate::base::error::{Error, Result};
 use crate::base::{budget, file, words};
 use crate::export::Output;
 use crate::export::check as places;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
-    DiffFormat, DiffSubject, Difference, Format, Side, Subject, Verdict, Written, differences,
+    CheckFormat, DiffFormat, DiffSubject, Difference, Side, Subject, Verdict, Written, differences,
     judge, pairs, union, update, write,
 };
+use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 use crate::mission::Mission;
 
-/// One report to write.
-pub(crate) struct ReportJob {
+/// One report of a check, to write to a file.
+#[derive(Clone, Debug)]
+pub struct Report {
     pub(crate) target: Target,
-    pub(crate) format: &'static Format,
+    pub(crate) format: &'static CheckFormat,
 }
 
-/// The whole job of `bagreel check`.
-pub(crate) struct Check {
-    pub(crate) reading: Reading,
-    pub(crate) expect: PathBuf,
-    /// The path of the expectation from the root of its repository.
-    pub(crate) tracked: String,
-    pub(crate) reports: Vec<ReportJob>,
-    /// The bags as given.
-    pub(crate) bags: Vec<String>,
-    pub(crate) links: Vec<(String, String)>,
-    /// Whether undecidable facts are errors.
-    pub(crate) is_strict: bool,
-    /// A file that Markdown is appended to.
-    pub(crate) append_to: Option<PathBuf>,
-}
-
-impl Check {
-    /// The subject of the reports.
-    pub(crate) fn subject<'a>(&self, mission: &'a Mission) -> Subject<'a> {
-        let file = self.expect.display().to_string();
-        let plain = file.trim_start_matches("./");
-        Subject {
-            mission,
-            bags: self.bags.clone(),
-            file: plain.to_owned(),
-            tracked: self.tracked.clone(),
-            links: self.links.clone(),
+impl Report {
+    /// A report in the format of the extension, such as `check.xml`, or of the word in front: `gitlab:quality.json`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown extension.
+    pub fn parse(text: &str) -> Result<Self> {
+        let named = text.split_once(':');
+        if let Some((format, path)) =
+            named.and_then(|(word, path)| Some((CheckFormat::from_word(word)?, path)))
+        {
+            return Ok(Self {
+                target: Target::parse(path),
+                format,
+            });
         }
+        let unknown = || {
+            Error::usage(
+                format!("`{text}` has no known extension"),
+                "use the extension .md, .xml, .json, .sarif or .txt, or put the format in front: `gitlab:FILE`",
+            )
+        };
+        Ok(Self {
+            target: Target::parse(text),
+            format: CheckFormat::of_name(text).ok_or_else(unknown)?,
+        })
     }
 }
 
+/// The whole job of `bagreel check`.
+#[derive(Clone)]
+#[non_exhaustive]
+pub struct Check {
+    /// The mission to check. Its windows are those of the expectations file unless their length is fixed.
+    pub reading: Reading,
+    /// The expectations file.
+    pub expect: PathBuf,
+    /// The path of that file from the root of its repository, for services that annotate its lines.
+    pub tracked: String,
+    /// The names of the bags in reports.
+    pub bags: Vec<String>,
+    /// The files to write.
+    pub reports: Vec<Report>,
+    /// Names and URLs of links in Markdown.
+    pub links: Vec<(String, String)>,
+    /// Whether facts that cannot be decided are errors.
+    pub is_strict: bool,
+    /// A file that reports are appended to instead of replacing it.
+    pub append_to: Option<PathBuf>,
+}
+
 /// The outcome of `bagreel check`.
-pub(crate) struct CheckResult {
-    pub(crate) mission: Mission,
-    pub(crate) verdict: Verdict,
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Checked {
+    /// The mission, as it was read.
+    pub mission: Mission,
+    /// The findings.
+    pub verdict: Verdict,
+}
+
+impl Check {
+    /// A check of a mission against an expectations file that writes no reports.
+    pub fn new(reading: Reading, expect: impl Into<PathBuf>) -> Self {
+        let expect = expect.into();
+        Self {
+            tracked: plain(&expect),
+            bags: reading.inputs.iter().map(Input::given).collect(),
+            reading,
+            expect,
+            reports: Vec::new(),
+            links: Vec::new(),
+            is_strict: false,
+            append_to: None,
+        }
+    }
+
+    /// The findings of this check as a report.
+    pub fn report(&self, done: &Checked, format: &CheckFormat) -> String {
+        let subject = Subject {
+            mission: &done.mission,
+            bags: self.bags.clone(),
+            file: plain(&self.expect),
+            tracked: self.tracked.clone(),
+            links: self.links.clone(),
+        };
+        (format.write)(&subject, &done.verdict)
+    }
+}
+
+/// A path as given, without a leading `./`.
+fn plain(path: &Path) -> String {
+    let given = path.display().to_string();
+    given.trim_start_matches("./").to_owned()
 }
 
 /// Checks a mission and writes every report.
 ///
 /// # Errors
-/// If the expectation, the mission or an output cannot be read or written.
-pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
+/// If the expectations file, the mission or an output cannot be read or written.
+pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     let text = file::read_text(&job.expect, budget::USER_TEXT)?;
     let expectation = crate::gate::read(&text, &job.expect)?;
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
@@ -81,40 +143,113 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
     if job.is_strict {
         verdict.decide();
     }
-    let subject = job.subject(&mission);
+    let done = Checked { mission, verdict };
     for report in &job.reports {
-        let text = (report.format.write)(&subject, &verdict);
+        let text = job.report(&done, report.format);
         let before = file::text_before(report.target.path(), job.append_to.as_deref())?;
         put(&report.target, &(before + &text))?;
     }
-    Ok(CheckResult { mission, verdict })
+    Ok(done)
 }
 
 /// The whole job of `bagreel diff`.
-pub(crate) struct DiffJob {
-    pub(crate) readings: [Reading; 2],
-    /// The share by which a rate must differ.
-    pub(crate) rate_change: f64,
-    pub(crate) subject: DiffSubject,
+#[derive(Clone)]
+#[non_exhaustive]
+pub struct Diff {
+    /// The missions.
+    pub readings: [Reading; 2],
+    /// The fraction by which a rate must differ, besides significantly.
+    pub rate_change: f64,
+    /// The names of the missions.
+    pub subject: DiffSubject,
+    /// Pictures to write, of both missions.
+    pub pictures: Vec<Output>,
+    /// The options of these pictures.
+    pub drawing: Drawing,
     pub(crate) reports: Vec<(Target, &'static DiffFormat)>,
-    /// Pictures of both missions.
-    pub(crate) pictures: Vec<Output>,
-    pub(crate) drawing: Drawing,
+}
+
+impl Diff {
+    /// A comparison that writes no files.
+    ///
+    /// # Errors
+    /// As [`Drawing::new`].
+    pub fn new(readings: [Reading; 2]) -> Result<Self> {
+        let subject = subject(&readings);
+        let mut drawing = Drawing::new()?;
+        drawing.body = Body::Graph;
+        drawing.page.title = Some(format!("A: {} → B: {}", subject.first, subject.second));
+        Ok(Self {
+            readings,
+            rate_change: RATE_CHANGE,
+            subject,
+            reports: Vec::new(),
+            pictures: Vec::new(),
+            drawing,
+        })
+    }
+
+    /// Adds a file to write: `d.txt`, `d.json`, `d.md`, or a picture in any format of [`Render`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown extension, and for tables, which contain times, which differ between the two.
+    pub fn write(&mut self, output: &OsStr) -> Result<()> {
+        let name = output.to_string_lossy();
+        if let Some(format) = DiffFormat::of_name(&name) {
+            self.reports.push((Target::parse(output), format));
+            return Ok(());
+        }
+        let picture = Output::named(output, None)?;
+        if !picture.format.is_viewed {
+            return Err(Error::usage(
+                format!("`{name}` cannot represent a comparison"),
+                "write differences as `d.txt`, `d.json` or `d.md`, or draw them: `d.svg`, `d.html`, `d.gif`",
+            ));
+        }
+        self.pictures.push(picture);
+        Ok(())
+    }
+
+    /// The differences as a report.
+    pub fn report(&self, done: &Compared, format: &DiffFormat) -> String {
+        (format.write)(&self.subject, &done.differences)
+    }
+}
+
+/// The names of two missions, without folders unless the names differ only in these.
+fn subject(readings: &[Reading; 2]) -> DiffSubject {
+    let names = |name: fn(&Input) -> String| {
+        readings.each_ref().map(|reading| {
+            let all: Vec<String> = reading.inputs.iter().map(name).collect();
+            words::some_of(&all, 2)
+        })
+    };
+    let short = names(Input::name);
+    let [first, second] = if short[0] == short[1] {
+        names(Input::given)
+    } else {
+        short
+    };
+    DiffSubject { first, second }
 }
 
 /// The outcome of `bagreel diff`.
-pub(crate) struct Compared {
-    pub(crate) missions: Vec<Mission>,
-    pub(crate) differences: Vec<Difference>,
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Compared {
+    /// Both missions, as they were read.
+    pub missions: [Mission; 2],
+    /// The differences: elements, then events, then times of topics.
+    pub differences: Vec<Difference>,
     /// Remarks for the user about the pictures.
-    pub(crate) remarks: BTreeSet<String>,
+    pub remarks: BTreeSet<String>,
 }
 
 /// Compares two missions, and writes every report and picture.
 ///
 /// # Errors
 /// If a mission cannot be read or an output cannot be written.
-pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
+pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|(target, _)| target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
@@ -140,6 +275,7 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
         let mission = union(&first, &second, &differences, side);
         let mut render = Render::new(Reading::default(), outputs)?;
         render.drawing = job.drawing.clone();
+        render.drawing.page.rate_change = job.rate_change;
         let missions = [&first, &second];
         let pairs = pairs(missions, &job.subject, &differences, &mission);
         render.sequence.pairs = (!pairs.rows.is_empty()).then_some(pairs);
@@ -149,7 +285,7 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
         remarks.extend(done.mission.notices.iter().map(|n| n.text));
     }
     Ok(Compared {
-        missions: vec![first, second],
+        missions: [first, second],
         differences,
         remarks,
     })
@@ -159,35 +295,54 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
 const MOVING: [&str; 5] = ["gif", "apng", "html", "mp4", "webm"];
 
 /// The whole job of `bagreel baseline`.
-pub(crate) struct Baseline {
-    /// The runs, each read separately.
-    pub(crate) runs: Vec<Reading>,
-    /// The expectation to update; `None` to write a new one.
-    pub(crate) update: Option<PathBuf>,
-    /// The names to update; all if empty.
-    pub(crate) only: Vec<String>,
-    pub(crate) output: Target,
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Baseline {
+    /// The healthy runs, each read separately.
+    pub runs: Vec<Reading>,
+    /// The expectations file to update instead of writing a new one.
+    pub update: Option<PathBuf>,
+    /// The nodes and topics to update; all if empty.
+    pub only: Vec<String>,
+    /// The file to write unless one is updated.
+    pub output: Target,
+}
+
+impl Baseline {
+    /// A new expectations file that all runs meet.
+    pub fn new(runs: Vec<Reading>, output: Target) -> Self {
+        Self {
+            runs,
+            update: None,
+            only: Vec::new(),
+            output,
+        }
+    }
 }
 
 /// The outcome of `bagreel baseline`.
-#[derive(Default)]
-pub(crate) struct BaselineWritten {
-    pub(crate) missions: Vec<Mission>,
-    /// The number of rewritten facts.
-    pub(crate) changed: usize,
-    /// The number of remaining findings.
-    pub(crate) left: usize,
-    /// The numbers of nodes and topics written in a new expectation, and of both that did not fit.
-    pub(crate) nodes: usize,
-    pub(crate) topics: usize,
-    pub(crate) left_out: usize,
+#[derive(Debug, Default)]
+#[non_exhaustive]
+pub struct BaselineWritten {
+    /// The runs, as they were read.
+    pub missions: Vec<Mission>,
+    /// The number of rewritten facts in an updated file.
+    pub changed: usize,
+    /// The number of remaining findings in an updated file: those of rules.
+    pub left: usize,
+    /// The number of nodes in a new file.
+    pub nodes: usize,
+    /// The number of topics in a new file.
+    pub topics: usize,
+    /// The number of nodes and topics that did not fit in a new file.
+    pub left_out: usize,
 }
 
 /// Writes an expectation that all runs meet, or updates one.
 ///
 /// # Errors
-/// If the expectation or a run cannot be read, or the output cannot be written.
-pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten> {
+/// If the expectations file or a run cannot be read, or the output cannot be written.
+pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten> {
     let old = job.update.as_deref().map(|path| {
         let text = file::read_text(path, budget::USER_TEXT)?;
         let expectation = crate::gate::read(&text, path)?;

@@ -1,12 +1,13 @@
-//! The boxes that contain topics: that of their group, or the collapsed namespace that they are part of.
+//! The box of each node and topic: its own, that of its role or group, or the collapsed namespace that it is part of.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::ItemKind;
 use super::collapse::{Collapse, swallows};
 use super::group::Groups;
+use super::replicas::Fleets;
 use super::select::Selection;
+use super::{ItemKind, Mode, ViewOptions, roles};
 use crate::graph::{ById, Edge, Elements, NodeId, Topic, TopicId};
 
 /// The kind and name of a box.
@@ -17,10 +18,98 @@ pub(crate) type NodeKeys = ById<NodeId, Option<ItemKey>>;
 /// The box of each topic, if it has one.
 pub(crate) type TopicKeys = ById<TopicId, Option<ItemKey>>;
 
+/// What determines the boxes.
+pub(super) struct Boxes<'a> {
+    pub(super) elements: &'a Elements,
+    pub(super) options: &'a ViewOptions,
+    pub(super) fleets: &'a Fleets,
+    pub(super) selection: &'a Selection,
+    pub(super) groups: &'a Groups,
+}
+
+impl Boxes<'_> {
+    /// The box of each node and of each topic.
+    pub(super) fn keys(&self) -> (NodeKeys, TopicKeys) {
+        let names = self.names();
+        let collapse = self.collapse(&names);
+        let nodes = self.nodes(&names, &collapse);
+        let topics = match self.options.mode {
+            Mode::Bundles => inside(self.elements, &collapse, &nodes, self.selection),
+            Mode::Nodes => ById::like(&self.elements.topics, None),
+            _ => self.topics((&collapse, &names), &nodes),
+        };
+        (nodes, topics)
+    }
+
+    /// Per node, the name of its role, in the first of several equal namespaces.
+    fn names(&self) -> ById<NodeId, Arc<str>> {
+        let mut names: ById<NodeId, Arc<str>> = if self.options.exact_names {
+            let nodes = self.elements.nodes.iter();
+            nodes.map(|node| node.name.shared()).collect()
+        } else {
+            roles::boxes(self.elements)
+        };
+        for name in names.iter_mut() {
+            if let Some(stand_in) = self.fleets.stand_in(name) {
+                *name = stand_in;
+            }
+        }
+        names
+    }
+
+    /// The namespaces to collapse, except those with a single box.
+    fn collapse(&self, names: &ById<NodeId, Arc<str>>) -> Collapse<'_> {
+        let mut collapse = Collapse::new(self.options);
+        if !collapse.is_empty() {
+            let folded = names.iter().zip(&self.selection.nodes);
+            let folded = folded.filter_map(|(name, reason)| reason.is_none().then_some(&**name));
+            let topics = self.elements.topics.iter();
+            let topics = topics.map(|topic| topic.name.as_str());
+            let topics = topics.filter(|_| !self.options.mode.is_direct());
+            collapse.open_single(&folded.collect(), &topics.collect());
+        }
+        collapse
+    }
+
+    fn nodes(&self, names: &ById<NodeId, Arc<str>>, collapse: &Collapse<'_>) -> NodeKeys {
+        let all = names.iter().zip(&self.selection.nodes);
+        let keys = all.map(|(name, reason)| {
+            reason.is_none().then(|| match collapse.of(name) {
+                Some(space) => (ItemKind::Namespace, space.into()),
+                None => (ItemKind::Node, Arc::clone(name)),
+            })
+        });
+        keys.collect()
+    }
+
+    fn topics(
+        &self,
+        (collapse, names): (&Collapse<'_>, &ById<NodeId, Arc<str>>),
+        nodes: &NodeKeys,
+    ) -> TopicKeys {
+        let all = self.elements.topics.iter().zip(&self.selection.topics);
+        let own = |(topic, reason): (&Topic, &Option<_>)| {
+            let is_selected = reason.is_none();
+            is_selected.then(|| (ItemKind::Topic, topic.name.shared()))
+        };
+        let mut topics: TopicKeys = all.map(own).collect();
+        set_groups(&mut topics, self.groups);
+        for key in topics.iter_mut().flatten() {
+            if let Some(stand_in) = self.fleets.stand_in(&key.1) {
+                key.1 = stand_in;
+            }
+        }
+        if !collapse.is_empty() {
+            swallow(self.elements, (collapse, names), nodes, &mut topics);
+        }
+        topics
+    }
+}
+
 /// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their
 /// name. Changes of topics that several boxes publish are only shown on the arrows, so these topics are in
 /// none.
-pub(crate) fn inside(
+fn inside(
     elements: &Elements,
     collapse: &Collapse<'_>,
     nodes: &NodeKeys,
@@ -49,7 +138,7 @@ pub(crate) fn inside(
 }
 
 /// Puts the topics of each group into its box, whose name is made different from that of every topic.
-pub(crate) fn set_groups(topics: &mut TopicKeys, groups: &Groups) {
+fn set_groups(topics: &mut TopicKeys, groups: &Groups) {
     for ids in groups.values() {
         for id in ids {
             topics[*id] = None;
@@ -74,7 +163,7 @@ pub(crate) fn set_groups(topics: &mut TopicKeys, groups: &Groups) {
 }
 
 /// Moves topics and groups that belong inside a collapsed namespace into it.
-pub(crate) fn swallow(
+fn swallow(
     elements: &Elements,
     (collapse, names): (&Collapse<'_>, &ById<NodeId, Arc<str>>),
     nodes: &NodeKeys,

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::bundles;
-use super::collapse::Collapse;
 use super::group::{Groups, groups};
-use super::homes::{ItemKey, NodeKeys, TopicKeys, inside, set_groups, swallow};
+use super::homes::{Boxes, ItemKey};
 use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
@@ -145,53 +144,14 @@ impl Viewed {
 
     fn set_items(&mut self, mission: &Mission, options: &ViewOptions, groups: &Groups) {
         let elements = &mission.elements;
-        let mut collapse = Collapse::new(options);
-        let mut names: ById<NodeId, Arc<str>> = if options.exact_names {
-            elements.nodes.iter().map(|n| n.name.shared()).collect()
-        } else {
-            roles::boxes(elements)
-        };
-        for name in names.iter_mut() {
-            if let Some(stand_in) = self.fleets.stand_in(name) {
-                *name = stand_in;
-            }
+        let (nodes, mut topics) = Boxes {
+            elements,
+            options,
+            fleets: &self.fleets,
+            selection: &self.selection,
+            groups,
         }
-        if !collapse.is_empty() {
-            let folded = names.iter().zip(&self.selection.nodes);
-            let folded = folded.filter_map(|(name, reason)| reason.is_none().then_some(&**name));
-            let topics = elements.topics.iter().map(|topic| topic.name.as_str());
-            let topics = topics.filter(|_| !options.mode.is_direct());
-            collapse.open_single(&folded.collect(), &topics.collect());
-        }
-        let nodes: NodeKeys = (names.iter().zip(&self.selection.nodes))
-            .map(|(name, reason)| {
-                let plain = || (ItemKind::Node, Arc::clone(name));
-                reason.is_none().then(|| {
-                    let space = collapse.of(name);
-                    space.map_or_else(plain, |s| (ItemKind::Namespace, s.into()))
-                })
-            })
-            .collect();
-        let mut topics: TopicKeys = ById::like(&elements.topics, None);
-        if options.mode == Mode::Bundles {
-            topics = inside(elements, &collapse, &nodes, &self.selection);
-        } else if options.mode != Mode::Nodes {
-            let all = elements.topics.iter().zip(&self.selection.topics);
-            for ((topic, reason), key) in all.zip(topics.iter_mut()) {
-                *key = reason
-                    .is_none()
-                    .then(|| (ItemKind::Topic, topic.name.shared()));
-            }
-            set_groups(&mut topics, groups);
-            for key in topics.iter_mut().flatten() {
-                if let Some(stand_in) = self.fleets.stand_in(&key.1) {
-                    key.1 = stand_in;
-                }
-            }
-            if !collapse.is_empty() {
-                swallow(elements, (&collapse, &names), &nodes, &mut topics);
-            }
-        }
+        .keys();
         self.topics_in_words = ById::like(&topics, false);
         if options.is_picture {
             self.set_apart(mission, options, (&nodes, &mut topics));

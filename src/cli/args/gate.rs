@@ -92,7 +92,7 @@ pub(crate) struct CheckArgs {
     pub(crate) expect: Option<PathBuf>,
     /// Output format.
     #[arg(long, value_name = "WORD", default_value = "text", value_parser = check_format)]
-    pub(crate) format: &'static gate::Format,
+    pub(crate) format: &'static gate::CheckFormat,
     /// Also write this file, in the format of its extension or prefix: `check.xml`, `gitlab:quality.json`. Repeatable.
     #[arg(long = "output", short, value_name = "[WORD:]FILE")]
     pub(crate) outputs: Vec<OsString>,
@@ -146,17 +146,15 @@ pub(crate) const BASELINE_HELP: &str =
 pub(crate) const CHECK_HELP: &str = "Exit codes: 0 passed, 1 failed, 2 not checked (usage error, unreadable bag, no rule could be evaluated), 3 passed but \
     data was skipped (damaged bag).";
 
-fn check_format(word: &str) -> Result<&'static gate::Format, String> {
-    gate::Format::from_word(word).ok_or_else(|| {
+fn check_format(word: &str) -> Result<&'static gate::CheckFormat, String> {
+    gate::CheckFormat::from_word(word).ok_or_else(|| {
         let words: Vec<&str> = gate::FORMATS.iter().map(|f| f.word).collect();
         format!("write one of {}", words.join(", "))
     })
 }
 
 fn diff_format(word: &str) -> Result<&'static gate::DiffFormat, String> {
-    let word = if word == "md" { "markdown" } else { word };
-    let format = gate::DIFF_FORMATS.iter().find(|f| f.word == word);
-    format.ok_or_else(|| "write one of text, json, markdown".to_owned())
+    gate::DiffFormat::from_word(word).ok_or_else(|| "write one of text, json, markdown".to_owned())
 }
 
 fn link(text: &str) -> Result<(String, String), String> {

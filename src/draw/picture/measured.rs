@@ -97,12 +97,7 @@ impl MeasuredGraph {
             }
             vertices.push(Vertex {
                 size,
-                outline: match item.kind {
-                    _ if has_rows => Outline::Box,
-                    ItemKind::Node if style.node.is_capsule() => Outline::Capsule,
-                    ItemKind::Node => Outline::Ellipse,
-                    _ => Outline::Box,
-                },
+                outline: outline(item, has_rows, style),
                 cluster: item.cluster,
             });
             labels.push(label);
@@ -116,13 +111,11 @@ impl MeasuredGraph {
         };
         let topics: Vec<Vec<String>> = view.arrows.iter().map(fitted).collect();
         let mut rooms = drafter.rooms(&topics);
-        let gates: Vec<(Gate, Vec<String>)> = gates::gates(view)
-            .into_iter()
-            .map(|gate| {
-                let names = fitted(&gate.arrow);
-                (gate, names)
-            })
-            .collect();
+        let named = |gate: Gate| {
+            let names = fitted(&gate.arrow);
+            (gate, names)
+        };
+        let gates: Vec<_> = gates::gates(view).into_iter().map(named).collect();
         let forks = gates::forks(view, &gates);
         gates::share((view, fonts, &style.edge), &mut rooms, &gates, &forks);
         let through: BTreeSet<ArrowId> = gates.iter().flat_map(|(gate, _)| gate.lines()).collect();
@@ -177,6 +170,16 @@ impl MeasuredGraph {
             footers,
             first_seen: first_seen(view),
         }
+    }
+}
+
+/// The outline of a box: rows need straight sides.
+fn outline(item: &Item, has_rows: bool, style: &Style) -> Outline {
+    match item.kind {
+        ItemKind::Node if has_rows => Outline::Box,
+        ItemKind::Node if style.node.is_capsule() => Outline::Capsule,
+        ItemKind::Node => Outline::Ellipse,
+        _ => Outline::Box,
     }
 }
 

@@ -10,21 +10,38 @@ use crate::export::report::escape::{code, plain};
 
 /// The two missions as given.
 #[derive(Clone, Debug)]
-pub(crate) struct DiffSubject {
-    pub(crate) first: String,
-    pub(crate) second: String,
+pub struct DiffSubject {
+    /// The name of the first.
+    pub first: String,
+    /// The name of the second.
+    pub second: String,
 }
 
 /// A format of differences.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DiffFormat {
+pub struct DiffFormat {
     pub(crate) word: &'static str,
     pub(crate) endings: &'static [&'static str],
     pub(crate) write: fn(&DiffSubject, &[Difference]) -> String,
 }
 
+impl DiffFormat {
+    /// The format of a word: `text`, `json` or `markdown`.
+    pub fn from_word(word: &str) -> Option<&'static Self> {
+        let word = if word == "md" { "markdown" } else { word };
+        DIFF_FORMATS.iter().find(|f| f.word == word)
+    }
+
+    /// The format of a file name, by its extension.
+    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
+        let name = name.to_ascii_lowercase();
+        let is_end = |f: &&Self| f.endings.iter().any(|end| name.ends_with(end));
+        DIFF_FORMATS.iter().find(is_end)
+    }
+}
+
 /// All formats.
-pub(crate) const DIFF_FORMATS: &[DiffFormat] = &[
+const DIFF_FORMATS: &[DiffFormat] = &[
     DiffFormat {
         word: "text",
         endings: &[".txt"],

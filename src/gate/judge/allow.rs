@@ -1,6 +1,6 @@
 //! Accepted known findings, which expire on a date compared with the bag's time.
 
-use super::{Checked, Judge};
+use super::{CheckedFact, Judge};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::gate::expectation::AllowedFinding;
@@ -30,7 +30,7 @@ impl Judge<'_> {
 }
 
 /// Accepts the findings that an allowance matches; returns whether there were any.
-fn forgive(checks: &mut [Checked], allowance: &AllowedFinding, start: Stamp) -> bool {
+fn forgive(checks: &mut [CheckedFact], allowance: &AllowedFinding, start: Stamp) -> bool {
     let mut is_used = false;
     let all = checks.iter_mut().flat_map(|c| &mut c.findings);
     for finding in all.filter(|f| f.kind == allowance.finding && allowance.name.matches(&f.name)) {

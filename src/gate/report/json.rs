@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Subject;
 use crate::gate::finding::{Finding, Severity};
-use crate::gate::judge::{Checked, Judgement, Verdict};
+use crate::gate::judge::{CheckedFact, Judgement, Verdict};
 use crate::mission::info::json;
 
 #[derive(Serialize)]
@@ -74,7 +74,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     json(&report)
 }
 
-fn rule(check: &Checked) -> RuleJson<'_> {
+fn rule(check: &CheckedFact) -> RuleJson<'_> {
     RuleJson {
         title: &check.title,
         line: check.place.line,

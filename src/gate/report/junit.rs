@@ -3,7 +3,7 @@
 use super::Subject;
 use crate::draw::paint::xml::Xml;
 use crate::gate::finding::{Finding, Severity};
-use crate::gate::judge::{Checked, Judgement, Verdict};
+use crate::gate::judge::{CheckedFact, Judgement, Verdict};
 
 /// The report; ends in a new line.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
@@ -32,11 +32,11 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
 }
 
 /// Whether a fact fails: a warning passes, as it does for the exit code.
-fn is_failed(check: &Checked) -> bool {
+fn is_failed(check: &CheckedFact) -> bool {
     check.findings.iter().any(|f| f.severity == Severity::Error)
 }
 
-fn case(xml: &mut Xml, subject: &Subject<'_>, check: &Checked) {
+fn case(xml: &mut Xml, subject: &Subject<'_>, check: &CheckedFact) {
     xml.open("testcase")
         .attribute("classname", &subject.file)
         .attribute("name", &check.title)
