@@ -67,7 +67,7 @@
 //! same bytes for the same bag.
 
 #![cfg_attr(
-    not(feature = "cli"),
+    not(all(feature = "cli", feature = "parquet", feature = "pdf")),
     allow(
         dead_code,
         unreachable_pub,

@@ -18,7 +18,6 @@ pub(crate) fn hex_of(bytes: &[u8]) -> String {
 }
 
 /// The first `digits` hex digits of a text's digest, 64 at most.
-#[cfg(any(feature = "cli", feature = "parquet"))]
 pub(crate) fn hex(text: &str, digits: usize) -> String {
     let mut sum = Sum::default();
     sum.add(text.as_bytes());
@@ -27,10 +26,8 @@ pub(crate) fn hex(text: &str, digits: usize) -> String {
 
 /// A digest of bytes that come in parts.
 #[derive(Default)]
-#[cfg(any(feature = "cli", feature = "parquet"))]
 pub(crate) struct Sum(Sha256);
 
-#[cfg(any(feature = "cli", feature = "parquet"))]
 impl Sum {
     pub(crate) fn add(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
@@ -86,7 +83,6 @@ mod tests {
     }
 
     #[test]
-    #[cfg(any(feature = "cli", feature = "parquet"))]
     fn hex_is_a_prefix_of_the_digest() {
         assert_eq!(hex("", 12), "e3b0c44298fc");
     }

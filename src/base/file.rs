@@ -46,7 +46,6 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`].
-#[cfg(all(feature = "cli", feature = "parquet"))]
 pub(crate) fn read_from(stream: impl io::Read, name: &Path, limit: u64) -> Result<Vec<u8>> {
     bounded(stream, name, limit, |_| Ok(()))
 }

@@ -30,7 +30,6 @@ impl Drop for Leftover {
     }
 }
 
-#[cfg(feature = "cli")]
 /// Removes all registered paths just before the process ends.
 pub(crate) fn remove() {
     for path in all().iter() {

@@ -200,7 +200,6 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// As [`read`].
-#[cfg(feature = "cli")]
 pub(super) fn so_far(collected: &Collected, reading: &Reading) -> Result<Mission> {
     let mut findings = concluded(collected, reading)?;
     let traffic = traffic(&collected.recorded, &findings)?;
