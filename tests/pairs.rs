@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use bagreel::bag::Want;
+use bagreel::{Reading, read};
 
 use crate::edges::log1;
 use crate::gate::bagreel;
@@ -398,6 +399,39 @@ fn a_subscriber_that_disappears_from_statistics_is_missing() {
     assert_eq!(found(here, "same.bag").0, Vec::<String>::new());
     written(here, "deaf.bag", &again(&counted(&["/amcl"]), 6));
     assert_eq!(found(here, "deaf.bag").0, ["subscriber-missing /scan"]);
+}
+
+/// A recorder subscribes to a topic because it exists; any other node may wait for it.
+#[test]
+fn a_topic_that_only_a_recorder_waits_for_does_not_exist_yet() {
+    let dir = tempfile::tempdir().unwrap();
+    let first = |reader: &str| {
+        let mut bag = counted(&["/record_1", "/record_2"]);
+        let joy = bag.publisher("/joystick", "/joy", "std_msgs/String");
+        bag.send(joy, (40_000, 60_000), 500, b"\x01\0\0\0a");
+        for name in ["/record_1", reader] {
+            let own = bag.publisher(name, "/statistics", "rosgraph_msgs/TopicStatistics");
+            STATISTICS.clone_into(&mut bag.publishers[own].definition);
+            let at = ORIGIN + 42 * SECOND;
+            let payload = statistics("/joy", "/joystick", name, at);
+            bag.messages.push((own, at, payload));
+        }
+        bag.messages.sort_by_key(|m| m.1);
+        written(dir.path(), "run.bag", &bag);
+        let mission = read(&Reading::of([dir.path().join("run.bag")])).unwrap();
+        let elements = &mission.elements;
+        let mut topics = elements.topics.with_ids();
+        let (joy, _) = topics.find(|(_, t)| t.name.as_str() == "/joy").unwrap();
+        let subscribes = elements.subscribes.iter();
+        let seen = subscribes
+            .filter(|edge| edge.topic == joy)
+            .map(|edge| &edge.seen);
+        let seen = seen.chain([&elements.topics[joy].seen]);
+        let firsts = seen.map(|seen| (seen.lives[0].start.0 - ORIGIN) / SECOND);
+        firsts.collect::<Vec<_>>()
+    };
+    assert_eq!(first("/record_2"), [40, 40, 40]);
+    assert_eq!(first("/teleop"), [0, 0, 0]);
 }
 
 /// A bag whose connections have no node names, with a log of few nodes.

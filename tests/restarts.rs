@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use crate::causes::{at, minute, shown};
 use crate::pairs::loaded;
 use crate::support::rosbag1::{Pack, write};
-use crate::support::{ORIGIN, shared};
+use crate::support::{ORIGIN, Recording, shared};
 
 const MILLISECOND: i64 = 1_000_000;
 
@@ -105,17 +105,12 @@ fn a_first_log_record_in_a_rewritten_bag_is_no_start() {
 fn a_slow_topic_with_the_same_gap_does_not_hide_a_restart() {
     let mut bag = minute(&[]);
     bag.send(0, (60_000, 210_000), 100, &[]);
-    let scan = bag.publisher("/lidar", "/scan", "test/Scan");
-    "Header header\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
-        .clone_into(&mut bag.publishers[scan].definition);
-    for (from, to) in [(0, 116_000), (143_000, 210_000)] {
-        for (number, millisecond) in (1_u32..).zip((from..to).step_by(100)) {
-            let mut payload = number.to_le_bytes().to_vec();
-            payload.extend([0; 12]);
-            let time = ORIGIN + millisecond * MILLISECOND;
-            bag.messages.push((scan, time, payload));
-        }
-    }
+    stamped(
+        &mut bag,
+        "/lidar",
+        "/scan",
+        &[(0, 116_000), (143_000, 210_000)],
+    );
     // The interval of 27 s is less than 5 of those before it, but nearly 7 usual ones.
     let rare = bag.publisher("/lidar", "/rare", "std_msgs/Empty");
     let mixed = [4, 8, 4, 4, 8, 4, 8, 4, 4, 8, 4];
@@ -136,5 +131,64 @@ fn the_last_goal_in_a_status_is_no_sign_of_its_client() {
         // The numbers of the clients' log records start over before each goal.
         let found = restarts(&[bag], Stdio::null());
         assert_eq!(found.len(), 4, "{found:?}");
+    }
+}
+
+#[test]
+fn a_restarted_node_is_drawn_with_the_topics_of_its_present_run() {
+    let mut bag = minute(&[]);
+    bag.send(0, (60_000, 210_000), 100, &[]);
+    stamped(
+        &mut bag,
+        "/lidar",
+        "/scan",
+        &[(0, 116_000), (143_000, 210_000)],
+    );
+    for (topic, times) in [("/before", (0, 116_000)), ("/after", (143_000, 210_000))] {
+        let own = bag.publisher("/lidar", topic, "std_msgs/Empty");
+        bag.send(own, times, 100, &[]);
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.bag");
+    fs::write(&path, write(&bag, Pack::None, 64 * 1024)).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(folder.path())
+        .args([
+            "render", "run.bag", "-p", "10", "--mode", "all", "-o", "{n}.svg",
+        ])
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{done:?}");
+    // The windows in which a topic is drawn as present.
+    let drawn = |topic: &str| {
+        let name = format!("data-name=\"{topic}\"");
+        let windows = 0..21;
+        let is_drawn = |window: &i32| {
+            let frame = folder.path().join(format!("{window:02}.svg"));
+            let frame = fs::read_to_string(frame).unwrap();
+            let mut groups = frame.split("<g ").filter_map(|group| group.split_once('>'));
+            let absent = ["removed", "away"];
+            groups.any(|(tag, _)| tag.contains(&name) && !absent.iter().any(|a| tag.contains(a)))
+        };
+        windows.filter(is_drawn).collect::<Vec<i32>>()
+    };
+    assert_eq!(drawn("/scan"), (0..11).chain(14..21).collect::<Vec<_>>());
+    assert_eq!(drawn("/before"), (0..11).collect::<Vec<_>>());
+    assert_eq!(drawn("/after"), (14..21).collect::<Vec<_>>());
+}
+
+/// Adds messages whose headers are numbered from 1 in each of these times, in milliseconds.
+fn stamped(bag: &mut Recording, node: &str, topic: &str, times: &[(i64, i64)]) {
+    let own = bag.publisher(node, topic, "test/Scan");
+    "Header header\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+        .clone_into(&mut bag.publishers[own].definition);
+    for (from, to) in times {
+        for (number, millisecond) in (1_u32..).zip((*from..*to).step_by(100)) {
+            let mut payload = number.to_le_bytes().to_vec();
+            payload.extend([0; 12]);
+            let time = ORIGIN + millisecond * MILLISECOND;
+            bag.messages.push((own, time, payload));
+        }
     }
 }

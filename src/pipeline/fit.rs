@@ -347,9 +347,8 @@ impl Fitting<'_> {
             notices.extend(reported(drawing, &parts(collapsed, kept), &self.page, text).iter());
             if self.options.mode != drawing.view.mode {
                 let text = format!(
-                    "drew one line per pair of boxes{}; draw each topic with `--mode {}`",
-                    so_that(text >= drawing.readable()),
-                    drawing.view.mode.word()
+                    "drew one line per pair of boxes{}; draw each topic with `--fit none`",
+                    so_that(text >= drawing.readable())
                 );
                 notices.add(Notice::new(NoticeKind::Hidden, text));
             }

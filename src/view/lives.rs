@@ -4,10 +4,12 @@
 //! The picture is derived from these and not from the messages in a window, so that no element appears,
 //! vanishes or changes its look without an event.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Elements, PerElement, TopicId};
 use crate::mission::Mission;
-use crate::mission::event_log::Kind;
+use crate::mission::event_log::{Event, EventId, Kind};
 
 /// Beginnings and ends in continuous time.
 pub(crate) struct ItemTurns<'a> {
@@ -29,13 +31,12 @@ impl<'a> ItemTurns<'a> {
             pauses: PerElement::new(&mission.elements, |_| Vec::new()),
         };
         let events = &mission.log.events;
+        let kept = kept(&mission.elements, events);
         for event in events {
-            // A part is reported with its whole, so it appears and vanishes with it. An element that restarts
-            // keeps its parts; for a role, one run ends and the next one begins at a restart, otherwise each
-            // run would exist all the time.
+            // A part is reported with its whole, so it appears and vanishes with it.
             let whole = event.part_of.and_then(|id| events.get(id));
-            let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
-            if is_kept && !event.what.is_node() {
+            let key = |whole| (whole, part(&mission.elements, event.what));
+            if event.part_of.is_some_and(|id| kept.contains(&key(id))) {
                 continue;
             }
             let begins = match event.kind {
@@ -50,7 +51,11 @@ impl<'a> ItemTurns<'a> {
                 }
                 _ => continue,
             };
-            let turn = (whole.unwrap_or(event).time, begins);
+            let whole = whole.unwrap_or(event);
+            // A run of a role begins where the last one ended, away until it is back.
+            let is_new = begins && whole.kind == Kind::Restarted && !event.what.is_node();
+            let end = whole.until.filter(|_| is_new);
+            let turn = (end.unwrap_or(whole.time), begins);
             if let Some(turns) = lives.turns.of_mut(event.what) {
                 turns.push(turn);
             }
@@ -137,6 +142,36 @@ impl<'a> ItemTurns<'a> {
         }
         alive
     }
+}
+
+/// The topic, or the edge with its topic and its node's role, that an event is about: the same for each run of a role.
+type PartKey<'a> = (bool, Option<&'a str>, Option<TopicId>);
+
+fn part(elements: &Elements, what: Element) -> PartKey<'_> {
+    let (node, topic) = elements.ends(what);
+    let role = node.map(|id| &*elements.nodes[id].role);
+    (matches!(what, Element::Publish(_)), role, topic)
+}
+
+/// The topics and edges that a node has before and after its restart: these stay. Nodes are not among them: for a role,
+/// one run ends and the next one begins, otherwise each run would exist all the time.
+fn kept<'a>(
+    elements: &'a Elements,
+    events: &ById<EventId, Event>,
+) -> BTreeSet<(EventId, PartKey<'a>)> {
+    let mut seen: BTreeMap<(EventId, PartKey<'_>), [bool; 2]> = BTreeMap::new();
+    for event in events {
+        let whole = event.part_of.and_then(|id| Some((id, events.get(id)?)));
+        let restart = whole.filter(|(_, whole)| whole.kind == Kind::Restarted);
+        if let Some((id, _)) = restart.filter(|_| !event.what.is_node()) {
+            let key = (id, part(elements, event.what));
+            let [ends, begins] = seen.entry(key).or_default();
+            *ends |= event.kind == Kind::Vanished;
+            *begins |= event.kind == Kind::Appeared;
+        }
+    }
+    seen.retain(|_, [ends, begins]| *ends && *begins);
+    seen.into_keys().collect()
 }
 
 /// Whether an element exists after the first `done` of its beginnings and ends; before all of them, it exists

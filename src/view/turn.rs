@@ -136,8 +136,9 @@ pub(super) fn with_ends(
     ends: [Option<(Option<Mark>, &[EventId])>; 2],
 ) -> Option<Changed> {
     let marks: &[Mark] = match there {
-        (false, true) => &[Mark::Added],
-        (_, false) => &[Mark::Removed],
+        // A node may return with other lines.
+        (false, true) => &[Mark::Added, Mark::Restarted],
+        (_, false) => &[Mark::Removed, Mark::Restarted],
         // Lines stay, dotted, while one of their ends is away.
         (true, true) => &[Mark::Removed, Mark::Away],
     };
@@ -145,8 +146,8 @@ pub(super) fn with_ends(
     let mut ends = ends.into_iter().flatten();
     let (mark, events) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
     Some(Changed {
-        came: mark == Mark::Added,
-        went: mark == Mark::Removed,
+        came: there == (false, true),
+        went: !there.1 || mark == Mark::Removed,
         mark: Some(mark).filter(|_| there == (true, true)),
         events: events.to_vec(),
         ..Changed::default()

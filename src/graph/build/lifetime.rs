@@ -41,6 +41,19 @@ impl Lifetime {
         }
     }
 
+    /// The part of it inside another one; `None` if they do not overlap.
+    pub(super) fn within(&self, other: &Self) -> Option<Self> {
+        let later = if other.from > self.from { other } else { self };
+        let sooner = if other.to < self.to { other } else { self };
+        (later.from <= sooner.to).then_some(Self {
+            from: later.from,
+            to: sooner.to,
+            sign: self.sign.max(later.from),
+            began: later.began,
+            ended: sooner.ended,
+        })
+    }
+
     /// Ends the lifetime because of evidence.
     pub(super) fn close(&mut self, end: Stamp) {
         let last = self.to;

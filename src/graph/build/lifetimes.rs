@@ -44,10 +44,9 @@ pub(crate) fn compute_lifetimes(
         } else {
             learner.learn(track);
         }
-        tracks
-            .entry(ElementKey::Topic(topic))
-            .or_default()
-            .know(track);
+        let is_recorder = is_recorder(what, tracks);
+        let topic = tracks.entry(ElementKey::Topic(topic)).or_default();
+        topic.know(track, is_recorder);
     }
     // A node ended if its last connection was closed and it has no later sign.
     for (node, end) in closed {
@@ -67,13 +66,20 @@ pub(crate) fn compute_lifetimes(
         }
     }
     let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
+    let mut of_recorders: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
+    let mut recorded: Vec<ElementKey> = Vec::new();
     for (what, track) in &mut edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
         };
         let around = tracks.get(&ElementKey::Node(node));
         track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
-        add(of_topics.entry(topic).or_default(), &track.lives);
+        if is_recorder(what, tracks) {
+            add(of_recorders.entry(topic).or_default(), &track.lives);
+            recorded.push(*what);
+        } else {
+            add(of_topics.entry(topic).or_default(), &track.lives);
+        }
     }
     tracks.append(&mut edges);
     live_like(tracks, likes, false, |what, lives| {
@@ -86,9 +92,32 @@ pub(crate) fn compute_lifetimes(
             let edges = of_topics.remove(topic).unwrap_or_default();
             track.live(mission, false);
             track.live_with(edges);
+            if track.lives.is_empty() {
+                track.live_with(of_recorders.remove(topic).unwrap_or_default());
+            }
+        }
+    }
+    for what in recorded {
+        let [_, Some(topic)] = what.ends() else {
+            continue;
+        };
+        let around = tracks.get(&ElementKey::Topic(topic));
+        let around = around.map(|t| Rc::clone(&t.lives)).unwrap_or_default();
+        if let Some(track) = tracks.get_mut(&what) {
+            track.stay_within(&around);
         }
     }
     live_like(tracks, likes, true, |_, _| {});
+}
+
+/// Whether an edge is a subscription of a recorder, which subscribes to topics because they exist: it does not show how
+/// long they do.
+fn is_recorder(what: &ElementKey, tracks: &Tracks) -> bool {
+    let ElementKey::Subscribe(_, node) = what else {
+        return false;
+    };
+    let node = tracks.get(&ElementKey::Node(*node));
+    node.is_some_and(|node| node.evidence.has("recorder"))
 }
 
 /// Adds the lifetimes of an edge to those of its topic's edges, very many of which may be equal.

@@ -266,11 +266,12 @@ impl Liveness {
         }
     }
 
-    /// Adds the evidence for an edge to its topic. The senders are counted on the topic itself.
-    pub(crate) fn know(&mut self, edge: &Self) {
+    /// Adds the evidence for an edge to its topic, which exists as long as the edge unless that `follows` it. The senders
+    /// are counted on the topic itself.
+    pub(crate) fn know(&mut self, edge: &Self, follows: bool) {
         self.evidence = self.evidence.and(edge.evidence);
         self.confidence = self.confidence.min(edge.confidence);
-        if edge.is_whole() {
+        if edge.is_whole() && !follows {
             self.extent = self.extent.max(Extent::Whole);
         }
         self.seen.extend(edge.signs.iter().chain(&edge.seen));
@@ -365,6 +366,13 @@ impl Liveness {
             }
         }
         self.lives = Rc::new(own);
+    }
+
+    /// Limits its lifetimes to those of an element without which it does not exist.
+    pub(crate) fn stay_within(&mut self, others: &[Lifetime]) {
+        let own = self.lives.iter();
+        let inside = own.flat_map(|life| others.iter().filter_map(|other| life.within(other)));
+        self.lives = Rc::new(inside.collect());
     }
 
     /// Dates its beginnings back to those of an element without which it does not exist, unless it is known to be absent
