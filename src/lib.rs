@@ -173,7 +173,7 @@ pub use pipeline::fleet;
 
 pub mod commands {
     //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the check
-    //! against an expectations file, the comparison of two missions.
+    //! against an expectations file and the writing of one, the comparison of two missions.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output as Done};
+use std::process::Command;
 
 use bagreel::commands::{Baseline, Check, Diff, Report, baseline, check, diff};
 use bagreel::values::{
@@ -11,19 +11,11 @@ use bagreel::values::{
 };
 use bagreel::{Error, Mission, Output, Reading, Render, read, render};
 
+use crate::gate::bagreel;
+
 /// A path in the project.
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
-/// Runs a program with arguments that have no spaces.
-fn run(program: &Path, folder: &Path, args: &str) -> Done {
-    let mut command = Command::new(program);
-    command
-        .current_dir(folder)
-        .args(args.split(' '))
-        .output()
-        .unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -57,7 +49,10 @@ fn every_example_program_runs_as_it_says() {
             .expect(name);
         let line = line.trim_end_matches('`').replace('\'', "");
         let here = format!("{}/", project("examples").display());
-        let done = run(&program, folder.path(), &line.replace("examples/", &here));
+        let line = line.replace("examples/", &here);
+        let mut run = Command::new(&program);
+        run.current_dir(folder.path()).args(line.split(' '));
+        let done = run.output().unwrap();
         assert!(done.status.success(), "{name}: {}", text(&done.stderr));
         assert!(
             text(&done.stdout).lines().count() >= 1,
@@ -116,12 +111,8 @@ fn a_program_writes_a_baseline_and_checks_missions_against_it() {
     .unwrap();
     job.expect = "graph.yaml".into();
     job.tracked = "graph.yaml".to_owned();
-    let command = Path::new(env!("CARGO_BIN_EXE_bagreel"));
-    let told = run(
-        command,
-        folder.path(),
-        "check courier.mcap --expect graph.yaml --format json",
-    );
+    let args = "check courier.mcap --expect graph.yaml --format json";
+    let told = bagreel(folder.path(), &args.split(' ').collect::<Vec<_>>());
     assert_eq!(told.status.code(), Some(1));
     let json = CheckFormat::from_word("json").unwrap();
     assert_eq!(job.report(&done, json), text(&told.stdout));
@@ -166,12 +157,8 @@ fn a_program_compares_two_missions() {
             .contains("/amcl")
     );
 
-    let command = Path::new(env!("CARGO_BIN_EXE_bagreel"));
-    let told = run(
-        command,
-        &project("examples"),
-        "diff courier.mcap warehouse.bag --format json",
-    );
+    let args = "diff courier.mcap warehouse.bag --format json";
+    let told = bagreel(&project("examples"), &args.split(' ').collect::<Vec<_>>());
     let json = DiffFormat::from_word("json").unwrap();
     assert_eq!(job.report(&done, json), text(&told.stdout));
 }

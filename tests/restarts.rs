@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::causes::{at, minute, shown};
+use crate::gate::bagreel;
 use crate::pairs::loaded;
 use crate::support::rosbag1::{Pack, write};
 use crate::support::{ORIGIN, Recording, shared};
@@ -152,13 +153,8 @@ fn a_restarted_node_is_drawn_with_the_topics_of_its_present_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.bag");
     fs::write(&path, write(&bag, Pack::None, 64 * 1024)).unwrap();
-    let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-        .current_dir(folder.path())
-        .args([
-            "render", "run.bag", "-p", "10", "--mode", "all", "-o", "{n}.svg",
-        ])
-        .output()
-        .unwrap();
+    let args = "render run.bag -p 10 --mode all -o {n}.svg";
+    let done = bagreel(folder.path(), &args.split(' ').collect::<Vec<_>>());
     assert!(done.status.success(), "{done:?}");
     // The windows in which a topic is drawn as present.
     let drawn = |topic: &str| {

@@ -279,10 +279,11 @@ fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Readin
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.
 fn report(output: &OsStr) -> Result<Report> {
     let is_summary = summary().is_some_and(|path| path == Path::new(output));
-    let name = output.to_string_lossy();
-    Report::parse(&if is_summary {
-        format!("markdown:{name}")
-    } else {
-        name.into_owned()
-    })
+    match CheckFormat::from_word("markdown").filter(|_| is_summary) {
+        Some(format) => Ok(Report {
+            target: Target::parse(output),
+            format,
+        }),
+        None => Report::parse(output),
+    }
 }

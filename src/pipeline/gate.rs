@@ -33,7 +33,9 @@ impl Report {
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown extension.
-    pub fn parse(text: &str) -> Result<Self> {
+    pub fn parse(output: impl AsRef<OsStr>) -> Result<Self> {
+        let output = output.as_ref();
+        let text = output.to_string_lossy();
         let named = text.split_once(':');
         if let Some((format, path)) =
             named.and_then(|(word, path)| Some((CheckFormat::from_word(word)?, path)))
@@ -50,8 +52,8 @@ impl Report {
             )
         };
         Ok(Self {
-            target: Target::parse(text),
-            format: CheckFormat::of_name(text).ok_or_else(unknown)?,
+            target: Target::parse(output),
+            format: CheckFormat::of_name(&text).ok_or_else(unknown)?,
         })
     }
 }
@@ -175,14 +177,12 @@ impl Diff {
     /// # Errors
     /// As [`Drawing::new`].
     pub fn new(readings: [Reading; 2]) -> Result<Self> {
-        let subject = subject(&readings);
         let mut drawing = Drawing::new()?;
         drawing.body = Body::Graph;
-        drawing.page.title = Some(format!("A: {} → B: {}", subject.first, subject.second));
         Ok(Self {
+            subject: subject(&readings),
             readings,
             rate_change: RATE_CHANGE,
-            subject,
             reports: Vec::new(),
             pictures: Vec::new(),
             drawing,
@@ -275,7 +275,13 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
         let mission = union(&first, &second, &differences, side);
         let mut render = Render::new(Reading::default(), outputs)?;
         render.drawing = job.drawing.clone();
-        render.drawing.page.rate_change = job.rate_change;
+        let page = &mut render.drawing.page;
+        page.rate_change = job.rate_change;
+        let DiffSubject {
+            first: a,
+            second: b,
+        } = &job.subject;
+        page.title.get_or_insert_with(|| format!("A: {a} → B: {b}"));
         let missions = [&first, &second];
         let pairs = pairs(missions, &job.subject, &differences, &mission);
         render.sequence.pairs = (!pairs.rows.is_empty()).then_some(pairs);

@@ -29,6 +29,13 @@ pub(crate) fn compute_lifetimes(
         .filter(|(_, other)| matches!(other, ElementKey::Node(_)));
     let followers: BTreeSet<ElementKey> = of_nodes.map(|(what, _)| *what).collect();
     let mut edges = tracks.split_off(&FIRST_EDGE);
+    // A recorder subscribes to topics because they exist, so its subscriptions do not show how long they do.
+    let nodes = tracks.iter().filter_map(|(what, track)| match what {
+        ElementKey::Node(node) if track.evidence.has("recorder") => Some(*node),
+        _ => None,
+    });
+    let recorders: BTreeSet<Name> = nodes.collect();
+    let is_recorded = |what: &ElementKey| matches!(what, ElementKey::Subscribe(_, node) if recorders.contains(node));
     for (what, track) in &edges {
         let [Some(node), Some(topic)] = what.ends() else {
             continue;
@@ -44,9 +51,8 @@ pub(crate) fn compute_lifetimes(
         } else {
             learner.learn(track);
         }
-        let is_recorder = is_recorder(what, tracks);
-        let topic = tracks.entry(ElementKey::Topic(topic)).or_default();
-        topic.know(track, is_recorder);
+        let known = tracks.entry(ElementKey::Topic(topic)).or_default();
+        known.know(track, is_recorded(what));
     }
     // A node ended if its last connection was closed and it has no later sign.
     for (node, end) in closed {
@@ -74,7 +80,7 @@ pub(crate) fn compute_lifetimes(
         };
         let around = tracks.get(&ElementKey::Node(node));
         track.live_within(&around.map(|t| Rc::clone(&t.lives)).unwrap_or_default());
-        if is_recorder(what, tracks) {
+        if is_recorded(what) {
             add(of_recorders.entry(topic).or_default(), &track.lives);
             recorded.push(*what);
         } else {
@@ -108,16 +114,6 @@ pub(crate) fn compute_lifetimes(
         }
     }
     live_like(tracks, likes, true, |_, _| {});
-}
-
-/// Whether an edge is a subscription of a recorder, which subscribes to topics because they exist: it does not show how
-/// long they do.
-fn is_recorder(what: &ElementKey, tracks: &Tracks) -> bool {
-    let ElementKey::Subscribe(_, node) = what else {
-        return false;
-    };
-    let node = tracks.get(&ElementKey::Node(*node));
-    node.is_some_and(|node| node.evidence.has("recorder"))
 }
 
 /// Adds the lifetimes of an edge to those of its topic's edges, very many of which may be equal.
