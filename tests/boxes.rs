@@ -1,17 +1,22 @@
-//! Tests that boxes of a window agree with its JSON.
+//! Tests that boxes and edges of a window agree with its JSON.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
+use crate::support::shared;
+
 /// The mission as JSON, and a picture of each of its windows.
-fn rendered(bag: &str, arguments: &[&str]) -> (Value, Vec<String>) {
+fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let out = |name: &str| folder.path().join(name);
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command.arg("render").arg(bag).args(["--view", "graph"]);
+    command
+        .arg("render")
+        .arg(bag.as_ref())
+        .args(["--view", "graph"]);
     let outputs = [out("mission.json"), out("{n}.svg")];
     let done = command
         .args(arguments)
@@ -33,23 +38,31 @@ fn rendered(bag: &str, arguments: &[&str]) -> (Value, Vec<String>) {
     (mission, pictures)
 }
 
-/// The boxes of a picture: their class and attributes by name.
-fn boxes(picture: &str) -> impl Iterator<Item = BTreeMap<String, String>> + '_ {
+/// An element of a picture: its class and attributes.
+type Drawn = BTreeMap<String, String>;
+
+/// The nodes, topics and edges of a picture.
+fn elements(picture: &str) -> Vec<Drawn> {
     let document = roxmltree::Document::parse(picture).unwrap();
-    let is_box = |node: &roxmltree::Node<'_, '_>| {
+    let is_one = |node: &roxmltree::Node<'_, '_>| {
         let class = node.attribute("class").unwrap_or_default();
-        node.has_attribute("data-state")
-            && class
-                .split(' ')
-                .any(|word| word == "node" || word == "topic")
+        let kind = class.split(' ').next().unwrap_or_default();
+        let is_named = node.has_attribute("data-name") || node.has_attribute("data-from");
+        is_named && ["node", "topic", "edge"].contains(&kind)
     };
-    let boxes = document.descendants().filter(is_box);
     let attributes = |node: roxmltree::Node<'_, '_>| {
         let all = node.attributes();
         all.map(|a| (a.name().to_owned(), a.value().to_owned()))
             .collect()
     };
-    boxes.map(attributes).collect::<Vec<_>>().into_iter()
+    let all = document.descendants().filter(is_one);
+    all.map(attributes).collect()
+}
+
+/// The nodes and topics of a picture.
+fn boxes(picture: &str) -> impl Iterator<Item = Drawn> {
+    let all = elements(picture).into_iter();
+    all.filter(|drawn| drawn.contains_key("data-state"))
 }
 
 fn rows<'a>(window: &'a Value, what: &str) -> impl Iterator<Item = &'a Value> {
@@ -114,4 +127,111 @@ fn no_topic_is_active_before_its_first_message() {
         }
     }
     assert!(silent > 0);
+}
+
+/// The graph of a window: its nodes with the name they are drawn with, its topics, and who publishes and subscribes.
+struct Graph<'a> {
+    drawn_as: BTreeMap<&'a str, &'a str>,
+    topics: BTreeSet<&'a str>,
+    edges: BTreeSet<(&'a str, &'a str, &'a str)>,
+}
+
+impl<'a> Graph<'a> {
+    fn of(window: &'a Value) -> Self {
+        let text = |row: &'a Value, key: &str| row[key].as_str().unwrap();
+        let edges = |kind: &'static str| {
+            rows(window, kind).map(move |row| (kind, text(row, "node"), text(row, "topic")))
+        };
+        let nodes = rows(window, "nodes");
+        Self {
+            drawn_as: nodes.map(|n| (text(n, "name"), text(n, "role"))).collect(),
+            topics: rows(window, "topics").map(|t| text(t, "name")).collect(),
+            edges: edges("publishes").chain(edges("subscribes")).collect(),
+        }
+    }
+
+    /// Whether a box stands for a node: by its name, the name of its role, or that of a namespace around it.
+    fn is_node(&self, drawn: &str, node: &str) -> bool {
+        let below = |name: &str| {
+            name.strip_prefix(drawn)
+                .is_some_and(|rest| rest.starts_with('/'))
+        };
+        drawn == node || self.drawn_as.get(node) == Some(&drawn) || below(node)
+    }
+
+    /// Whether a box stands for a topic: by its name, or as the common box of the topics of an action.
+    fn is_topic(drawn: &str, topic: &str) -> bool {
+        let action = drawn.strip_suffix("action_topics");
+        drawn == topic || action.is_some_and(|action| topic.starts_with(action))
+    }
+
+    fn has_edge(&self, kind: &str, node: &str, topic: &str) -> bool {
+        let is_it = |edge: &&(&str, &str, &str)| {
+            edge.0 == kind && self.is_node(node, edge.1) && Self::is_topic(topic, edge.2)
+        };
+        self.edges.iter().any(|edge| is_it(&edge))
+    }
+
+    fn has(&self, drawn: &Drawn) -> bool {
+        let class: Vec<&str> = drawn["class"].split(' ').collect();
+        match class[..] {
+            ["node", ..] => self
+                .drawn_as
+                .keys()
+                .any(|node| self.is_node(&drawn["data-name"], node)),
+            ["topic", ..] => self
+                .topics
+                .iter()
+                .any(|topic| Self::is_topic(&drawn["data-name"], topic)),
+            ["edge", "publish", ..] => {
+                self.has_edge("publishes", &drawn["data-from"], &drawn["data-to"])
+            }
+            ["edge", "subscribe", ..] => {
+                self.has_edge("subscribes", &drawn["data-to"], &drawn["data-from"])
+            }
+            _ => {
+                let (from, to) = (&drawn["data-from"], &drawn["data-to"]);
+                drawn["data-topics"].split(' ').all(|topic| {
+                    let is_sent = |node, other: &str| {
+                        self.has_edge("publishes", node, topic)
+                            && (self.has_edge("subscribes", other, topic) || other == topic)
+                    };
+                    let is_read = |node| from == topic && self.has_edge("subscribes", node, topic);
+                    is_sent(from, to) || is_sent(to, from) || is_read(to)
+                })
+            }
+        }
+    }
+}
+
+#[test]
+fn only_what_is_in_the_graph_of_a_window_is_drawn_in_it() {
+    let examples = ["examples/warehouse.bag", "examples/courier.mcap"].map(|bag| Some(bag.into()));
+    let others = [
+        "bags/mission/mission.bag",
+        "mini/nodelet.bag",
+        "mini/mini_late.bag",
+    ];
+    let others = others.map(|bag| shared(&format!("data/{bag}")));
+    let mut all = 0;
+    for bag in examples.into_iter().chain(others).flatten() {
+        for mode in [&["--mode", "all"][..], &["--fit", "none"], &[]] {
+            let (mission, pictures) = rendered(&bag, &[&["--period", "10"], mode].concat());
+            for (window, picture) in rows(&mission, "windows").zip(&pictures) {
+                let graph = Graph::of(window);
+                for drawn in elements(picture) {
+                    let is_past = |word| ["removed", "away", "gone"].contains(&word);
+                    if !drawn["class"].split(' ').any(is_past) {
+                        assert!(
+                            graph.has(&drawn),
+                            "{bag:?} {mode:?} {}: {drawn:?}",
+                            window["index"]
+                        );
+                        all += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(all > 5_000, "{all}");
 }
