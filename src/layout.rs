@@ -135,7 +135,7 @@ worded! {
 }
 
 /// The caller's preferences for a layout.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LayoutOptions {
     /// The page to fill, in pixels: its aspect ratio determines packing and the choice of orientation.
     pub page: Size,
@@ -143,6 +143,9 @@ pub struct LayoutOptions {
     pub orientation: Option<Orientation>,
     /// Whether a drawing that fills the page is better than one of short edges without crossings.
     pub is_tight: bool,
+    /// The scale below which the drawing is of no use, so that no effort is made to improve it: 0 if it is of use at any
+    /// scale, infinite for a sketch.
+    pub least: f64,
 }
 
 /// The finished layout; its top left corner is (0, 0).

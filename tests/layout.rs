@@ -11,7 +11,7 @@ fn options(orientation: Option<Orientation>) -> layout::LayoutOptions {
     layout::LayoutOptions {
         page: Size::new(1280.0, 560.0),
         orientation,
-        is_tight: false,
+        ..layout::LayoutOptions::default()
     }
 }
 
@@ -114,6 +114,21 @@ proptest! {
     #[test]
     fn the_same_plan_gives_the_same_layout(plan in plans()) {
         prop_assert_eq!(laid_out(&plan, None), laid_out(&plan, None));
+    }
+
+    #[test]
+    fn only_a_drawing_of_no_use_is_made_without_effort(plan in plans()) {
+        let at_least = |least: f64| {
+            let options = layout::LayoutOptions { least, ..options(None) };
+            layout::lay_out(&plan, &options, layout::engine("layered").unwrap())
+        };
+        let (best, page) = (at_least(0.0), options(None).page);
+        let scale = (page.w / best.size.w).min(page.h / best.size.h);
+        prop_assert_eq!(&at_least(0.75 * scale), &best);
+        let sketch = at_least(f64::INFINITY);
+        let found = measure::measure(&plan, &sketch);
+        prop_assert_eq!((found.overlaps, found.through, found.foreign, found.label_overlaps), (0, 0, 0, 0));
+        prop_assert_eq!(sketch.boxes.len(), plan.vertices.len());
     }
 
     #[test]
@@ -270,8 +285,7 @@ fn an_inconsistent_plan_is_still_laid_out() {
     for (word, _) in layout::ENGINES {
         let page = layout::LayoutOptions {
             page: odd,
-            orientation: None,
-            is_tight: false,
+            ..layout::LayoutOptions::default()
         };
         let layout = layout::lay_out(&plan, &page, layout::engine(word).unwrap());
         let finite = |r: &Rect| [r.x, r.y, r.w, r.h].iter().all(|x| x.is_finite());

@@ -138,12 +138,17 @@ impl<'a> Measured<'a> {
         layout::LayoutOptions {
             page: Size::new(self.page.graph.w, self.page.graph.h),
             orientation: self.options.orientation,
-            is_tight: false,
+            ..layout::LayoutOptions::default()
         }
     }
 
     /// The smallest text of the graph in pixels if it is laid out like this.
     pub fn text_px(&self, layout: &Layout) -> f64 {
+        self.smallest_text() * self.scale(layout)
+    }
+
+    /// The smallest text of the graph at its natural size, in pixels.
+    pub(crate) fn smallest_text(&self) -> f64 {
         let (style, graph) = (self.style, &self.graph);
         let mut smallest = style.topic.size.min(style.node.size);
         if graph.rated.contains(&true) || !graph.footers.is_empty() {
@@ -152,7 +157,7 @@ impl<'a> Measured<'a> {
         if graph.labels.iter().any(|l| l.second) || !self.view.rows.is_empty() {
             smallest = smallest.min(style.node.small).min(style.topic.small);
         }
-        smallest * self.page.fit(layout.size).scale
+        smallest
     }
 
     /// The scale of the graph if it is laid out like this.

@@ -228,7 +228,7 @@ impl<'a> StripSource<'a> {
                 let options = layout::LayoutOptions {
                     page,
                     orientation,
-                    is_tight: false,
+                    ..layout::LayoutOptions::default()
                 };
                 layout::lay_out(measured.plan(), &options, self.engine)
             }));

@@ -90,8 +90,7 @@ mod tests {
             &plan,
             &LayoutOptions {
                 page,
-                orientation: None,
-                is_tight: false,
+                ..LayoutOptions::default()
             },
         );
         let inside = |v: usize, c: usize| layout.boxes[v].overlaps(&layout.clusters[c]);

@@ -154,11 +154,16 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
         .collect();
     let searches = layers.par_iter().map(|cut| Search::new(cut, effort));
     let searches: Vec<Search> = searches.collect();
-    let is_promising = promising(plan, options, part, &searches);
+    let (is_promising, is_useful) = promising(plan, options, part, &searches);
+    let last = |search: Search<'_>| {
+        if is_useful {
+            search.finished()
+        } else {
+            search.found()
+        }
+    };
     let both = searches.into_par_iter().zip(is_promising);
-    let found: Vec<_> = both
-        .map(|(search, is)| is.then(|| search.finished()))
-        .collect();
+    let found: Vec<_> = both.map(|(search, is)| is.then(|| last(search))).collect();
     let ordering = |(layers, found): (Layers, Option<(LayerRows, u64)>)| {
         let (rows, crossings) = found?;
         Some(Ordering {
@@ -175,35 +180,41 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
 /// complete searches, this changed 10 of 392 plans, 5 of them for the better.
 const PROMISING: f64 = 0.8;
 
-/// Whether each search may lead to the best drawing in one of the orientations, by the order that it found first.
+/// Whether each search may lead to the best drawing in one of the orientations, and whether one of these may be of use,
+/// by the orders that were found first.
 fn promising(
     plan: &Plan,
     options: &LayoutOptions,
     part: &Component,
     searches: &[Search],
-) -> Vec<bool> {
-    if searches.len() == 1 {
-        return vec![true];
-    }
+) -> (Vec<bool>, bool) {
+    let bound = |search: &Search, orientation| {
+        let (rows, crossings) = search.found();
+        bound(
+            plan,
+            options,
+            part,
+            (search.layers, &rows, crossings),
+            orientation,
+        )
+    };
+    let bounds = orientations(options).into_iter().map(|orientation| {
+        let all = searches.par_iter();
+        all.map(|search| bound(search, orientation)).collect()
+    });
+    let bounds: Vec<Vec<Bound>> = bounds.collect();
+    let is_useful = bounds
+        .iter()
+        .flatten()
+        .any(|bound| bound.fit >= options.least);
     let mut promising = vec![false; searches.len()];
-    for orientation in orientations(options) {
-        let hope = |search: &Search| {
-            let (rows, crossings) = search.found();
-            hope(
-                plan,
-                options,
-                part,
-                (search.layers, &rows, crossings),
-                orientation,
-            )
-        };
-        let hopes: Vec<f64> = searches.iter().map(hope).collect();
-        let least = PROMISING * hopes.iter().copied().fold(0.0, f64::max);
-        for (is, hope) in promising.iter_mut().zip(hopes) {
-            *is |= hope >= least;
+    for bounds in bounds {
+        let least = PROMISING * bounds.iter().map(|bound| bound.quality).fold(0.0, f64::max);
+        for (is, bound) in promising.iter_mut().zip(bounds) {
+            *is |= bound.quality >= least;
         }
     }
-    promising
+    (promising, is_useful)
 }
 
 /// The orientations to try.
@@ -212,18 +223,29 @@ fn orientations(options: &LayoutOptions) -> Vec<Orientation> {
     options.orientation.map_or(both, |asked| vec![asked])
 }
 
-/// The upper bound of the quality of a part with this order.
-fn hope(
+/// Upper bounds for the drawing of a part.
+struct Bound {
+    /// The scale at which it fits the page.
+    fit: f64,
+    quality: f64,
+}
+
+/// The upper bounds for the drawing of a part with this order.
+fn bound(
     plan: &Plan,
     options: &LayoutOptions,
     part: &Component,
     (layers, rows, crossings): (&Layers, &LayerRows, u64),
     orientation: Orientation,
-) -> f64 {
+) -> Bound {
     let room = Spacing::new(plan, options, part, layers, orientation);
     let (size, length) = room.least(rows, &room.apart(rows));
     let size = turned(size, orientation);
-    quality(size, (crossings, length), part.links.len(), options) * ROUNDING
+    let quality = quality(size, (crossings, length), part.links.len(), options);
+    Bound {
+        fit: pack::fit(size, options.page),
+        quality: quality * ROUNDING,
+    }
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
@@ -321,7 +343,7 @@ fn best_block(
     // The most promising first: most others can then be rejected before they are placed.
     let hoped = |ordering: &Ordering| {
         let found = (&ordering.layers, &ordering.rows, ordering.crossings);
-        hope(plan, options, part, found, orientation)
+        bound(plan, options, part, found, orientation).quality
     };
     let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));

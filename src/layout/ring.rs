@@ -229,8 +229,7 @@ mod tests {
     fn page() -> LayoutOptions {
         LayoutOptions {
             page: Size::new(1280.0, 560.0),
-            orientation: None,
-            is_tight: false,
+            ..LayoutOptions::default()
         }
     }
 

@@ -1,5 +1,6 @@
 //! Makes a drawing legible: enlarges the page, draws topics as lines, collapses constant elements, then changing ones.
 
+mod crop;
 mod notices;
 
 use std::collections::BTreeSet;
@@ -25,8 +26,15 @@ const LARGEST: Size = Size::new(1920.0, 1080.0);
 const FEWEST_STEADY: usize = 3;
 /// The share of the smallest legible text below which changing elements of a namespace are collapsed too.
 const HOPELESS: f64 = 0.3;
+/// The shares of the smallest legible text below which a quarter of the remaining namespaces is collapsed at once, and
+/// two: below 0.75, two at once cost a synthetic mission of 60 nodes four boxes; below 0.7, they cost none of 54 any.
+const FAR: f64 = 0.5;
+const SMALL: f64 = 0.7;
 /// The most collapsed namespaces that are tentatively reopened.
 const MOST_REOPENED: usize = 24;
+
+/// A namespace, and those of its boxes that stay outside when it is collapsed.
+type Spared = (Arc<str>, Vec<Arc<str>>);
 
 /// The best drawing so far, with its page and options.
 struct Fitting<'a> {
@@ -77,51 +85,13 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     let drawing = asked;
     let mut composed = fitting.composed();
     if !drawing.is_sized && drawing.is_fitted && drawing.page.width_mm.is_none() {
-        composed.page = cut(&composed, drawing);
+        composed.page = crop::cropped(&composed, drawing);
     }
     let notices = &mut composed.notices;
     notices.extend(picture::unshown(&composed.view, &drawing.fonts));
     let remarks = composed.layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     composed
-}
-
-/// The size of names on a page cropped to its graph, in pixels.
-const NAMES: f64 = 15.0;
-/// The space around the graph on such a page, in pixels.
-const AROUND: f64 = 20.0;
-/// The minimum width of such a page for an animation, which has a timeline, and for a still; and the minimum height.
-const LEAST: (f64, f64, f64) = (720.0, 320.0, 140.0);
-/// The minimum width of such a page with a legend.
-const LEGEND: f64 = 480.0;
-/// The width of a page with decorations (title, legend, timeline) of normal size, and their smallest legible scale.
-const DECORATIONS: (f64, f64) = (1100.0, 0.8);
-
-/// The page cropped to its graph, if names of a legible size leave it empty.
-fn cut(composed: &Composed, drawing: &Drawing) -> PageOptions {
-    let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);
-    let measured =
-        |page: &PageOptions| Measured::new(view, &drawing.style, &drawing.fonts, page.clone());
-    let largest = NAMES / drawing.style.node.size;
-    let scale = measured(page).scale(&composed.layout).min(largest);
-    let least = if view.has_time() { LEAST.0 } else { LEAST.1 };
-    let wide = (natural.w * scale + 2.0 * AROUND)
-        .max(least)
-        .min(page.size.w);
-    let mut cut = PageOptions {
-        size: Size::new(wide, page.size.h),
-        unit: Some((wide / DECORATIONS.0).clamp(DECORATIONS.1, 1.0)),
-        has_legend: page.has_legend && wide >= LEGEND,
-        ..page.clone()
-    };
-    let decorations = page.size.h - measured(&cut).layout_options().page.h;
-    let high = decorations + natural.h * scale + 1.2 * AROUND;
-    cut.size = Size::new(libm::ceil(wide), libm::ceil(high.max(LEAST.2)));
-    if cut.size.h < page.size.h {
-        cut
-    } else {
-        page.clone()
-    }
 }
 
 impl Fitting<'_> {
@@ -158,8 +128,8 @@ impl Fitting<'_> {
             self.again();
             self.take_higher_page();
         }
-        let changing = self.collapse_the_steady();
-        self.collapse_the_rest(changing);
+        let spared = self.collapse_the_steady();
+        self.collapse_the_rest(spared);
         if self.is_readable() {
             self.open_again();
         } else {
@@ -206,9 +176,9 @@ impl Fitting<'_> {
 
     /// Collapses the constant elements of namespaces until the text is legible. Returns the namespaces with the boxes
     /// that were left outside.
-    fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
+    fn collapse_the_steady(&mut self) -> Vec<Spared> {
         let reported = self.changing();
-        let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
+        let mut left: Vec<Spared> = Vec::new();
         loop {
             let is_new = |name: &Arc<str>| {
                 !self.options.collapse.contains(name)
@@ -221,6 +191,7 @@ impl Fitting<'_> {
                 return left;
             }
             let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
+            let before = self.options.collapse.len();
             for candidate in self.at_once(fresh) {
                 let mut changing = self.best.view.holding(&reported, &candidate.name);
                 changing.retain(|name| !is_hopeless && !self.options.expand.contains(name));
@@ -232,7 +203,9 @@ impl Fitting<'_> {
                     left.push((candidate.name, changing));
                 }
             }
-            self.again();
+            if self.options.collapse.len() > before {
+                self.again();
+            }
         }
     }
 
@@ -267,7 +240,7 @@ impl Fitting<'_> {
     }
 
     /// Collapses these namespaces including the boxes left outside, until the text is legible.
-    fn collapse_the_rest(&mut self, mut left: Vec<(Arc<str>, Vec<Arc<str>>)>) {
+    fn collapse_the_rest(&mut self, mut left: Vec<Spared>) {
         while !self.is_readable() && !left.is_empty() {
             let now = self.at_once(left.clone());
             left.drain(..now.len());
@@ -281,10 +254,17 @@ impl Fitting<'_> {
         }
     }
 
-    /// The first of these, or a quarter of them if the text is far too small, which saves a layout per namespace.
+    /// The first of these; two if the text is too small for one to suffice, or a quarter if it is far too small, which
+    /// saves a layout per namespace.
     fn at_once<T>(&self, mut all: Vec<T>) -> Vec<T> {
-        let is_far = self.best.text < self.drawing.readable() / 2.0;
-        all.truncate(if is_far { all.len().div_ceil(4) } else { 1 });
+        let share = self.best.text / self.drawing.readable();
+        all.truncate(if share < FAR {
+            all.len().div_ceil(4)
+        } else if share < SMALL {
+            2
+        } else {
+            1
+        });
         all
     }
 
@@ -335,9 +315,14 @@ impl Fitting<'_> {
 
     /// The drawing with notices about what was done to make it legible, and whether that was sufficient.
     fn composed(mut self) -> Composed {
-        if self.best.layout.is_none() {
+        if self.drawing.is_fitted && !self.is_readable() {
+            // No effort has been made to improve an illegible drawing.
+            let drawing = Drawing {
+                is_fitted: false,
+                ..self.drawing.with(self.engine)
+            };
             let chosen = (&self.options, &self.page);
-            self.best = Attempt::drawn(self.mission, self.drawing, chosen, &mut self.layouts);
+            self.best = Attempt::drawn(self.mission, &drawing, chosen, &mut Layouts::default());
         }
         let (drawing, text) = (self.drawing, self.best.text);
         let mut notices = self.best.notices;
@@ -430,7 +415,17 @@ impl Attempt {
         // The widest labels depend on rates, so the windows are needed too.
         let (view, notices) = view(mission, options);
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
-        let (plan, page) = (measured.plan(), measured.layout_options());
+        let readable = drawing.readable();
+        let plan = measured.plan();
+        let least = |share: f64| share * readable / measured.smallest_text();
+        let page = LayoutOptions {
+            least: if drawing.is_fitted {
+                least(ALMOST)
+            } else {
+                0.0
+            },
+            ..measured.layout_options()
+        };
         let mut placed = |page: &LayoutOptions| {
             let layout = match &drawing.kept {
                 None => layouts.of(plan, page, drawing.engine),
@@ -439,10 +434,10 @@ impl Attempt {
             (measured.text_px(&layout), layout)
         };
         let (mut text, mut layout) = placed(&page);
-        let readable = drawing.readable();
         if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
             let tight = placed(&LayoutOptions {
                 is_tight: true,
+                least: least(1.0),
                 ..page
             });
             if tight.0 >= readable {

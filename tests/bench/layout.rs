@@ -85,7 +85,7 @@ fn main() {
         let options = layout::LayoutOptions {
             page: PAGE,
             orientation,
-            is_tight: false,
+            ..layout::LayoutOptions::default()
         };
         show(
             "ours",

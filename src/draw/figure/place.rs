@@ -184,7 +184,7 @@ fn tightened(
         let options = LayoutOptions {
             page: Size::new(width * tightness, width * ASPECT * tightness),
             orientation: Some(orientation),
-            is_tight: false,
+            ..LayoutOptions::default()
         };
         let mut sized = scaled(plan, tightness);
         for (link, label) in sized.links.iter_mut().zip(labels) {

@@ -66,7 +66,7 @@ impl<'a> DotView<'a> {
         let options = layout::LayoutOptions {
             page: Size::new(1600.0, 900.0),
             orientation: Some(Orientation::LeftRight),
-            is_tight: false,
+            ..layout::LayoutOptions::default()
         };
         self.layout = Some(layout::lay_out(&self.plan, &options, layout::ENGINES[0].1));
         self

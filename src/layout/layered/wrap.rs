@@ -15,6 +15,8 @@ const LONG: f64 = 2.5;
 const MOST_ROWS: usize = 12;
 /// The most edges from a row to the next: with more of them the rows cannot be read one by one.
 const MOST_CUT: usize = 8;
+/// The scale of a sketch divided by that of the drawing with all effort, at least: true of 165 of 169 synthetic parts.
+const SKETCHED: f64 = 0.9;
 /// The space beside an edge in a channel, and between a channel and the boxes.
 const LANE: f64 = 8.0;
 const BESIDE: f64 = 12.0;
@@ -39,13 +41,22 @@ pub(crate) fn wraps(
         return found;
     }
     let fit = |block: &PlacedPart| pack::fit(block.size, options.page);
+    let useful = SKETCHED * options.least;
+    let sketch = LayoutOptions {
+        least: f64::INFINITY,
+        ..*options
+    };
     for many in 2..=MOST_ROWS {
-        let rows = cuts(part, layers, many)
-            .and_then(|cuts| Wrapped::new(plan, options, part, layers, &cuts, orientation));
-        let Some(block) = rows.and_then(|rows| rows.placed(plan, part)) else {
+        let placed = |options: &LayoutOptions| {
+            let cuts = cuts(part, layers, many)?;
+            let rows = Wrapped::new(plan, options, part, layers, &cuts, orientation)?;
+            Some(rows.placed(plan, part)?.on_page(orientation))
+        };
+        let sketched = (useful > 0.0).then(|| placed(&sketch)).flatten();
+        let useless = sketched.filter(|block| fit(block) < useful);
+        let Some(block) = useless.or_else(|| placed(options)) else {
             continue;
         };
-        let block = block.on_page(orientation);
         // More rows make it narrower and higher: beyond the best number, the search can stop.
         if found.last().is_some_and(|last| fit(last) >= fit(&block)) {
             break;
@@ -248,8 +259,7 @@ mod tests {
         };
         let options = LayoutOptions {
             page: Size::new(1280.0, 560.0),
-            orientation: None,
-            is_tight: false,
+            ..LayoutOptions::default()
         };
         lay_out(&plan, &options)
     }
