@@ -6,6 +6,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::lines::groups;
 use crate::support::shared;
 
 /// The mission as JSON, and a picture of each of its windows.
@@ -41,28 +42,17 @@ fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
 /// An element of a picture: its class and attributes.
 type Drawn = BTreeMap<String, String>;
 
-/// The nodes, topics and edges of a picture.
-fn elements(picture: &str) -> Vec<Drawn> {
-    let document = roxmltree::Document::parse(picture).unwrap();
-    let is_one = |node: &roxmltree::Node<'_, '_>| {
-        let class = node.attribute("class").unwrap_or_default();
-        let kind = class.split(' ').next().unwrap_or_default();
-        let is_named = node.has_attribute("data-name") || node.has_attribute("data-from");
-        is_named && ["node", "topic", "edge"].contains(&kind)
-    };
-    let attributes = |node: roxmltree::Node<'_, '_>| {
-        let all = node.attributes();
-        all.map(|a| (a.name().to_owned(), a.value().to_owned()))
-            .collect()
-    };
-    let all = document.descendants().filter(is_one);
-    all.map(attributes).collect()
+/// The nodes, topics and edges of a picture; samples in its legend have no name.
+fn elements(picture: &str) -> impl Iterator<Item = Drawn> {
+    let kinds = ["node", "topic", "edge"].into_iter();
+    let all = kinds.flat_map(|kind| groups(picture, kind));
+    all.map(|(drawn, _)| drawn)
+        .filter(|drawn| drawn.contains_key("data-name") || drawn.contains_key("data-from"))
 }
 
 /// The nodes and topics of a picture.
 fn boxes(picture: &str) -> impl Iterator<Item = Drawn> {
-    let all = elements(picture).into_iter();
-    all.filter(|drawn| drawn.contains_key("data-state"))
+    elements(picture).filter(|drawn| drawn.contains_key("data-state"))
 }
 
 fn rows<'a>(window: &'a Value, what: &str) -> impl Iterator<Item = &'a Value> {
@@ -166,10 +156,9 @@ impl<'a> Graph<'a> {
     }
 
     fn has_edge(&self, kind: &str, node: &str, topic: &str) -> bool {
-        let is_it = |edge: &&(&str, &str, &str)| {
-            edge.0 == kind && self.is_node(node, edge.1) && Self::is_topic(topic, edge.2)
-        };
-        self.edges.iter().any(|edge| is_it(&edge))
+        self.edges.iter().any(|(of, end, sent)| {
+            *of == kind && self.is_node(node, end) && Self::is_topic(topic, sent)
+        })
     }
 
     fn has(&self, drawn: &Drawn) -> bool {

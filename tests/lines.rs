@@ -30,7 +30,7 @@ fn film() -> (Value, Vec<String>) {
 }
 
 /// The groups of a picture whose first class word is this one.
-fn groups(picture: &str, class: &str) -> Elements {
+pub(crate) fn groups(picture: &str, class: &str) -> Elements {
     let document = roxmltree::Document::parse(picture).unwrap();
     let is_one = |node: &roxmltree::Node<'_, '_>| {
         node.attribute("class")

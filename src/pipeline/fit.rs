@@ -27,7 +27,7 @@ const FEWEST_STEADY: usize = 3;
 /// The share of the smallest legible text below which changing elements of a namespace are collapsed too.
 const HOPELESS: f64 = 0.3;
 /// The shares of the smallest legible text below which a quarter of the remaining namespaces is collapsed at once, and
-/// two: below 0.75, two at once cost a synthetic mission of 60 nodes four boxes; below 0.7, they cost none of 54 any.
+/// two: below 0.75, two at once cost a synthetic mission of 75 nodes four boxes; below 0.7, they cost none of 54 any.
 const FAR: f64 = 0.5;
 const SMALL: f64 = 0.7;
 /// The most collapsed namespaces that are tentatively reopened.
@@ -417,10 +417,10 @@ impl Attempt {
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
         let readable = drawing.readable();
         let plan = measured.plan();
-        let least = |share: f64| share * readable / measured.smallest_text();
+        let least = readable / measured.smallest_text();
         let page = LayoutOptions {
             least: if drawing.is_fitted {
-                least(ALMOST)
+                ALMOST * least
             } else {
                 0.0
             },
@@ -437,7 +437,7 @@ impl Attempt {
         if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
             let tight = placed(&LayoutOptions {
                 is_tight: true,
-                least: least(1.0),
+                least,
                 ..page
             });
             if tight.0 >= readable {

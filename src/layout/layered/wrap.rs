@@ -47,8 +47,10 @@ pub(crate) fn wraps(
         ..*options
     };
     for many in 2..=MOST_ROWS {
+        let Some(cuts) = cuts(part, layers, many) else {
+            continue;
+        };
         let placed = |options: &LayoutOptions| {
-            let cuts = cuts(part, layers, many)?;
             let rows = Wrapped::new(plan, options, part, layers, &cuts, orientation)?;
             Some(rows.placed(plan, part)?.on_page(orientation))
         };
