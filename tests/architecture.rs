@@ -162,12 +162,21 @@ impl File {
     }
 }
 
-fn files() -> Vec<File> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// The source files without those of tests.
+pub(crate) fn source_files() -> Vec<PathBuf> {
     let mut found = Vec::new();
-    walk(&src, &mut found);
+    walk(&src(), &mut found);
     found.sort();
-    found.iter().map(|path| file(&src, path)).collect()
+    found
+}
+
+fn files() -> Vec<File> {
+    let found = source_files();
+    found.iter().map(|path| file(&src(), path)).collect()
 }
 
 fn walk(folder: &Path, found: &mut Vec<PathBuf>) {

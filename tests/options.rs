@@ -626,7 +626,7 @@ fn options_without_effect_are_refused_with_a_hint() {
 }
 
 /// The options that `--help` of a command lists.
-fn listed(command: &str) -> BTreeSet<String> {
+pub(crate) fn listed(command: &str) -> BTreeSet<String> {
     let output = bagreel(Path::new("."), command, "", "--help");
     let help = text(&output.stdout);
     let options = help.lines().filter_map(|line| {
@@ -647,18 +647,22 @@ fn listed(command: &str) -> BTreeSet<String> {
         .collect()
 }
 
-#[test]
-fn every_option_has_a_row() {
+/// The commands that `--help` lists, without `help`.
+pub(crate) fn commands() -> Vec<String> {
     let help = text(&bagreel(Path::new("."), "--help", "", "").stdout);
     let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1);
     let commands = commands.take_while(|l| !l.is_empty());
-    let commands: Vec<&str> = commands
-        .filter_map(|l| l.split_whitespace().next())
-        .collect();
+    let named = commands.filter_map(|l| l.split_whitespace().next());
+    let commands: Vec<String> = named.filter(|c| *c != "help").map(str::to_owned).collect();
     assert!(
-        commands.contains(&"render") && commands.len() > 5,
+        commands.iter().any(|c| c == "render") && commands.len() > 5,
         "{commands:?}"
     );
+    commands
+}
+
+#[test]
+fn every_option_has_a_row() {
     let rows = CHANGES.iter().map(|row| (row.0, row.2));
     let said = SAYS.iter().chain(REFUSED).map(|row| (row.0, row.2));
     let rows: BTreeSet<(&str, &str)> = rows
@@ -667,11 +671,11 @@ fn every_option_has_a_row() {
             Some((command, with.split_whitespace().next()?.strip_prefix("--")?))
         })
         .collect();
-    for command in commands.iter().filter(|c| **c != "help") {
+    for command in &commands() {
         let listed = listed(command);
         let missing: Vec<&String> = listed
             .iter()
-            .filter(|o| !rows.contains(&(*command, o.as_str())))
+            .filter(|o| !rows.contains(&(command.as_str(), o.as_str())))
             .collect();
         assert!(
             missing.is_empty(),
@@ -679,7 +683,7 @@ fn every_option_has_a_row() {
         );
         let gone = rows
             .iter()
-            .filter(|row| row.0 == *command && !listed.contains(row.1));
+            .filter(|row| row.0 == command && !listed.contains(row.1));
         assert_eq!(
             gone.count(),
             0,

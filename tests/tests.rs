@@ -40,6 +40,7 @@ mod pairs;
 mod phases;
 mod pictures;
 mod properties;
+mod ratchet;
 mod reading;
 #[cfg(feature = "remote")]
 mod remote;
