@@ -13,9 +13,6 @@ mod input;
 mod mcap;
 mod model;
 pub(crate) mod moved;
-mod object;
-#[cfg(feature = "remote")]
-mod remote;
 mod rosbag1;
 mod rosbag2;
 pub(crate) mod source;
@@ -35,14 +32,13 @@ pub(crate) use folder::{Recording, parts_of, recordings};
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{closed, head, place};
+pub(crate) use model::Growing;
 #[doc(hidden)]
 pub use model::Growth;
 pub use model::{
     ChunkCounts, Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink,
     Tier, Want,
 };
-pub(crate) use model::{ETAG, Growing};
-pub(crate) use object::{list, version};
 pub(crate) use split::parts as split_parts;
 use unknown::explain;
 
@@ -59,7 +55,7 @@ pub const FORMATS: &[FormatRow] = &[
 /// The kind of an input, recognized by its first bytes.
 #[derive(Clone, Copy)]
 pub enum InputKind {
-    /// A bag of this format. Standard input and URLs are not read for this and count as ROS 1 bags here.
+    /// A bag of this format. Standard input is not read for this and counts as a ROS 1 bag here.
     Bag(&'static FormatRow),
     /// JSON text, such as a mission written by bagreel; not a bag.
     Json,
@@ -72,7 +68,6 @@ pub enum InputKind {
 pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,
-        // Remote objects are inspected once, when they are opened.
         _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
@@ -85,15 +80,12 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
     }
 }
 
-/// Opens a bag of any format, recognized by its first bytes. Objects need the feature `remote`.
+/// Opens a bag of any format, recognized by its first bytes.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::Remote`] if a store fails; [`Error::UnknownBag`],
-/// [`Error::Unsupported`] or [`Error::Malformed`], with a hint, if no content can be read.
+/// [`Error::Io`] if it cannot be read; [`Error::UnknownBag`], [`Error::Unsupported`] or
+/// [`Error::Malformed`], with a hint, if no content can be read.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
-    if let Input::Url(url) = input {
-        return object::open(url, options);
-    }
     let mut place = place(input)?;
     let head = head(&mut place)?;
     if let Some(row) = FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
@@ -101,7 +93,7 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }
     let path = match input {
         Input::Path(path) => path.clone(),
-        Input::Url(_) | Input::Stdin => PathBuf::from(input.name()),
+        Input::Stdin => PathBuf::from(input.name()),
     };
     let folder = matches!(place, BagPlace::Folder(_));
     Err(explain(&path, &head, folder))
@@ -111,8 +103,8 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
 /// recording, the newest one below it.
 ///
 /// # Errors
-/// As [`open`], and [`Error::Unsupported`] for inputs that do not grow: pipes, objects, and bags
-/// compressed as a whole.
+/// As [`open`], and [`Error::Unsupported`] for inputs that do not grow: pipes, and bags compressed as a
+/// whole.
 pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
     let grows = |path: &Path| {
         let kind = sniff(&Input::Path(path.to_owned()));

@@ -9,7 +9,6 @@ mod installed;
 mod look;
 mod reading;
 mod render;
-mod serve;
 mod show;
 mod stop;
 #[cfg(feature = "parquet")]

@@ -13,7 +13,6 @@ mod graphml;
 pub(crate) mod html;
 mod indexed;
 mod json;
-pub(crate) mod mcap;
 pub(crate) mod mermaid;
 pub(crate) mod nodl;
 pub mod options;
@@ -147,12 +146,6 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "json",
         what: "the mission as data; can be read again as an input",
         start: json::start,
-        ..DATA
-    },
-    OutputFormat {
-        word: "mcap",
-        what: "the graph over time as `/rosgraph`, with the event log, for Foxglove and others",
-        start: mcap::start,
         ..DATA
     },
     OutputFormat {

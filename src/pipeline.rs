@@ -21,7 +21,6 @@ pub mod follow;
 mod gate;
 mod inputs;
 #[cfg(feature = "cli")]
-pub(crate) mod live;
 #[cfg(all(feature = "cli", feature = "pdf"))]
 pub(crate) mod paper;
 mod phases;

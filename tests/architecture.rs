@@ -25,8 +25,6 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["checksum", "decompress", "model", "split", "unknown"],
         &["source"],
         &["adapters", "input", "moved", "straight"],
-        &["remote"],
-        &["object"],
         &["deferred", "folder"],
         &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
@@ -61,7 +59,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["sequence", "sink"],
         &["check", "encoder"],
         &["indexed", "spells"],
-        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mcap", "mermaid", "parquet", "pdf", "still", "tex", "video"],
+        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "still", "tex", "video"],
         &["report", "run", "tables"],
         &["nodl"],
     ]),
@@ -81,11 +79,11 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["figure", "fit", "probe", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["fleet", "follow", "gate", "live", "paper"],
+        &["fleet", "follow", "gate", "paper"],
     ]),
     ("cli", &[
         &["args", "stop"],
-        &["applies", "look", "reading", "serve", "terminal"],
+        &["applies", "look", "reading", "terminal"],
         &["extract", "installed", "render", "show", "tables"],
         &["gate"],
         &["follow"],
@@ -112,7 +110,6 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "mission/events",
             "mission/info",
             "mission/json",
-            "pipeline/live/bridge",
         ],
     ),
     // Work on all cores: frames, and the ways of laying out a graph.
@@ -129,10 +126,6 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ),
     // Widths of texts, and the outlines and names of fonts in a PDF.
     ("skrifa", &["draw/text", "draw/paint/pdf"]),
-    // Reads bags, writes the graph.
-    ("mcap", &["bag/mcap", "export/mcap"]),
-    // Launch files, and the answers of a ROS master.
-    ("roxmltree", &["evidence/topology", "pipeline/live/master"]),
     // Filters names as in `rqt_graph`; extracts mission names from paths.
     ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Parses and formats times.

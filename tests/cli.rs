@@ -166,28 +166,58 @@ fn a_truncated_bag_is_recovered_and_exits_3() {
     );
 }
 
-#[test]
-fn standard_input_has_the_same_counts_as_the_file() {
-    let dir = folder();
-    let from_file = bagreel(
-        dir.path(),
-        &[
-            "render", WAREHOUSE, "--period", "30", "-o", "-", "--format", "json",
-        ],
-    );
+/// The outcome with these bytes on standard input.
+fn piped(folder: &Path, args: &[&str], bytes: Vec<u8>) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-        .args([
-            "render", "-", "--period", "30", "-o", "-", "--format", "json",
-        ])
+        .current_dir(folder)
+        .args(args)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
-    std::thread::spawn(move || stdin.write_all(&fs::read(WAREHOUSE).unwrap()));
-    let piped = child.wait_with_output().unwrap();
-    assert!(counts(&piped.stdout) == counts(&from_file.stdout));
+    let writer = std::thread::spawn(move || stdin.write_all(&bytes));
+    let output = child.wait_with_output().unwrap();
+    // A bag that is refused is not read to its end.
+    let _ = writer.join().unwrap();
+    output
+}
+
+#[test]
+fn standard_input_has_the_same_counts_as_the_file() {
+    let dir = folder();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let json = |input: &str| {
+        ["render", input, "-p", "30", "-o", "-", "--format", "json"].map(str::to_owned)
+    };
+    for name in ["warehouse.bag", "courier.mcap", "courier/courier_0.db3"] {
+        let path = examples.join(name);
+        let args = json(path.to_str().unwrap());
+        let from_file = bagreel(dir.path(), &args.each_ref().map(String::as_str));
+        let bytes = fs::read(&path).unwrap();
+        // As rosbag2 compresses it.
+        let packed = zstd::encode_all(&bytes[..], 1).unwrap();
+        let args = json("-");
+        let args = args.each_ref().map(String::as_str);
+        let all = [Some(bytes).filter(|_| !name.ends_with("db3")), Some(packed)];
+        for bytes in all.into_iter().flatten() {
+            let from_pipe = piped(dir.path(), &args, bytes);
+            assert_eq!(code(&from_pipe), Some(0), "{name}: {}", errors(&from_pipe));
+            assert!(
+                counts(&from_pipe.stdout) == counts(&from_file.stdout),
+                "{name}"
+            );
+        }
+    }
+    let database = fs::read(examples.join("courier/courier_0.db3")).unwrap();
+    let refused = piped(dir.path(), &["info", "-"], database);
+    let said = errors(&refused);
+    assert_eq!(code(&refused), Some(1), "{said}");
+    assert!(
+        said.contains("cannot be read from a pipe") && said.contains("hint: save it to a file"),
+        "{said}"
+    );
 }
 
 /// The count of every topic in every window; payload sizes are only known if payloads are read.

@@ -1,4 +1,4 @@
-//! Tests of reading graph data recorded by other tools, and of writing the graph in exchange formats.
+//! Tests of reading graph data recorded by other tools.
 
 use std::fs;
 use std::path::Path;
@@ -284,79 +284,4 @@ fn age_bytes_and_drops_are_checked() {
     );
     let (code, said) = check("/scan: {bytes: ..5 apples}");
     assert!(code == Some(2) && said.contains("..5MB/s"), "{said}");
-}
-
-/// The names of the elements in each window, as lines.
-fn seen(mission: &Mission) -> Vec<Vec<String>> {
-    let all = &mission.elements;
-    let node = |id| all.nodes[id].name.as_str();
-    let topic = |id| all.topics[id].name.as_str();
-    let graphs = mission.graphs.iter().map(|graph| {
-        let nodes = graph.nodes().map(|(id, _)| format!("node {}", node(id)));
-        let topics = graph.topics().map(|(id, _)| format!("topic {}", topic(id)));
-        let publishes = graph.publishes().map(|(id, _)| &all.publishes[id]);
-        let publishes = publishes.map(|e| format!("{} -> {}", node(e.node), topic(e.topic)));
-        let subscribes = graph.subscribes().map(|(id, _)| &all.subscribes[id]);
-        let subscribes = subscribes.map(|e| format!("{} <- {}", node(e.node), topic(e.topic)));
-        nodes
-            .chain(topics)
-            .chain(publishes)
-            .chain(subscribes)
-            .collect()
-    });
-    graphs.collect()
-}
-
-#[test]
-fn an_exported_graph_is_the_same_after_import() {
-    let folder = tempfile::tempdir().unwrap();
-    // Three publishers that the recorder counts without names, two of them beside a named one.
-    let mut bag = Recording::default();
-    for (node, topic, many) in [("/a", "/x", 3), ("", "/y", 1)] {
-        let place = bag.publisher(node, topic, "std_msgs/msg/Empty");
-        let offer =
-            "- {reliability: reliable, durability: volatile, history: keep_last, depth: 10}\n";
-        bag.publishers[place].qos = offer.repeat(many);
-        bag.send(place, (0, 30_000), 100, &Cdr::default().done());
-    }
-    let counted = folder.path().join("counted.mcap");
-    let options = mcap::Options {
-        profile: "ros2",
-        publisher_key: Some("node"),
-        ..mcap::Options::default()
-    };
-    fs::write(&counted, mcap::write(&bag, &options)).unwrap();
-    let all = seen(&in_windows_of(&counted, 10));
-    for lists in ["/x ? ×2 -> /x", "/y ? -> /y"] {
-        assert!(all[1].contains(&lists.to_owned()), "{all:?}");
-    }
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
-    let examples = ["warehouse.bag", "courier.mcap"].map(|bag| examples.join(bag));
-    for path in examples.into_iter().chain([counted]) {
-        let out = folder.path().join("graph.mcap");
-        let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-            .args([
-                "render",
-                path.to_str().unwrap(),
-                "-o",
-                out.to_str().unwrap(),
-            ])
-            .output()
-            .unwrap();
-        assert!(
-            run.status.success(),
-            "{}",
-            String::from_utf8_lossy(&run.stderr)
-        );
-        let (bag, again) = (in_windows_of(&path, 10), in_windows_of(&out, 10));
-        assert_eq!(bag.span, again.span);
-        for (at, (before, after)) in seen(&bag).iter().zip(seen(&again)).enumerate() {
-            let lost: Vec<_> = before.iter().filter(|e| !after.contains(e)).collect();
-            let new: Vec<_> = after.iter().filter(|e| !before.contains(e)).collect();
-            assert!(
-                lost.is_empty() && new.is_empty(),
-                "window {at}: lost {lost:?}, new {new:?}"
-            );
-        }
-    }
 }

@@ -17,7 +17,7 @@ use self::law::held;
 use self::recorders::{Chance, OPTIMISED, RECORDERS, RESILIENT, Recorder, made, options};
 use crate::support::mission::mission;
 use crate::support::rosbag1::{self, Pack};
-use crate::support::{Recording, browser, mcap, small, sqlite3};
+use crate::support::{Recording, mcap, small, sqlite3};
 
 fn bagreel(folder: &Path, args: &[&str]) -> Command {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
@@ -152,15 +152,6 @@ fn following_a_database_never_locks_it() {
         let left = fs::read_dir(folder.path()).unwrap().count();
         assert_eq!(left, 1, "something was left beside the database");
     }
-}
-
-#[test]
-fn the_served_page_grows_with_the_recording() {
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/courier.mcap");
-    browser::drive(
-        "live.py",
-        [Path::new(env!("CARGO_BIN_EXE_bagreel")), &example],
-    );
 }
 
 #[test]

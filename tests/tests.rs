@@ -32,7 +32,6 @@ mod info;
 mod layout;
 mod library;
 mod lines;
-mod live;
 mod marks;
 mod options;
 mod pages;
@@ -42,8 +41,6 @@ mod pictures;
 mod properties;
 mod ratchet;
 mod reading;
-#[cfg(feature = "remote")]
-mod remote;
 mod restarts;
 mod ros2_example;
 mod source;

@@ -1,8 +1,8 @@
 """See how a robot's software reconfigures during a mission, straight from its bag files.
 
 `show` plays a mission in a notebook, `read` reads bags into a `Mission`, `render` draws it. `baseline`, `check` and `diff` compare
-missions, `events` returns the event log, `extract` writes messages as tables. `tables` counts one bag by its index, local or
-remote; `merge` and `finish` make a mission from the counts. Tables are Arrow: pyarrow, pandas, polars and DuckDB use them
+missions, `events` returns the event log, `extract` writes messages as tables. `tables` counts one bag by its index;
+`merge` and `finish` make a mission from the counts. Tables are Arrow: pyarrow, pandas, polars and DuckDB use them
 without copying.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import _bagreel, _results
-from ._bagreel import BagreelError, Mission, StoreError, Table, __version__
+from ._bagreel import BagreelError, Mission, Table, __version__
 from ._command import Bags, Paths, given, run, texts
 from ._results import Check, Diff, Rendered, Shown
 
@@ -27,7 +27,6 @@ __all__ = [
     "Mission",
     "Rendered",
     "Shown",
-    "StoreError",
     "Table",
     "__version__",
     "baseline",
@@ -50,10 +49,10 @@ __all__ = [
 def plan(
     sources: Paths, *, period: str = "10s", align: Literal["clock", "bag"] = "clock", mission: str | None = None
 ) -> list[dict[str, Any]]:
-    """Lists the bags of paths, folders, URLs and prefixes of stores (which end in a slash).
+    """Lists the bags of paths and folders.
 
     Each is a dict of `uri`, `mission` and `origin_ns`, sorted by mission. `mission` is a regular expression whose first
-    group, or whole match, in the path or URL names the mission.
+    group, or whole match, in the path names the mission.
     """
     return _bagreel.plan(texts(sources), period=period, align=align, mission=mission)
 
@@ -65,7 +64,7 @@ def tables(
     align: Literal["clock", "bag"] = "clock",
     mission: str | None = None,
     origin_ns: int | None = None,
-    tier: Literal["auto", "index", "chunks"] = "auto",
+    tier: Literal["index", "chunks"] = "index",
     start_ns: int | None = None,
     end_ns: int | None = None,
 ) -> dict[str, Table]:
@@ -76,7 +75,6 @@ def tables(
     one of the windows, as returned by `plan`.
 
     Raises:
-        StoreError: the store failed or could not be reached; a retry may help.
         ValueError: an option is invalid, or `uri` is not one bag.
     """
     return _bagreel.tables(os.fspath(uri), **given(locals(), "uri"))

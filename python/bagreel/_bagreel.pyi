@@ -6,9 +6,6 @@ from typing import Any, final
 class BagreelError(RuntimeError):
     """A bag could not be read, or a table could not be created."""
 
-class StoreError(BagreelError):
-    """A store failed or could not be reached; a retry may help."""
-
 __version__: str
 
 @final
@@ -71,7 +68,7 @@ def tables(
     align: str = "clock",
     mission: str | None = None,
     origin_ns: int | None = None,
-    tier: str = "auto",
+    tier: str = "index",
     start_ns: int | None = None,
     end_ns: int | None = None,
 ) -> dict[str, Table]: ...

@@ -1,6 +1,6 @@
 """Bags as a data source of Apache Spark 4 (and of Sail): `spark.read.format("bagreel")`.
 
-Options: `path` (paths, folders, URLs or prefixes, separated by commas), `table` (`counts` or `bags`), `period`,
+Options: `path` (paths or folders, separated by commas), `table` (`counts` or `bags`), `period`,
 `align`, `mission`, `tier`, as for `bagreel.tables`, and `shards`, the number of tasks among which the bags are divided
 (default 64; four per core of the cluster is a good number). The wheel must be installed on the workers.
 """
@@ -17,7 +17,7 @@ _NUMBERS = {
 }  # fmt: skip
 _COLUMNS = {
     "counts": "mission bag format period_ns win start_ns end_ns topic type node node_role n bytes first_ns last_ns max_gap_ns",
-    "bags": "uri mission etag file_bytes format tier is_complete messages content start_ns end_ns period_ns origin_ns lost "
+    "bags": "uri mission file_bytes format tier is_complete messages content start_ns end_ns period_ns origin_ns lost "
     "error bagreel schema_version",
 }
 
@@ -34,8 +34,7 @@ class Shard(InputPartition):
 
 
 class BagreelDataSource(DataSource):
-    """The tables `counts` and `bags` of a fleet. An unreadable bag is a row of `bags`, never an exception; a
-    failing store raises one, so that Spark retries the task."""
+    """The tables `counts` and `bags` of a fleet. An unreadable bag is a row of `bags`, never an exception."""
 
     @classmethod
     def name(cls) -> str:

@@ -22,12 +22,6 @@ pyo3::create_exception!(
     PyRuntimeError,
     "A bag could not be read, or a table could not be created."
 );
-pyo3::create_exception!(
-    _bagreel,
-    StoreError,
-    BagreelError,
-    "A store failed or could not be reached; a retry may help."
-);
 
 /// The error as a Python exception, followed by its hint.
 fn raised(error: &Error) -> PyErr {
@@ -36,10 +30,9 @@ fn raised(error: &Error) -> PyErr {
         true => error.to_string(),
         false => format!("{error} ({hint})"),
     };
-    match error {
-        Error::Remote { .. } => StoreError::new_err(text),
-        error if error.is_usage() => PyValueError::new_err(text),
-        _ => BagreelError::new_err(text),
+    match error.is_usage() {
+        true => PyValueError::new_err(text),
+        false => BagreelError::new_err(text),
     }
 }
 
@@ -66,12 +59,10 @@ fn detail(text: &str) -> PyResult<CountDetail> {
     let found = CountDetail::ALL
         .into_iter()
         .find(|detail| detail.word() == text);
-    found.ok_or_else(|| {
-        PyValueError::new_err(format!("`{text}` is none of `auto`, `index`, `chunks`"))
-    })
+    found.ok_or_else(|| PyValueError::new_err(format!("`{text}` is neither `index` nor `chunks`")))
 }
 
-/// Every bag of some paths, folders, URLs and prefixes, with its mission and the start of one of its windows.
+/// Every bag of some paths and folders, with its mission and the start of one of its windows.
 #[pyfunction]
 #[pyo3(signature = (sources, *, period="10s", align="clock", mission=None))]
 fn plan<'py>(
@@ -101,7 +92,7 @@ fn plan<'py>(
 
 /// The tables `counts` and `bags` of one bag, or of a part of its time.
 #[pyfunction]
-#[pyo3(signature = (uri, *, period="10s", align="clock", mission=None, origin_ns=None, tier="auto", start_ns=None, end_ns=None))]
+#[pyo3(signature = (uri, *, period="10s", align="clock", mission=None, origin_ns=None, tier="index", start_ns=None, end_ns=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 fn tables(
     py: Python<'_>,
@@ -323,7 +314,5 @@ mod _bagreel {
     #[expect(non_upper_case_globals, reason = "its name in Python")]
     const __version__: &str = env!("CARGO_PKG_VERSION");
     #[pymodule_export]
-    use super::{
-        BagreelError, Mission, StoreError, Table, finish, main, merge, plan, read, tables,
-    };
+    use super::{BagreelError, Mission, Table, finish, main, merge, plan, read, tables};
 }

@@ -14,17 +14,14 @@ mod unpack;
 
 use std::collections::BTreeSet;
 use std::marker::PhantomData;
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{
-    ChunkCounts, Connection, ConnectionId, OpenOptions, Reader, Report, Sink, Tier, Want,
-};
-use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
+use crate::bag::model::{ChunkCounts, Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
@@ -33,7 +30,6 @@ use crate::base::time::{Span, Stamp};
 pub(crate) use growing::follow;
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX};
-use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, SecondFinds, pass, walk};
 
@@ -181,11 +177,6 @@ impl<G: Grammar> Reader for Indexed<G> {
         };
         let wants = vec![Want::Stamps; plan.connections.list().len()];
         let query = self.query(plan, &wants, None);
-        if plan.chunks.len() <= MOST_LOOKED_INTO {
-            let chunks: Vec<&Chunk> = plan.chunks.iter().collect();
-            // As in `by_index`.
-            let _ = self.source.expect(&indexes(&chunks));
-        }
         Ok(plan.span(|chunk, sink| query.read(chunk, sink)))
     }
 
@@ -234,14 +225,10 @@ impl<G: Grammar> Indexed<G> {
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
-            // What fails here is requested again later, and reported then.
-            let mut places = indexes(groups[at]);
-            places.extend(self.heads(plan, groups[at], &wants));
-            let _ = self.source.expect(&places);
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
         let whole = self.source.len();
-        let threads = threads(chunks.len(), plan.longest_index(), self.source.is_far());
+        let threads = threads(chunks.len(), plan.longest_index());
         in_order(groups.len(), threads, &work, sink, |at, sink| {
             sink.progress(share(at + 1, groups.len(), whole), whole);
         });
@@ -256,18 +243,6 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// If the bag is remote: the ranges of the chunk heads, each with its first message's, for chunks with messages of
-    /// which more than the time is wanted.
-    fn heads(&self, plan: &ChunkPlan, chunks: &[&Chunk], wants: &[Want]) -> Vec<Range<u64>> {
-        if !self.source.is_far() {
-            return Vec::new();
-        }
-        let is_wanted = |id: ConnectionId| wants[id.0 as usize] > Want::Stamps;
-        let chunks = chunks.iter().filter(|chunk| plan.holds(chunk, is_wanted));
-        let head = |chunk: &&Chunk| chunk.start..chunk.start + 2 * GLANCE as u64;
-        chunks.map(head).collect()
-    }
-
     /// Counts chunks as a whole where that is requested and sufficient; returns the other chunks and the tier that
     /// results.
     fn by_chunk_counts<'p>(
@@ -277,7 +252,7 @@ impl<G: Grammar> Indexed<G> {
         range: Option<Span>,
         sink: &mut Clip<'_>,
     ) -> (Vec<&'p Chunk>, Tier) {
-        let Some(chunk_counts) = self.chunk_counts.filter(|l| plan.chunks.len() > l.above) else {
+        let Some(chunk_counts) = self.chunk_counts else {
             return (chunks, Tier::Index);
         };
         let is_inside = |c: &Chunk| range.is_none_or(|r| r.contains(c.first) && r.contains(c.last));
@@ -363,13 +338,6 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// The ranges of the indexes of those chunks that are read whole.
-fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
-    let ranges = chunks.iter().map(|chunk| chunk.index.clone());
-    let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
-    ranges.filter(is_held).collect()
-}
-
 /// A report with the values common to all tiers.
 fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
     Report {
@@ -403,13 +371,10 @@ impl<G: Grammar> Reader for Piped<G> {
 }
 
 /// The number of threads to use for `chunks` chunks whose longest index takes `index` bytes: reads wait for the
-/// disk or a store, and a long index takes memory.
-fn threads(chunks: usize, index: u64, is_far: bool) -> usize {
+/// disk, and a long index takes memory.
+fn threads(chunks: usize, index: u64) -> usize {
     if index > LONGEST_INDEX / 16 {
         return 1;
-    }
-    if is_far {
-        return (chunks / GROUP).clamp(1, 16);
     }
     (chunks / 256).clamp(1, 8)
 }

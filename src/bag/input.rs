@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 
 use super::model::{Growing, OpenOptions, Reader};
 use super::source::{ByteStream, FileSource};
-use super::unknown::elsewhere;
 use crate::base::error::{Error, Result};
 
 /// One bag to read: a path, or standard input (`-`).
@@ -15,26 +14,18 @@ use crate::base::error::{Error, Result};
 pub enum Input {
     /// A file or a folder.
     Path(PathBuf),
-    /// An object in a store or on a web server: `s3://…`, `gs://…`, `az://…`, `https://…`.
-    Url(String),
     /// Standard input: ROS 1 or MCAP.
     Stdin,
 }
 
-/// The URL schemes that distinguish URLs from paths.
-const SCHEMES: &[&str] = &[
-    "s3://", "s3a://", "gs://", "az://", "abfs://", "abfss://", "azure://", "https://", "http://",
-];
-
 impl Input {
-    /// Parses an input: `-` is standard input, a URL an object, everything else a path.
+    /// Parses an input: `-` is standard input, everything else a path.
     pub fn parse(text: impl AsRef<OsStr>) -> Self {
         let text = text.as_ref();
-        let is_url = |text: &&str| SCHEMES.iter().any(|scheme| text.starts_with(scheme));
-        match text.to_str() {
-            Some("-") => Self::Stdin,
-            Some(url) if is_url(&url) => Self::Url(url.to_owned()),
-            _ => Self::Path(text.into()),
+        if text == "-" {
+            Self::Stdin
+        } else {
+            Self::Path(text.into())
         }
     }
 
@@ -42,7 +33,6 @@ impl Input {
     pub fn is_pipe(&self) -> bool {
         match self {
             Self::Path(path) => path.exists() && !path.is_file() && !path.is_dir(),
-            Self::Url(_) => false,
             Self::Stdin => true,
         }
     }
@@ -51,31 +41,17 @@ impl Input {
     pub fn name(&self) -> String {
         match self {
             Self::Path(path) => file_name(path),
-            Self::Url(url) => file_name(Path::new(&public_url_of(url))),
             Self::Stdin => "standard input".to_owned(),
         }
     }
 
-    /// The input as given; of a URL the public part.
+    /// The input as given.
     pub(crate) fn given(&self) -> String {
         match self {
             Self::Path(path) => path.display().to_string(),
-            Self::Url(url) => public_url_of(url),
             Self::Stdin => "-".to_owned(),
         }
     }
-}
-
-/// A URL that is safe to report: for web servers, without the password and the query, which may contain a signature
-/// that grants access.
-pub(crate) fn public_url_of(url: &str) -> String {
-    let Some((scheme, rest)) = url.split_once("://").filter(|_| url.starts_with("http")) else {
-        return url.to_owned();
-    };
-    let rest = rest.split(['?', '#']).next().unwrap_or(rest);
-    let (host, path) = rest.split_once('/').unwrap_or((rest, ""));
-    let host = host.rsplit_once('@').map_or(host, |(_, host)| host);
-    format!("{scheme}://{host}/{path}")
 }
 
 /// The size of an input on disk in bytes, for a folder that of its own files; `None` for pipes and inputs of
@@ -105,27 +81,14 @@ pub struct FormatRow {
     pub what: &'static str,
     /// The usual file extensions. For information only: the first bytes decide.
     pub extensions: &'static [&'static str],
-    /// The kind of input that it is read from.
-    pub(crate) medium: Medium,
+    /// Whether it is read at any position, and never from a pipe.
+    pub(crate) needs_file: bool,
     /// Whether an input's first bytes are those of such a bag.
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
     /// Opens a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
     /// Opens a reader of a bag that is still being written.
     pub(crate) follow: Option<Follow>,
-}
-
-/// The kind of input that a format is read from.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Medium {
-    /// A file, or a pipe.
-    Stream,
-    /// A file.
-    File,
-    /// A folder.
-    Folder,
-    /// A file or a pipe that wraps a bag of another format.
-    Wrapping,
 }
 
 /// The location of a bag, opened.
@@ -145,7 +108,6 @@ pub(crate) const HEAD: usize = 512;
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,
-        Input::Url(url) => return Err(elsewhere(&public_url_of(url))),
         Input::Stdin => {
             let stream = ByteStream::of_reader(io::stdin());
             return Ok(BagPlace::Pipe(input.name(), stream));

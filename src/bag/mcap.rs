@@ -17,7 +17,7 @@ use crate::bag::chunked::{
     self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, RecordHead, SecondReading,
     Unindexed,
 };
-use crate::bag::input::{FormatRow, Medium};
+use crate::bag::input::FormatRow;
 use crate::bag::model::{Connection, Sink};
 use crate::bag::source::{ByteStream, FileSource};
 use crate::base::error::Result;
@@ -29,7 +29,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "mcap",
     what: "MCAP file (ROS 1 or ROS 2)",
     extensions: &["mcap"],
-    medium: Medium::Stream,
+    needs_file: false,
     sniff: |_, head| head.starts_with(MAGIC),
     open: chunked::open::<Mcap>,
     follow: Some(chunked::follow::<Mcap>),

@@ -167,9 +167,6 @@ worded! {
     }
 }
 
-/// The name of the fact with the version of an object in a store.
-pub(crate) const ETAG: &str = "etag";
-
 /// A reader's report about its bag after reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
@@ -254,8 +251,6 @@ pub struct ChunkCounts {
     pub origin: Stamp,
     /// The length of all windows.
     pub period: Period,
-    /// Only bags with more chunks than this are counted this way, ≥ 0.
-    pub above: usize,
 }
 
 impl ChunkCounts {

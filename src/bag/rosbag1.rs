@@ -14,7 +14,7 @@ use std::sync::Arc;
 use crate::bag::chunked::{
     self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, SecondReading, Unindexed,
 };
-use crate::bag::input::{FormatRow, Medium};
+use crate::bag::input::FormatRow;
 use crate::bag::model::{Connection, Sink};
 use crate::bag::source::{ByteStream, FileSource};
 use crate::base::error::{Error, Result};
@@ -26,7 +26,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag1",
     what: "ROS 1 bag",
     extensions: &["bag", "bag.active"],
-    medium: Medium::Stream,
+    needs_file: false,
     sniff: |_, head| head.starts_with(b"#ROSBAG V2.") || head.starts_with(b"#ROSRECORD V"),
     open: chunked::open::<Rosbag1>,
     follow: Some(chunked::follow::<Rosbag1>),

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::bag::deferred::open_each;
 use crate::bag::folder::{Recording, only_recording, recordings};
-use crate::bag::input::{BagPlace, FormatRow, Input, Medium, file_name, size_on_disk};
+use crate::bag::input::{BagPlace, FormatRow, Input, file_name, size_on_disk};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
 };
@@ -26,7 +26,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag2",
     what: "ROS 2 recording: a folder with metadata.yaml, or with the parts of one recording",
     extensions: &[],
-    medium: Medium::Folder,
+    needs_file: false,
     sniff: |place, _| matches!(place, BagPlace::Folder(_)),
     open,
     follow: Some(growing::follow),

@@ -1,9 +1,7 @@
-//! Sources of bytes: files and objects with random access, and streams that support peeking and skipping.
+//! Sources of bytes: files with random access, and streams that support peeking and skipping.
 
-use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, Read};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,28 +9,11 @@ use crate::bag::checksum::Checksum;
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// A source of bytes with random access, shared by several threads.
-pub(crate) trait Ranges: Debug + Send + Sync {
-    /// Reads some bytes from `at` on; 0 bytes only at the end.
-    fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize>;
-
-    /// Announces the ranges that will be read next, so that a source with high latency can request all of them at
-    /// once.
-    fn expect(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
-        Ok(())
-    }
-
-    /// Whether latency is so high that few large requests are better than many small ones.
-    fn is_far(&self) -> bool {
-        false
-    }
-}
-
-/// A local file or a remote object with random access, shared by several threads. It counts the bytes it reads.
+/// A file with random access, shared by several threads. It counts the bytes it reads.
 #[derive(Debug)]
 pub(crate) struct FileSource {
     path: PathBuf,
-    from: Box<dyn Ranges>,
+    file: File,
     len: u64,
     read: AtomicU64,
 }
@@ -45,30 +26,12 @@ impl FileSource {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(Error::io("read", path))?;
         let len = file.metadata().map_err(Error::io("read", path))?.len();
-        Ok(Self::of(path, len, file))
-    }
-
-    /// A source of `len` bytes from `from`, named `path`.
-    pub(crate) fn of(path: &Path, len: u64, from: impl Ranges + 'static) -> Self {
-        Self {
+        Ok(Self {
             path: path.to_owned(),
-            from: Box::new(from),
+            file,
             len,
             read: AtomicU64::new(0),
-        }
-    }
-
-    /// As [`Ranges::expect`].
-    ///
-    /// # Errors
-    /// An error of the system.
-    pub(crate) fn expect(&self, ranges: &[Range<u64>]) -> io::Result<()> {
-        self.from.expect(ranges)
-    }
-
-    /// As [`Ranges::is_far`].
-    pub(crate) fn is_far(&self) -> bool {
-        self.from.is_far()
+        })
     }
 
     /// The path, as it was opened.
@@ -94,7 +57,7 @@ impl FileSource {
         let mut filled = 0;
         while filled < into.len() {
             let next = at + filled as u64;
-            match self.from.read_once(next, &mut into[filled..]) {
+            match read_once(&self.file, next, &mut into[filled..]) {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
@@ -106,12 +69,7 @@ impl FileSource {
     }
 }
 
-impl Ranges for File {
-    fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize> {
-        read_once(self, at, into)
-    }
-}
-
+/// Reads some bytes from `at` on; 0 bytes only at the end.
 #[cfg(unix)]
 fn read_once(file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     std::os::unix::fs::FileExt::read_at(file, into, at)
@@ -189,7 +147,7 @@ pub(crate) struct ByteStream<'a> {
 pub(crate) const FAR: usize = 256 * 1024;
 /// The step for picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
-/// The step for record heads in a remote source.
+/// The step for the head of a record alone.
 pub(crate) const GLANCE: usize = 512;
 
 impl<'a> ByteStream<'a> {

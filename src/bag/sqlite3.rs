@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::adapters::{Clip, in_order, share};
-use crate::bag::input::{BagPlace, FormatRow, Medium, file_name};
+use crate::bag::input::{BagPlace, FormatRow, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
@@ -31,7 +31,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "sqlite3",
     what: "ROS 2 bag in SQLite",
     extensions: &["db3"],
-    medium: Medium::File,
+    needs_file: true,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
     follow: Some(growing::follow),
@@ -58,7 +58,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         BagPlace::Folder(path) => return Err(super::explain(&path, &[], true)),
         BagPlace::Pipe(name, _) => {
             let what = "a database cannot be read from a pipe";
-            return Err(Error::unsupported(name, what, "give the file itself"));
+            return Err(Error::unsupported(name, what, "save it to a file first"));
         }
     };
     let ready = place::ready(source.path())?;

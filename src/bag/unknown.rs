@@ -21,16 +21,6 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     }
 }
 
-/// The error for an object where a file is required, or where objects are not supported.
-pub(crate) fn elsewhere(url: &str) -> Error {
-    let hint = if cfg!(feature = "remote") {
-        "only files can be read: download the bag"
-    } else {
-        "download the bag, or build with the feature `remote`: `cargo install bagreel --features remote`"
-    };
-    Error::unsupported(url, "it is not on this machine", hint)
-}
-
 fn guess(head: &[u8]) -> (&'static str, &'static str) {
     const KNOWN: &[(&[u8], &str, &str)] = &[
         (

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::bag::FORMATS;
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::input::{BagPlace, FormatRow, HEAD, Medium, file_name};
+use crate::bag::input::{BagPlace, FormatRow, HEAD, file_name};
 use crate::bag::model::{OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{ByteStream, FileSource, Temporary};
 use crate::bag::unknown::explain;
@@ -20,7 +20,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "zstd",
     what: "any of these, compressed as a whole",
     extensions: &["db3.zstd", "mcap.zstd"],
-    medium: Medium::Wrapping,
+    needs_file: false,
     sniff: |_, head| head.starts_with(b"\x28\xb5\x2f\xfd"),
     open,
     follow: None,
@@ -61,7 +61,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let Some(row) = FORMATS.iter().find(inside) else {
         return Err(explain(path, &head, false));
     };
-    let (place, copy) = if row.medium == Medium::File {
+    let (place, copy) = if row.needs_file {
         let copy = Temporary::new()?;
         let limit = file_bytes.saturating_mul(UNPACKED_FOLD).max(UNPACKED_COPY);
         let source = unpack(&mut stream, &copy, limit).map_err(fail())?;

@@ -18,16 +18,6 @@ pub enum Error {
         /// The system's error.
         source: io::Error,
     },
-    /// A store or server refused an object or could not be reached: the bag may be intact, and partial results are
-    /// discarded.
-    Remote {
-        /// The object.
-        url: String,
-        /// The store's answer.
-        reason: String,
-        /// The advice for the user.
-        hint: String,
-    },
     /// `path` is not a bag of a known format.
     UnknownBag {
         /// The file or folder.
@@ -88,7 +78,7 @@ pub enum Error {
     Interrupted,
     /// Something could not be drawn or written.
     Output {
-        /// The file or object that was to be written.
+        /// The file that was to be written.
         path: PathBuf,
         /// The reason for the failure.
         reason: String,
@@ -163,8 +153,7 @@ impl Error {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),
             Self::Interrupted => String::new(),
-            Self::Remote { hint, .. }
-            | Self::UnknownBag { hint, .. }
+            Self::UnknownBag { hint, .. }
             | Self::Malformed { hint, .. }
             | Self::Unsupported { hint, .. }
             | Self::NoMessages { hint, .. }
@@ -197,7 +186,6 @@ impl fmt::Display for Error {
                 doing,
                 source,
             } => write!(f, "cannot {doing} `{}`: {source}", path.display()),
-            Self::Remote { url, reason, .. } => write!(f, "cannot read `{url}`: {reason}"),
             Self::UnknownBag {
                 path, looks_like, ..
             } => write!(f, "`{}` is not a bag: it is {looks_like}", path.display()),

@@ -4,13 +4,6 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
-/// The node that writes `graph.mcap`: its topics are about the robot and not part of it.
-pub(crate) const OWN_NODE: &str = "/_bagreel";
-/// Its topic with a message each second while a live system is connected.
-pub(crate) const HEARTBEAT: &str = "/_bagreel/connected";
-/// The placeholder for all unknown publishers and subscribers in `graph.mcap`.
-pub(crate) const UNKNOWN_NODE: &str = "/_unknown";
-
 /// A message type in the form of ROS 1, without `/msg`.
 pub(crate) fn plain_type(type_name: &str) -> Cow<'_, str> {
     match type_name.split_once("/msg/") {

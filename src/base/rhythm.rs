@@ -56,10 +56,6 @@ pub(crate) const RUN_FEWEST: u64 = 10;
 pub(crate) const PAUSE_SHARE: u64 = 80;
 pub(crate) const PAUSE_FEWEST: u64 = 3;
 
-/// The longest time between two heartbeats of a connected live system, of which one is due each second: on a busy
-/// machine, or with a slow server, one or two are late.
-pub(crate) const UNSEEN_NS: i64 = 3 * SECOND;
-
 // ---- Starts and restarts.
 
 /// The largest number of a log record that shows a start: the first record of a process.

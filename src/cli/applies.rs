@@ -80,7 +80,7 @@ fn is_picture(output: &Output) -> bool {
 
 /// Whether the output contains the graph as data, complete unless `--filtered` is given.
 fn is_data(output: &Output) -> bool {
-    ["json", "mcap", "nodl", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
+    ["json", "nodl", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
 }
 
 /// Whether the output plays from frame to frame.
@@ -128,7 +128,7 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "filtered",
         takes: |_, output| is_data(output),
-        what: "it applies to data: json, mcap, nodl, csv, parquet, gexf, graphml; pictures are already filtered",
+        what: "it applies to data: json, nodl, csv, parquet, gexf, graphml; pictures are already filtered",
     },
     AppliesTo {
         options: "frame-ms",

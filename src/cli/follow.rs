@@ -6,20 +6,18 @@ use super::args::follow::{FollowArgs, FollowFormat};
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::reading::reading;
 use super::render;
-use super::serve::Server;
 use super::show::NO_EVENTS;
 use super::terminal::Terminal;
 use super::{DONE, code, gate};
 use crate::bag::Growth;
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::base::{budget, file};
 use crate::export::Output;
 use crate::gate::{Expectation, FORMATS, judge};
 use crate::graph::window::Length;
 use crate::mission::events::LogFormat;
 use crate::pipeline::Render;
-use crate::pipeline::follow::{Feed, FindingFeed, Follow, page};
-use crate::pipeline::live::Live;
+use crate::pipeline::follow::{Feed, FindingFeed, Follow};
 
 /// The number of newest messages in which events are detected: less than a tenth of a second of work, and
 /// several minutes for most robots.
@@ -32,9 +30,6 @@ const LEAST: f64 = 1.0;
 const LEAST_NEW: f64 = 0.2;
 /// The seconds from the first sign of something new to its analysis: a first message alone does not show a rhythm.
 const SETTLED: f64 = 0.5;
-
-/// The most events printed at once about a live system: more than anyone reads, and than all its nodes when it starts.
-const MOST_LINES: usize = 1000;
 
 /// A recurring task, and the next time at which it may run.
 struct Pace {
@@ -66,25 +61,21 @@ impl Pace {
 struct Follower<'a> {
     args: &'a FollowArgs,
     follow: Follow,
-    live: Option<Live>,
     format: LogFormat,
     feed: Feed,
     findings: FindingFeed,
     expectation: Option<Expectation>,
     job: Render,
-    server: Option<Server>,
     events: Pace,
-    whole: Pace,
+    checks: Pace,
     /// Whether no event has been printed.
     is_silent: bool,
 }
 
 /// Follows a recording to its end.
 pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
-    let live = Live::start(&args.what, &args.rates)?;
-    let what = live.as_ref().map_or(args.what.as_path(), Live::path);
     let inputs = Inputs {
-        bags: vec![what.to_owned()],
+        bags: vec![args.what.clone()],
         ..Inputs::default()
     };
     let time = TimeArgs {
@@ -116,50 +107,31 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         args,
         expectation: args.expect.as_deref().map(expectation).transpose()?,
         follow,
-        live,
         format: match args.format {
             FollowFormat::Text => LogFormat::Text,
             FollowFormat::Ndjson => LogFormat::Ndjson,
         },
         feed: Feed::default(),
         findings: FindingFeed::default(),
-        server: args
-            .serve
-            .map(|at| server(at, args, terminal))
-            .transpose()?,
         job,
         events: Pace::new(),
-        whole: Pace::new(),
+        checks: Pace::new(),
         is_silent: true,
     };
     follower.run(terminal)
-}
-
-fn server(at: std::net::SocketAddr, args: &FollowArgs, terminal: &mut Terminal) -> Result<Server> {
-    if !args.bind && !at.ip().is_loopback() {
-        let what = format!("`--serve {at}` would make the mission visible to other machines");
-        return Err(Error::usage(
-            what,
-            "serve at 127.0.0.1, or allow it with `--bind`",
-        ));
-    }
-    let server = Server::start(at)?;
-    terminal.status(&format!("the page is at http://{}/", server.address));
-    Ok(server)
 }
 
 impl Follower<'_> {
     fn run(mut self, terminal: &mut Terminal) -> Result<u8> {
         terminal.note_signals(true);
         let (mut grew, mut known, mut appeared) = (terminal.seconds(), 0, None);
-        let (mut is_behind, mut is_page_behind) = (false, false);
+        let (mut is_behind, mut is_unchecked) = (false, false);
         let idle = self.args.idle.map(|idle| idle.nanos() as f64 / 1e9);
         loop {
             let growth = self.follow.poll()?;
-            self.report(terminal);
             let now = terminal.seconds();
             if growth == Growth::More {
-                (grew, is_behind, is_page_behind) = (now, true, true);
+                (grew, is_behind, is_unchecked) = (now, true, true);
             }
             if self.follow.known() > known {
                 known = self.follow.known();
@@ -180,9 +152,9 @@ impl Follower<'_> {
                     break;
                 }
             }
-            if is_page_behind && (is_over || now >= self.whole.due) {
-                is_page_behind = false;
-                self.update_whole(terminal)?;
+            if is_unchecked && (is_over || now >= self.checks.due) {
+                is_unchecked = false;
+                self.print_findings(terminal)?;
             }
             if is_idle && let Some(idle) = self.args.idle {
                 terminal.status(&format!("nothing was written for {idle}"));
@@ -195,12 +167,6 @@ impl Follower<'_> {
         self.end(terminal)
     }
 
-    /// Prints the status messages of the connection.
-    fn report(&self, terminal: &mut Terminal) {
-        let statuses = self.live.iter().flat_map(Live::new_statuses);
-        statuses.for_each(|text| terminal.status(&text));
-    }
-
     /// Prints the new events; false if standard output was closed.
     fn print_events(&mut self, terminal: &mut Terminal) -> Result<bool> {
         let (follow, feed, format) = (&self.follow, &mut self.feed, self.format);
@@ -208,55 +174,32 @@ impl Follower<'_> {
             let known = follow.so_far(MOST, Length::All)?;
             Ok(known.map_or_else(Vec::new, |known| feed.new_lines(&known, format)))
         });
-        let mut lines = lines?;
-        let more = lines.len().saturating_sub(MOST_LINES);
-        if self.live.is_some() && more > 0 {
-            lines.truncate(MOST_LINES);
-            terminal.note(&format!("… and {more} more events"));
-        }
+        let lines = lines?;
         self.is_silent &= lines.is_empty();
         terminal.log(&lines, format)
     }
 
-    /// Prints new findings and updates the page.
-    fn update_whole(&mut self, terminal: &mut Terminal) -> Result<()> {
-        if self.expectation.is_none() && self.server.is_none() {
+    /// Prints new findings.
+    fn print_findings(&mut self, terminal: &mut Terminal) -> Result<()> {
+        let Some(expectation) = &self.expectation else {
             return Ok(());
-        }
-        let length = match (&self.expectation, self.args.period) {
-            (_, Some(length)) => length,
-            (
-                Some(Expectation {
-                    period: Some(period),
-                    ..
-                }),
-                _,
-            ) => Length::Fixed(*period),
-            _ => Length::Auto,
         };
+        let expected = expectation.period.map_or(Length::Auto, Length::Fixed);
+        let length = self.args.period.unwrap_or(expected);
         let (follow, findings, format) = (&self.follow, &mut self.findings, self.format);
-        let (expectation, server, job) = (&self.expectation, &self.server, &self.job);
-        let lines = self.whole.spend(terminal, || {
+        let lines = self.checks.spend(terminal, || {
             let Some(known) = follow.so_far(u64::MAX, length)? else {
                 return Ok(Vec::new());
             };
-            let judged = expectation.as_ref().map(|expectation| {
-                let verdict = judge(expectation, &known.mission, false);
-                findings.new_lines(&verdict, known.now, format)
-            });
-            if let Some(server) = server {
-                server.show(page(job, known.mission)?);
-            }
-            Ok(judged.unwrap_or_default())
+            let verdict = judge(expectation, &known.mission, false);
+            Ok(findings.new_lines(&verdict, known.now, format))
         });
         terminal.log(&lines?, format).map(drop)
     }
 
     /// Checks the recording as it is now and writes the outputs.
-    fn end(mut self, terminal: &mut Terminal) -> Result<u8> {
+    fn end(self, terminal: &mut Terminal) -> Result<u8> {
         terminal.note_signals(false);
-        self.live.iter_mut().for_each(Live::finish);
-        self.report(terminal);
         if self.is_silent {
             terminal.note(NO_EVENTS);
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{DONE, FAILED, SKIPPED};
+use super::{DONE, SKIPPED};
 use crate::base::error::Result;
 use crate::base::{budget, file, words};
 use crate::cli::args::tables::TablesArgs;
@@ -27,9 +27,6 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     job.on_error = args.on_error;
     job.jobs = args.jobs;
     let done = fleet::tables(&job, terminal)?;
-    for (_, why) in done.refused.iter().take(MOST_REPORTED) {
-        terminal.failed(why);
-    }
     if !done.copies.is_empty() {
         terminal.note(&format!(
             "{} of {} contain the same messages as another, and all are counted: {}",
@@ -39,15 +36,12 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
         ));
     }
     terminal.wrote([&*args.output], &summary(&done));
-    Ok(match &done {
-        done if !done.refused.is_empty() => FAILED,
-        done if done.unreadable + done.incomplete > 0 => SKIPPED,
-        _ => DONE,
+    Ok(if done.unreadable + done.incomplete > 0 {
+        SKIPPED
+    } else {
+        DONE
     })
 }
-
-/// The most failures reported one by one: a store that is down fails for every bag of a fleet.
-const MOST_REPORTED: usize = 8;
 
 /// `12 bags (1 unreadable, 3 already there), 4711 messages`.
 fn summary(done: &Tabled) -> String {
@@ -55,7 +49,6 @@ fn summary(done: &Tabled) -> String {
         (done.unreadable, "unreadable"),
         (done.incomplete, "damaged"),
         (done.kept, "already there"),
-        (done.refused.len(), "not available"),
     ];
     let of: Vec<String> = of
         .iter()

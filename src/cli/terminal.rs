@@ -65,13 +65,6 @@ impl Terminal {
         }
     }
 
-    /// Prints one of several errors that did not end the run; only `tables` has them.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn failed(&mut self, why: &str) {
-        self.progress.end();
-        self.line("31", "error", why);
-    }
-
     /// Prints notices, one line each; several routine ones are summarized in one line, unless all are requested.
     pub(crate) fn notices(&mut self, notices: &Notices) {
         self.progress.end();

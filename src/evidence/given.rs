@@ -46,7 +46,6 @@ fn recorded(path: &Path) -> Result<Topology> {
         Observation::Subscribe(node, topic) => {
             Some(NamedElement::Subscribe(text(node), text(topic)))
         }
-        Observation::Topic(topic) => Some(NamedElement::Topic(text(topic))),
         Observation::Type(topic, kind) => Some(NamedElement::Type(text(topic), text(kind))),
         _ => None,
     };

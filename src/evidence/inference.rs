@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
-use crate::base::name::{OWN_NODE, is_log, plain_type};
+use crate::base::name::{is_log, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::closed::Closed;
 use crate::evidence::observation::{
@@ -39,14 +39,6 @@ pub(crate) struct Stream {
     pub(crate) times: SeriesId,
     /// Whether a part of the recording is read and all its messages are outside of it.
     pub(crate) is_outside: bool,
-}
-
-impl Stream {
-    /// Whether it was written by this program about the robot, and is not part of the robot.
-    pub(crate) fn is_about(&self) -> bool {
-        let node = self.connection.publisher.as_ref();
-        node.is_some_and(|node| node.as_str() == OWN_NODE)
-    }
 }
 
 /// The reliability of the publisher that a header names.

@@ -106,8 +106,6 @@ observations! {
     Duplicate(node),
     /// The recorder lost so many messages of this topic.
     Lost(topic, many),
-    /// So many publishers of this topic have no known name.
-    Unnamed(topic, many),
     /// A snapshot was taken: observations that the source made in an earlier snapshot of the same name and not in this one
     /// have ended.
     Snapshot(name),

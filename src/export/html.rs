@@ -42,9 +42,6 @@ const SCRIPT: [&str; 9] = [
     include_str!("html/player/keys.js"),
 ];
 
-/// The part of the script for a page that is served while its recording grows.
-const LIVE: &str = include_str!("html/player/live.js");
-
 /// The parts of a page.
 pub(crate) struct HtmlPage<'a> {
     /// The whole sequence.
@@ -90,20 +87,15 @@ impl<'a> PageGraph<'a> {
 }
 
 impl HtmlPage<'_> {
-    /// The page: UTF-8, without any requests unless it is served; its policy allows its scripts and styles by digest.
+    /// The page: UTF-8, without any requests; its policy allows its scripts and styles by digest.
     pub(crate) fn write(&self) -> String {
         let still = self.whole.view.busiest_change();
         let fonts = fonts();
         let look = self.look();
-        let mut script = SCRIPT.map(squeezed).join("\n");
-        let mut requests = "";
-        if self.sequence.options.is_live {
-            script = script + "\n" + &squeezed(LIVE);
-            requests = "connect-src 'self';";
-        }
+        let script = SCRIPT.map(squeezed).join("\n");
         let (data, data_type) = data::packed(&data::json(self, still));
         let policy = format!(
-            "default-src 'none';{requests}script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
+            "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
             digest::policy(&script),
             digest::policy(&fonts),
             digest::policy(&look),

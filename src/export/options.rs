@@ -47,8 +47,6 @@ pub struct SequenceOptions {
     pub pairs: Option<LifeLines>,
     /// Links for the report: name and address.
     pub links: Vec<(String, String)>,
-    /// Whether a page polls its server for newer ones and replaces itself.
-    pub is_live: bool,
     /// A file to which reports are appended; all others are overwritten.
     pub append_to: Option<PathBuf>,
 }
@@ -71,7 +69,6 @@ impl Default for SequenceOptions {
             figure: None,
             pairs: None,
             links: Vec::new(),
-            is_live: false,
             append_to: None,
         }
     }

@@ -129,15 +129,14 @@ fn apart(recorded: &Recorded, inputs: &[Input]) -> Result<Vec<Notice>> {
 /// The beginning of the notice about a clock that was set back.
 const SET_BACK: &str = "the recorder's clock went back by";
 
-/// The collection options without comparing payloads of large or remote bags, where reading all payloads would defeat
-/// the index. They are compared on request.
+/// The collection options without comparing payloads of large bags, where reading all payloads would defeat the index.
+/// They are compared on request.
 fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
-    let is_far = |input: &Input| matches!(input, Input::Url(_));
     let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
     let is_bounded = options.payload_bytes < u64::MAX;
-    if is_bounded && (is_large || reading.inputs.iter().any(is_far)) {
+    if is_bounded && is_large {
         options.payload_bytes = 0;
     }
     options

@@ -7,17 +7,15 @@ mod feed;
 
 use std::path::Path;
 
+use super::Reading;
 use super::collect::Collected;
 use super::read::so_far;
-use super::{Reading, Render, Unwatched, show};
 pub use crate::bag::Growth;
-use crate::bag::source::Temporary;
 use crate::bag::{self, Growing, Input, Report, Tier, file_name};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::collector::Collector;
-use crate::export::Output;
 use crate::graph::window::Length;
 use crate::mission::Mission;
 pub use feed::Feed;
@@ -155,22 +153,6 @@ impl Follow {
             ..Report::default()
         }
     }
-}
-
-/// A mission as a page that its server updates.
-///
-/// # Errors
-/// If it cannot be drawn, or the folder for temporary files cannot be used.
-pub(crate) fn page(job: &Render, mission: Mission) -> Result<Vec<u8>> {
-    let folder = Temporary::new()?;
-    let path = folder.path().join("page.html");
-    let mut job = Render {
-        outputs: vec![Output::parse(&path.display().to_string(), None)?],
-        ..job.clone()
-    };
-    job.sequence.is_live = true;
-    show(&job, mission, &mut Unwatched)?;
-    std::fs::read(&path).map_err(Error::io("read", &path))
 }
 
 #[cfg(test)]

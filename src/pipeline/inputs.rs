@@ -18,7 +18,6 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     for input in inputs.iter().flat_map(bag::parts_of) {
         let real = match &input {
             Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
-            Input::Url(url) => PathBuf::from(url),
             Input::Stdin => PathBuf::from("-"),
         };
         if seen.insert(real) {
@@ -69,7 +68,6 @@ pub(super) fn space_of(reading: &Reading, input: &Input) -> String {
 fn is_of(name: &Path, input: &Input) -> bool {
     match input {
         Input::Path(path) => path.starts_with(name) || path.file_name() == Some(name.as_os_str()),
-        Input::Url(url) => name == Path::new(url),
         Input::Stdin => name == Path::new("-"),
     }
 }
@@ -111,8 +109,7 @@ pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
     Ok(all)
 }
 
-/// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes and remote bags are
-/// not checked.
+/// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes are not checked.
 fn refuse_copies(inputs: &[Input]) -> Result<()> {
     let near = inputs
         .iter()

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::Reading;
 use super::collect::Collected;
 use super::inputs::{each_once, in_time};
-use crate::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
+use crate::bag::{self, Connection, ConnectionId, Message, OpenOptions, Sink, Want};
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::numbers::{self, Number};
@@ -13,8 +13,7 @@ use crate::evidence::numbers::{self, Number};
 /// The longest time between two messages that are read at once, in nanoseconds: they are in one chunk.
 const AT_ONCE_NS: i64 = 100_000_000;
 
-/// Reads the sequence numbers of these messages, given by stream and time. Skips pipes, and remote bags, where each
-/// costs several requests.
+/// Reads the sequence numbers of these messages, given by stream and time. Skips pipes.
 pub(super) fn probe(
     reading: &Reading,
     collected: &mut Collected,
@@ -30,7 +29,7 @@ pub(super) fn probe(
         let mut wanted: Vec<(Stamp, usize, ConnectionId)> = of_bag
             .map(|(at, time)| (*time, *at, streams[*at].connection.id))
             .collect();
-        if wanted.is_empty() || input.is_pipe() || matches!(input, Input::Url(_)) {
+        if wanted.is_empty() || input.is_pipe() {
             continue;
         }
         wanted.sort_unstable();

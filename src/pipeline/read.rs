@@ -119,7 +119,7 @@ impl Reading {
 pub(super) fn files(inputs: &[Input]) -> Vec<PathBuf> {
     let paths = inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
-        Input::Url(_) | Input::Stdin => None,
+        Input::Stdin => None,
     });
     paths.filter(|path| path.exists()).cloned().collect()
 }

@@ -226,22 +226,10 @@ def dask(fleet, folder, expected):
         report(f"the same, a worker killed with -9 with {finished} of {COPIES} bags done", digest(client.gather(futures), "counts"), expected, started)
 
 
-def s3(fleet, folder, expected):
-    import s3 as server
-
-    server.run(fleet, folder, expected, report, 20 * COPIES, COMMAND)
-
-
-def workers(fleet, folder, expected):
-    import workers as late
-
-    FAILED.extend(late.run(ROOT, folder, COMMAND, of_folder))
-
-
 def main():
     folder = Path(sys.argv[1]).resolve()
     fleet = bags(folder)
-    for old in ("one", "shards", "shards_killed", "s3", "late"):
+    for old in ("one", "shards", "shards_killed"):
         shutil.rmtree(folder / old, ignore_errors=True)
     print("| how | digest of `counts` | rows | | time |\n|---|---|---|---|---|")
     started = time.time()
@@ -250,9 +238,8 @@ def main():
     report(f"one process, {COPIES} bags", expected, expected, started)
     uris = pa.concat_tables(pq.read_table(file) for file in (folder / "one/bags").glob("*.parquet"))
     assert sorted(uris["uri"].to_pylist()) == sorted(map(str, fleet.iterdir())), "not each bag exactly once"
-    sys.path.insert(0, str(Path(__file__).parent))
     # Spark before Sail, after whose client no new Spark session is possible.
-    for way in (wheel, xargs, dask, spark, sail, s3, workers):
+    for way in (wheel, xargs, dask, spark, sail):
         if not ONLY or way.__name__ in ONLY:
             way(fleet, folder, expected)
     print("failed: " + ", ".join(FAILED) if FAILED else "all equal")

@@ -198,52 +198,6 @@ fn write_with(recording: &Recording, how: Pack, chunk: usize, behind: &[u8]) -> 
     bytes
 }
 
-/// A sparse bag: its nonzero parts and their positions.
-#[cfg(feature = "remote")]
-pub struct SparseBag {
-    pub len: u64,
-    pub parts: Vec<(u64, Vec<u8>)>,
-}
-
-/// A bag of `chunks` chunks of `chunk` bytes, each with twenty messages of one publisher and one of another, a tenth of
-/// a second apart and half as long again. Their contents are a hole, listed only in the index.
-#[cfg(feature = "remote")]
-pub fn sparse(publishers: &[Publisher; 2], start: i64, chunks: usize, chunk: u32) -> SparseBag {
-    const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-    let mut at = (MAGIC.len() + bag_header(0, 0, 0).len()) as u64;
-    let (mut parts, mut infos) = (Vec::new(), Vec::new());
-    for k in 0..chunks {
-        let first = start + i64::try_from(k).unwrap() * 100_000_000;
-        let often = (0..20u32).map(|n| (first + i64::from(n) * 7_500_000, n));
-        let index = BTreeMap::from([(0, often.collect()), (1, vec![(first, 20)])]);
-        let open = Chunk {
-            index,
-            ..Chunk::default()
-        };
-        let (mut head, info) = close(&open, Pack::None, at);
-        let fields: [(&str, &[u8]); 3] =
-            [("op", &[5]), ("compression", b"none"), ("size", &[0; 4])];
-        let index = head.split_off(record(&fields, &[]).len());
-        // Its size, uncompressed and compressed.
-        let sizes = head.len() - 8;
-        head[sizes..].copy_from_slice(&chunk.to_le_bytes().repeat(2));
-        let behind = at + head.len() as u64 + u64::from(chunk);
-        parts.push((at, head));
-        at = behind + index.len() as u64;
-        parts.push((behind, index));
-        infos.push(info);
-    }
-    let mut tail: Vec<u8> = (0..)
-        .zip(publishers)
-        .flat_map(|(id, p)| connection(id, p))
-        .collect();
-    tail.extend(infos.concat());
-    let head = [MAGIC, &bag_header(at, 2, chunks)].concat();
-    let len = at + tail.len() as u64;
-    parts.extend([(at, tail), (0, head)]);
-    SparseBag { len, parts }
-}
-
 /// The same bag as if its recorder had been killed: no tail, as stated in the head.
 pub fn unindexed(bag: &[u8]) -> Vec<u8> {
     let at = bag.windows(10).position(|w| w == b"index_pos=").unwrap() + 10;

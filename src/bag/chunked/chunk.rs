@@ -21,9 +21,6 @@ impl<G: Grammar> Query<'_, G> {
         let Some(promised) = &chunk.promised else {
             return;
         };
-        if let Some(index) = self.sufficient(chunk, promised) {
-            return self.report(&index, None, sink);
-        }
         let found = match self.index(chunk, promised) {
             Ok(found) => found,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
@@ -73,19 +70,6 @@ impl<G: Grammar> Query<'_, G> {
             }
             self.walked(&mut stream, Share::Whole, sink);
         }
-    }
-
-    /// The index of a remote chunk, if it agrees with the tail and no more is wanted: reading the head of the chunk
-    /// would cost another request.
-    fn sufficient(&self, chunk: &Chunk, promised: &IndexSum) -> Option<Index> {
-        let len = chunk.index.end - chunk.index.start;
-        if !self.source.is_far() || len == 0 || len > LONGEST_INDEX {
-            return None;
-        }
-        // What fails here is requested again later, and reported then.
-        let index = self.index_at(chunk.index.start, len, promised).ok()??;
-        let is_all = index.spans(chunk.first, chunk.last) && !self.wants_messages(&index);
-        is_all.then_some(index)
     }
 
     /// The chunk's index, if it agrees exactly with the tail.

@@ -10,7 +10,7 @@ use super::record::{Connections, RecordHead};
 use crate::bag::adapters::MOST_CUTS;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
-use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
@@ -180,11 +180,6 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
-    /// Whether more than the time of a message in `index` is wanted.
-    pub(super) fn wants_messages(&self, index: &Index) -> bool {
-        !self.wanted(index).is_empty()
-    }
-
     /// The entries for which more than the stamp is wanted, in the order of the chunk.
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();
@@ -216,11 +211,7 @@ impl<G: Grammar> Query<'_, G> {
     ) -> Option<Vec<u32>> {
         let mut sizes = vec![0; index.stamps.len()];
         let mut missing = 0;
-        let step = self.step(index, wanted);
-        if let Some(body) = body.as_ref().filter(|_| self.source.is_far()) {
-            // What fails here is requested again later, and reported then.
-            let _ = self.source.expect(&ahead(body, wanted, step));
-        }
+        let step = step(wanted);
         let plain = body.and_then(|b| b.plain(self.source, step, &self.allowance).ok());
         match plain {
             None => missing = wanted.len(),
@@ -238,18 +229,6 @@ impl<G: Grammar> Query<'_, G> {
         }
         absent(sink, missing as u64);
         None
-    }
-
-    /// The number of bytes to read at a time for these messages.
-    fn step(&self, index: &Index, wanted: &[Wanted]) -> usize {
-        let is_size = |one: &Wanted| {
-            let id = self.connections.get(index.runs[one.run].0);
-            id.is_none_or(|id| self.wants[id.0 as usize] <= Want::Sizes)
-        };
-        match step(wanted) {
-            NEAR if self.source.is_far() && wanted.iter().all(is_size) => GLANCE,
-            step => step,
-        }
     }
 
     /// Reports one wanted message to `sink`; returns its size, or `None` if it is missing.
@@ -292,26 +271,6 @@ struct Wanted {
     entry: usize,
     run: usize,
 }
-
-/// The most messages of a chunk that are prefetched at once.
-const MOST_AHEAD: usize = 256;
-
-/// The ranges of the beginnings of these messages, or of the whole chunk if it is compressed.
-fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
-    let Range { start, end } = body.range;
-    let place = |offset: u64, length: u64| {
-        let at = start.saturating_add(offset).min(end);
-        at..at.saturating_add(length).min(end)
-    };
-    if body.how != Compression::None {
-        return Vec::from([place(0, MOST_PACKED)]);
-    }
-    let places = wanted.iter().take(MOST_AHEAD);
-    places.map(|one| place(one.offset, step as u64)).collect()
-}
-
-/// The most compressed bytes that are prefetched at once.
-const MOST_PACKED: u64 = 4 << 20;
 
 /// The number of bytes to read at a time for these messages, in order: far if the next one lies in the next few pages.
 fn step(wanted: &[Wanted]) -> usize {

@@ -51,7 +51,7 @@ pub(crate) struct ChunkPlan {
 pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 
 /// The most chunks that are all inspected to determine the covered time.
-pub(super) const MOST_LOOKED_INTO: usize = 512;
+const MOST_LOOKED_INTO: usize = 512;
 
 /// The most message counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
 const MOST_COUNTS: usize = 1 << 21;
@@ -77,13 +77,6 @@ impl ChunkPlan {
         let chunk_count: Vec<_> = counts.iter().map(known).collect::<Option<_>>()?;
         let sum: u64 = chunk_count.iter().map(|(_, count)| count).sum();
         (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(chunk_count)
-    }
-
-    /// Whether `chunk` is stated to contain messages of a wanted connection; `false` if its counts are not kept.
-    pub(super) fn holds(&self, chunk: &Chunk, is_wanted: impl Fn(ConnectionId) -> bool) -> bool {
-        let counts = self.counts.get(chunk.counts.clone());
-        let mut counts = counts.into_iter().flatten();
-        counts.any(|(raw, count)| *count > 0 && self.connections.get(*raw).is_some_and(&is_wanted))
     }
 
     /// The number of bytes of the longest index.

@@ -1,7 +1,6 @@
 //! The arguments of `follow`.
 
 use std::ffi::OsString;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -12,8 +11,8 @@ use crate::graph::window::Length;
 
 #[derive(Debug, Args)]
 pub(crate) struct FollowArgs {
-    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, a folder whose newest recording is
-    /// followed, or a live system: `ros1://HOST:11311` (a ROS 1 master), `ws://HOST:8765` (`foxglove_bridge`).
+    /// The recording: `.bag.active`, `.bag`, `.mcap`, `.db3`, a rosbag2 folder, or a folder whose newest recording
+    /// is followed.
     #[arg(value_name = "WHAT")]
     pub(crate) what: PathBuf,
     /// Output format.
@@ -26,25 +25,15 @@ pub(crate) struct FollowArgs {
     /// Output file, written at the end as `render` writes it from the closed recording. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Length of a window in outputs, on the page, and for rules about rates.
+    /// Length of a window in outputs, and for rules about rates.
     #[arg(long, short, value_parser = length)]
     pub(crate) period: Option<Length>,
     /// Stop when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) idle: Option<Period>,
-    /// Keep this much of the recording in memory for events, findings and the page; outputs cover all of it.
+    /// Keep this much of the recording in memory for events and findings; outputs cover all of it.
     #[arg(long, value_name = "TIME", default_value = "1h", value_parser = period)]
     pub(crate) keep: Period,
-    /// Topics of a live system (`ws://`) to subscribe to, so that their rates are known. [default: none, the graph
-    /// only]
-    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',')]
-    pub(crate) rates: Vec<String>,
-    /// Serve a page at this address that shows the mission as it grows: `127.0.0.1:8723`.
-    #[arg(long, value_name = "ADDRESS:PORT")]
-    pub(crate) serve: Option<SocketAddr>,
-    /// Allow an address that other machines can reach.
-    #[arg(long, requires = "serve")]
-    pub(crate) bind: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

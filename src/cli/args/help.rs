@@ -9,7 +9,7 @@ use super::Typed;
 const HEADINGS: [(&str, &str); 7] = [
     (
         "Input",
-        "ns verify manifest mission msg_path on_error expect only update rates",
+        "ns verify manifest mission msg_path on_error expect only update",
     ),
     (
         "Time",
@@ -27,7 +27,7 @@ const HEADINGS: [(&str, &str); 7] = [
     (
         "Output",
         "outputs output format include frame_ms tween hold_changes strip max_bytes poster json runs dot_profile link \
-         fields nested parts undecidable explain serve bind",
+         fields nested parts undecidable explain",
     ),
     ("Evidence", "topology source source_at infer why"),
     ("Performance", "timings bytes tier shard skip_existing jobs"),
@@ -117,11 +117,11 @@ const SCREENS: [(&str, &str, &str); 14] = [
     ),
     (
         "follow",
-        "format expect outputs period idle rates serve",
+        "format expect outputs period idle",
         "
   bagreel follow run.bag.active                       print events while rosbag records
   bagreel follow bags/ --expect expect.yaml -o run.html     check the newest recording in a folder
-  bagreel follow ros1://localhost:11311 --serve 127.0.0.1:8723   show a live ROS 1 system as a page",
+  bagreel follow run/ --format ndjson                 a rosbag2 folder, events for programs",
     ),
     (
         "styles",

@@ -12,9 +12,8 @@ use crate::pipeline::fleet::{CountDetail, OnError};
 
 #[derive(Debug, Args)]
 pub(crate) struct TablesArgs {
-    /// Bags, folders of bags, objects (`s3://`, `gs://`, `az://`, `https://`), prefixes ending in a slash, or `-` for
-    /// standard input.
-    #[arg(required_unless_present = "manifest", value_name = "BAG|FOLDER|URL")]
+    /// Bags, folders of bags, or `-` for standard input.
+    #[arg(required_unless_present = "manifest", value_name = "BAG|FOLDER")]
     pub(crate) bags: Vec<String>,
     /// Output folder; `counts/` and `bags/` in it get one Parquet file per bag.
     #[arg(long, short, value_name = "FOLDER")]
@@ -32,9 +31,8 @@ pub(crate) struct TablesArgs {
     /// recording]
     #[arg(long, value_name = "PATTERN")]
     pub(crate) mission: Option<String>,
-    /// Count messages by the full index, or whole chunks (fewer requests, but no first and last times); `auto` counts
-    /// chunks of objects with more than 64 of them.
-    #[arg(long, value_parser = detail, value_name = "auto|index|chunks", default_value = "auto")]
+    /// Count messages by the full index, or whole chunks (faster, but no first and last times).
+    #[arg(long, value_parser = detail, value_name = "index|chunks", default_value = "index")]
     pub(crate) tier: CountDetail,
     /// Count only shard I of N; the shards 1/N to N/N together count everything.
     #[arg(long, value_parser = shard, value_name = "I/N")]
@@ -45,7 +43,7 @@ pub(crate) struct TablesArgs {
     /// For an unreadable bag, write a row with the error, or fail.
     #[arg(long, value_parser = on_error, value_name = "row|fail", default_value = "row")]
     pub(crate) on_error: OnError,
-    /// Number of bags to count in parallel. [default: one per processor, eight for objects]
+    /// Number of bags to count in parallel. [default: one per processor]
     #[arg(long, value_name = "N")]
     pub(crate) jobs: Option<NonZeroUsize>,
 }
@@ -53,14 +51,13 @@ pub(crate) struct TablesArgs {
 pub(crate) const HELP: &str = "\
 counts: mission, bag, format, period_ns, win, start_ns, end_ns, topic, type, node, node_role, n, bytes,
         first_ns, last_ns, max_gap_ns
-bags:   uri, mission, etag, file_bytes, format, tier, is_complete, messages, content, start_ns, end_ns, period_ns,
+bags:   uri, mission, file_bytes, format, tier, is_complete, messages, content, start_ns, end_ns, period_ns,
         origin_ns, lost, error, bagreel, schema_version
 
-Exit codes: 0 done, 1 failed or a store refused a bag (run again), 2 usage error, 3 done, but `bags` lists unreadable or
-damaged bags.";
+Exit codes: 0 done, 1 failed, 2 usage error, 3 done, but `bags` lists unreadable or damaged bags.";
 
 fn detail(text: &str) -> Result<CountDetail, String> {
-    CountDetail::from_word(text).ok_or_else(|| "write `auto`, `index` or `chunks`".to_owned())
+    CountDetail::from_word(text).ok_or_else(|| "write `index` or `chunks`".to_owned())
 }
 
 fn on_error(text: &str) -> Result<OnError, String> {

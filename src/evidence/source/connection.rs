@@ -7,9 +7,6 @@ use crate::evidence::observation::{Confidence, SourceId};
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
-        if stream.is_about() {
-            continue;
-        }
         let inference = |what, when| Inference::new(source, what, Confidence::Measured, when);
         known.add(inference(
             ElementKey::Topic(stream.topic),

@@ -198,7 +198,6 @@ impl Owners {
     pub(crate) fn others(
         &self,
         known: &Conclusions<'_>,
-        kind_of: &impl Fn(&Conclusions<'_>, Name) -> String,
         kind: &str,
         node: &str,
     ) -> Vec<(bool, Name)> {
@@ -210,7 +209,7 @@ impl Owners {
         };
         let recorded = |row: &Contract| {
             let topic = known.facts.known(&resolved(&row.topic, node));
-            let topic = topic.filter(|topic| kind_of(known, *topic) == row.kind)?;
+            let topic = topic.filter(|topic| known.kind(*topic) == row.kind)?;
             Some((row.publishes, topic))
         };
         self.0

@@ -44,8 +44,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     if recorders.len() != 1 {
         return;
     }
-    let robots = known.streams.iter().filter(|s| !s.is_about());
-    let topics: BTreeSet<Name> = robots.map(|s| s.topic).collect();
+    let topics: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
     for recorder in recorders {
         for topic in &topics {
             let what = ElementKey::Subscribe(*topic, recorder);

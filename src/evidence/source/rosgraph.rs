@@ -5,15 +5,14 @@
 //! is parsed by the definition in the bag, or by the built-in one that it matches exactly.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::SourceContext;
-use crate::base::name::UNKNOWN_NODE;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
-use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
+use crate::evidence::observation::{Name, Observation, SourceId};
 
 /// `rosgraph_msgs/msg/Graph`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/Graph", &[]);
@@ -26,7 +25,7 @@ pub(crate) const NODE_SHAPE: MessageLayout = MessageLayout::ros2("rosgraph_msgs/
 
 /// The definition of a graph in the core interfaces, whose types are those of the other forms unless they differ:
 /// <https://github.com/ros2/rcl_interfaces/tree/rolling/rosgraph_msgs/msg>.
-pub(crate) const DEFINITION: &str = include_str!("rosgraph.msg");
+const DEFINITION: &str = include_str!("rosgraph.msg");
 
 /// The types of each form, the newest first: of the core interfaces, of nodl, and two of graph-monitor.
 const FORMS: [&str; 4] = [
@@ -116,26 +115,6 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         if name.is_empty() {
             continue;
         }
-        if name == UNKNOWN_NODE {
-            let mut unnamed: BTreeMap<Name, usize> = BTreeMap::new();
-            for (is_sent, topic, kind, qos) in ends(node) {
-                let (of, kind) = (context.name(&topic), context.name(kind));
-                // A recorder that knows the quality of service has counted the publishers.
-                if let Some(quality) = qos.and_then(quality).filter(|_| is_sent) {
-                    *unnamed.entry(of).or_default() += 1;
-                    offer(context, of, &quality);
-                }
-                context.states_in(group, Observation::Topic(of), || {
-                    format!("{topic} is in the graph")
-                });
-                context.states_in(group, Observation::Type(of, kind), String::new);
-            }
-            for (topic, many) in unnamed {
-                let observation = Observation::Unnamed(topic, context.name(&many.to_string()));
-                context.observation(observation, Confidence::Declared, String::new);
-            }
-            continue;
-        }
         let id = context.name(name);
         context.states_in(group, Observation::Node(id), || {
             format!("{name} is in the graph{}", parameters(node))
@@ -159,7 +138,8 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
                 format!("{name} {verb} {topic}{quality}")
             });
             if let Some(quality) = quality.filter(|_| is_sent) {
-                offer(context, of, &quality);
+                let offered = Observation::Quality(of, context.name(&quality));
+                context.states(offered, || format!("offered as {quality}"));
             }
             if !context.facts.text(kind).is_empty() {
                 context.states_in(group, Observation::Type(of, kind), String::new);
@@ -186,12 +166,6 @@ fn snapshot(context: &mut SourceContext<'_>, nodes: &[MessageValue], of: &str) {
         }
     }
     context.states(Observation::Snapshot(group), String::new);
-}
-
-/// Adds the quality of service that a topic is offered with.
-fn offer(context: &mut SourceContext<'_>, topic: Name, quality: &str) {
-    let observation = Observation::Quality(topic, context.name(quality));
-    context.states(observation, || format!("offered as {quality}"));
 }
 
 /// An endpoint in a message: whether it publishes, the topic, its type and its quality of service.

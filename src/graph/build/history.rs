@@ -9,7 +9,7 @@ use super::lifetime::Lifetime;
 use super::lifetimes::compute_lifetimes;
 use super::liveness::Liveness;
 use super::merged::fall_silent;
-use super::recordings::{doubled, pauses, unseen};
+use super::recordings::{doubled, pauses};
 use super::restarts::restarts;
 use super::senders::{Sender as TopicSender, Traffic};
 use super::tracks::{Tracks, tracks};
@@ -144,8 +144,7 @@ fn of_elements(
 ) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let mut pauses = pauses(traffic, &restarts, &findings.streams);
-    pauses.extend(unseen(recorded, &findings.streams)?);
+    let pauses = pauses(traffic, &restarts, &findings.streams);
     let (mut tracks, likes) = tracks(recorded, findings, traffic, (&restarts, &pauses))?;
     fall_silent(&mut tracks, traffic, findings, &pauses);
     compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);

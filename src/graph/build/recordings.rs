@@ -1,14 +1,10 @@
 //! The recordings of a mission: the time that each covers, and the times at which none of its messages was recorded.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io;
 
 use super::restarts::Restarts;
 use super::senders::{Sender, Traffic};
-use crate::base::name::HEARTBEAT;
-use crate::base::rhythm::{
-    FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE, UNSEEN_NS,
-};
+use crate::base::rhythm::{FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::clock::{DAY, FAR_DAYS};
 use crate::evidence::collector::Recorded;
@@ -207,18 +203,6 @@ fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
         };
     }
     found
-}
-
-/// The times at which a live system was not connected.
-pub(crate) fn unseen(recorded: &Recorded, streams: &[Stream]) -> io::Result<Vec<Span>> {
-    let is_beat = |s: &&Stream| s.is_about() && s.connection.topic.as_str() == HEARTBEAT;
-    let mut found = Vec::new();
-    for stream in streams.iter().filter(is_beat) {
-        let times = recorded.messages.times(stream.times)?;
-        let gaps = times.windows(2).map(|pair| Span::new(pair[0], pair[1]));
-        found.extend(gaps.filter(|gap| gap.nanos() >= UNSEEN_NS));
-    }
-    Ok(found)
 }
 
 /// The gaps of senders that rarely have any, sorted.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::counts::{Count, FleetBag};
 use super::plan::{CountDetail, PlannedBag};
 use crate::bag::{
-    self, ChunkCounts, Connection, ConnectionId, ETAG, Input, OpenOptions, Report, Sink, Want,
+    self, ChunkCounts, Connection, ConnectionId, Input, OpenOptions, Report, Sink, Want,
 };
 use crate::base::error::{Error, Result};
 use crate::base::name::NodeName;
@@ -50,18 +50,12 @@ pub struct CountedBag {
     pub bag: FleetBag,
 }
 
-/// In a remote bag with more chunks than this, chunks are counted as a whole: each would need a request.
-const FAR_CHUNKS: usize = 64;
-
 /// Counts the messages of a bag. An unreadable or damaged bag is not an error but has a row that states it.
 ///
 /// # Errors
-/// [`Error::Remote`], where a retry may help; and if the temporary file of times cannot be used.
+/// If the temporary file of times cannot be used.
 pub fn count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
-    match try_count(planned, tally) {
-        Err(error) => unreadable(planned, tally, error),
-        counted => counted,
-    }
+    Ok(try_count(planned, tally).unwrap_or_else(|error| unreadable(planned, tally, &error)))
 }
 
 /// As [`count()`], with an error for a bag that cannot be read.
@@ -75,34 +69,15 @@ pub(super) fn try_count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBa
 }
 
 /// The result for a bag that cannot be read for this reason.
-///
-/// # Errors
-/// [`Error::Remote`], which implies nothing about the bag.
-pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: Error) -> Result<CountedBag> {
-    if matches!(error, Error::Remote { .. }) {
-        return Err(error);
-    }
-    let (file_bytes, etag) = version(&planned.input()).unwrap_or_default();
+pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: &Error) -> CountedBag {
     let bag = FleetBag {
-        file_bytes,
-        etag,
+        file_bytes: bag::size_on_disk(&planned.input()),
         error: Some(error.to_string()),
         ..row(planned, tally)
     };
-    Ok(CountedBag {
+    CountedBag {
         counts: Vec::new(),
         bag,
-    })
-}
-
-/// The size of a bag, and its version in a store.
-///
-/// # Errors
-/// If a store fails or has no such object.
-pub(super) fn version(input: &Input) -> Result<(Option<u64>, Option<String>)> {
-    match input {
-        Input::Url(url) => bag::version(url).map(|(bytes, etag)| (Some(bytes), etag)),
-        _ => Ok((bag::size_on_disk(input), None)),
     }
 }
 
@@ -114,7 +89,6 @@ fn row(planned: &PlannedBag, tally: &Tally) -> FleetBag {
     FleetBag {
         uri: planned.uri.clone(),
         mission: planned.mission.clone(),
-        etag: None,
         file_bytes: None,
         format: None,
         tier: None,
@@ -138,8 +112,6 @@ impl FleetBag {
             .filter(|n| n.kind.is_loss())
             .map(reported)
             .collect();
-        let etag = report.facts.iter().find(|(name, _)| name == ETAG);
-        self.etag = etag.map(|(_, value)| value.clone());
         self.file_bytes = Some(report.file_bytes);
         self.format = Some(report.format.clone());
         self.tier = Some(report.tier);
@@ -164,15 +136,9 @@ fn read(
     tally: &Tally,
     taken: &mut BagTally,
 ) -> Result<Report> {
-    let above = match (tally.detail, input) {
-        (CountDetail::Chunks, _) => Some(0),
-        (CountDetail::Auto, Input::Url(_)) => Some(FAR_CHUNKS),
-        (CountDetail::Auto | CountDetail::Index, _) => None,
-    };
-    let chunk_counts = above.map(|above| ChunkCounts {
+    let chunk_counts = (tally.detail == CountDetail::Chunks).then_some(ChunkCounts {
         origin: planned.origin,
         period: tally.period,
-        above,
     });
     let options = OpenOptions {
         chunk_counts,
@@ -262,7 +228,6 @@ impl BagTally {
         let chunk_counts = ChunkCounts {
             origin: self.origin,
             period: self.period,
-            above: 0,
         };
         let sized: Vec<bool> = sent
             .series
@@ -395,7 +360,6 @@ mod tests {
         let chunk_counts = ChunkCounts {
             origin: Stamp(3),
             period,
-            above: 0,
         };
         for (at, start, win) in [
             (3, 3, 0),

@@ -108,12 +108,10 @@ fn sum(a: Option<u64>, b: Option<u64>) -> Option<u64> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FleetBag {
-    /// Its path or URL, as it was given.
+    /// Its path, as it was given.
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
-    /// Its version in a store; none for files.
-    pub etag: Option<String>,
     /// Its size in bytes, if known.
     pub file_bytes: Option<u64>,
     /// The format's name, if it is a bag.

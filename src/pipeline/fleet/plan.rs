@@ -19,7 +19,7 @@ pub struct Planning {
     pub period: Period,
     /// The alignment of windows: whole periods of UTC, or from the first message of each mission.
     pub align: Align,
-    /// A regular expression whose first group, or whole match, in a bag's path or URL is its mission.
+    /// A regular expression whose first group, or whole match, in a bag's path is its mission.
     pub mission: Option<String>,
 }
 
@@ -43,10 +43,8 @@ worded! {
     /// The detail in which messages are counted: with their times, or only by their number.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum CountDetail {
-        /// By chunks for remote bags with more than 64 of them, as each would cost a request; else by the index.
-        #[default]
-        Auto = "auto",
         /// Every message's time, from the index.
+        #[default]
         Index = "index",
         /// By chunks: a chunk within one window is counted as a whole, without times. A bag without chunks is read by
         /// its index.
@@ -57,7 +55,7 @@ worded! {
 /// One bag of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlannedBag {
-    /// Its path or URL, as it was given or found.
+    /// Its path, as it was given or found.
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
@@ -142,7 +140,7 @@ impl FleetPlan {
     }
 }
 
-/// Makes a plan of bags, folders with bags below them, and prefixes of stores, which end in a slash.
+/// Makes a plan of bags and folders with bags below them.
 ///
 /// A folder that is one ROS 2 recording is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 without
 /// a gap) are one mission, `x`; so are the dated ones that ROS 1 records (`x_2024-05-03-14-03-22_0.bag`, …), and the files `x/x_0.mcap`, … of a ROS 2 recording that are given individually;
@@ -169,7 +167,7 @@ pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
         .collect();
     bags.sort_by(|a, b| (&a.mission, &a.uri).cmp(&(&b.mission, &b.uri)));
     if planning.align == Align::Bag {
-        begin_with_missions(&mut bags)?;
+        begin_with_missions(&mut bags);
     }
     Ok(FleetPlan {
         period: planning.period,
@@ -177,13 +175,9 @@ pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     })
 }
 
-/// The bags of a path or URL.
+/// The bags of a path.
 fn listed(source: &str) -> Result<Vec<String>> {
     match Input::parse(source) {
-        Input::Url(url) if url.ends_with('/') => {
-            let found = bag::list(&url)?.into_iter();
-            Ok(found.filter(|url| is_named(url)).collect())
-        }
         Input::Path(path) if path.is_dir() => {
             let text = |path: PathBuf| path.to_string_lossy().into_owned();
             let found = bag::recordings(&path)?;
@@ -200,11 +194,6 @@ fn endings() -> Vec<String> {
     let mut all: Vec<String> = all.map(|ending| format!(".{ending}")).collect();
     all.sort_by_key(|ending| std::cmp::Reverse(ending.len()));
     all
-}
-
-/// Whether an object has a bag's extension; inspecting each object would cost a request.
-fn is_named(url: &str) -> bool {
-    endings().iter().any(|ending| url.ends_with(ending))
 }
 
 /// The mission of each bag.
@@ -286,21 +275,14 @@ fn in_own_folder(name: &str) -> bool {
 }
 
 /// Aligns the windows of each mission with its first message. Unreadable bags are ignored.
-fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
+fn begin_with_missions(bags: &mut [PlannedBag]) {
     for mission in bags.chunk_by_mut(|a, b| a.mission == b.mission) {
-        let mut first: Option<Stamp> = None;
-        for bag in mission.iter() {
-            let own = match begins(&bag.input()) {
-                Err(error @ Error::Remote { .. }) => return Err(error),
-                own => own.ok().flatten(),
-            };
-            first = first.into_iter().chain(own).min();
-        }
+        let own = mission.iter().map(|bag| begins(&bag.input()));
+        let first = own.filter_map(|own| own.ok().flatten()).min();
         for bag in mission {
             bag.origin = first.unwrap_or_default();
         }
     }
-    Ok(())
 }
 
 /// The start of a bag, read from its end if possible.
@@ -345,10 +327,7 @@ mod tests {
         assert_eq!(missions_of(&dated, None), ["d/r_2024-05-03-14-03-22"; 2]);
         let expected = ["d/a", "d/a", "d/b_1", "d/b_2", "c_0"];
         assert_eq!(missions_of(&split, None), expected);
-        assert_eq!(
-            missions_of(&["s3://x/run/run_0.mcap"], None),
-            ["s3://x/run"]
-        );
+        assert_eq!(missions_of(&["/x/run/run_0.mcap"], None), ["/x/run"]);
         assert_eq!(
             missions_of(&["a.bag.active", "b.db3.zstd", "c"], None),
             ["a", "b", "c"]

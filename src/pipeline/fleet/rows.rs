@@ -31,7 +31,6 @@ pub(super) const COUNTS: &[ColumnOf<(), Count>] = columns! {
 const BAGS: &[ColumnOf<(), FleetBag>] = columns! {
     "uri" Text |(), bag| TableCell::text(&*bag.uri);
     "mission" Text |(), bag| TableCell::text(&*bag.mission);
-    "etag" Text |(), bag| text(bag.etag.as_deref());
     "file_bytes" I64 |(), bag| TableCell::known(bag.file_bytes, TableCell::count);
     "format" Text |(), bag| text(bag.format.as_deref());
     "tier" Text |(), bag| TableCell::known(bag.tier, |tier| TableCell::text(tier.word()));

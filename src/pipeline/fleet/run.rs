@@ -10,11 +10,11 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use std::time::UNIX_EPOCH;
 
-use super::count::{CountedBag, Tally, try_count, unreadable, version};
+use super::count::{CountedBag, Tally, try_count, unreadable};
 use super::counts::SCHEMA_VERSION;
 use super::plan::{CountDetail, FleetPlan, PlannedBag, Planning, plan};
 use super::rows::{bags_table, counts_table};
-use crate::bag::Input;
+use crate::bag::{self, Input};
 use crate::base::digest::hex;
 use crate::base::error::{Error, Result};
 use crate::base::table::Batch;
@@ -40,7 +40,7 @@ pub enum OnError {
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct FleetJob {
-    /// Bags; folders with bags below them; URLs; prefixes of stores, which end in a slash.
+    /// Bags; folders with bags below them.
     pub sources: Vec<String>,
     /// The options of the plan.
     pub planning: Planning,
@@ -87,12 +87,7 @@ pub struct Tabled {
     pub rows: usize,
     /// The bags that contain the same messages as another one of this run, sorted; all of them are counted.
     pub copies: Vec<String>,
-    /// Bags that a store refused, with the reasons; they have no row, and another run counts them.
-    pub refused: Vec<(String, String)>,
 }
-
-/// The number of remote bags that each processor counts in parallel.
-const FAR_JOBS: usize = 8;
 
 /// Counts every bag of the job and writes its rows.
 ///
@@ -145,7 +140,6 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
                 work.is_stopped.store(true, Ordering::Relaxed);
             }
         }
-        done.refused.sort();
         let copies = alike.into_values().filter(|same| same.len() > 1);
         done.copies = copies.flatten().collect();
         done.copies.sort();
@@ -155,13 +149,7 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
 
 fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
     let cores = thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let is_far = |bag: &PlannedBag| matches!(Input::parse(&bag.uri), Input::Url(_));
-    let times = if plan.bags.iter().any(is_far) {
-        FAR_JOBS
-    } else {
-        1
-    };
-    let jobs = job.jobs.map_or(cores * times, NonZeroUsize::get);
+    let jobs = job.jobs.map_or(cores, NonZeroUsize::get);
     jobs.min(plan.bags.len())
 }
 
@@ -169,14 +157,12 @@ fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
 enum BagOutcome {
     Kept,
     Written { counted: Box<CountedBag> },
-    Refused { uri: String, why: String },
 }
 
 impl Tabled {
     fn take(&mut self, one: BagOutcome) {
         match one {
             BagOutcome::Kept => self.kept += 1,
-            BagOutcome::Refused { uri, why } => self.refused.push((uri, why)),
             BagOutcome::Written { counted } => {
                 self.bags += 1;
                 self.unreadable += usize::from(counted.bag.error.is_some());
@@ -206,29 +192,16 @@ impl FleetWork<'_> {
             let Some(bag) = self.plan.bags.get(at) else {
                 return;
             };
-            let one = match self.one(bag) {
-                Err(error @ Error::Remote { .. }) if self.job.on_error == OnError::Row => {
-                    Ok(BagOutcome::Refused {
-                        uri: bag.uri.clone(),
-                        why: error.to_string(),
-                    })
-                }
-                one => one,
-            };
             // The receiver is gone after a failure.
-            if to.send(one).is_err() {
+            if to.send(self.one(bag)).is_err() {
                 return;
             }
         }
     }
 
     fn one(&self, bag: &PlannedBag) -> Result<BagOutcome> {
-        let input = bag.input();
-        let before = self.version(&input)?;
-        if let Some(version) = &before
-            && self.job.skip_existing
-            && self.files.hold(&self.name(bag, version))
-        {
+        let name = self.name(bag);
+        if self.job.skip_existing && self.files.hold(&name) {
             return Ok(BagOutcome::Kept);
         }
         let tally = Tally {
@@ -237,36 +210,25 @@ impl FleetWork<'_> {
             part: None,
         };
         let counted = match (try_count(bag, &tally), self.job.on_error) {
-            (Err(error), OnError::Row) => unreadable(bag, &tally, error)?,
+            (Err(error), OnError::Row) => unreadable(bag, &tally, &error),
             (counted, _) => counted?,
         };
-        let version = match (before, input) {
-            (Some(version), Input::Path(_)) => version,
-            _ => BagVersion::counted(&counted),
-        };
-        self.files.write(&self.name(bag, &version), &counted)?;
+        self.files.write(&name, &counted)?;
         Ok(BagOutcome::Written {
             counted: Box::new(counted),
         })
     }
 
-    /// The version of a bag before it is read; `None` if that would be a needless request.
-    fn version(&self, input: &Input) -> Result<Option<BagVersion>> {
-        if matches!(input, Input::Url(_)) && !self.job.skip_existing {
-            return Ok(None);
-        }
-        BagVersion::of(input).map(Some)
-    }
-
     /// The names of a bag's files, from a digest of its location and one of everything that determines its rows.
-    fn name(&self, bag: &PlannedBag, version: &BagVersion) -> FileName {
-        let BagVersion {
-            bytes,
-            changed,
-            etag,
-        } = version;
+    fn name(&self, bag: &PlannedBag) -> FileName {
+        let input = bag.input();
+        let changed = match &input {
+            Input::Path(path) => changed(path),
+            Input::Stdin => None,
+        };
         let made_of = format!(
-            "{bytes:?} {changed:?} {etag:?} {} {} {} {} {SCHEMA_VERSION}",
+            "{:?} {changed:?} {} {} {} {} {SCHEMA_VERSION}",
+            bag::size_on_disk(&input),
             bag.mission,
             bag.origin.0,
             self.plan.period.nanos(),
@@ -275,45 +237,6 @@ impl FleetWork<'_> {
         FileName {
             bag: hex(&bag.uri, DIGITS),
             made_of: hex(&made_of, DIGITS),
-        }
-    }
-}
-
-/// The version of a bag.
-#[derive(Default)]
-struct BagVersion {
-    bytes: Option<u64>,
-    changed: Option<u128>,
-    etag: Option<String>,
-}
-
-impl BagVersion {
-    /// The current version of a bag; a missing one has none.
-    ///
-    /// # Errors
-    /// [`Error::Remote`] if a store fails.
-    fn of(input: &Input) -> Result<Self> {
-        let (bytes, etag) = match version(input) {
-            Err(error @ Error::Remote { .. }) => return Err(error),
-            version => version.unwrap_or_default(),
-        };
-        let changed = match input {
-            Input::Path(path) => changed(path),
-            _ => None,
-        };
-        Ok(Self {
-            bytes,
-            changed,
-            etag,
-        })
-    }
-
-    /// The version that was read from a store.
-    fn counted(counted: &CountedBag) -> Self {
-        Self {
-            bytes: counted.bag.file_bytes,
-            changed: None,
-            etag: counted.bag.etag.clone(),
         }
     }
 }
