@@ -6,9 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use bagreel::bag::{OpenOptions, Report, Tier, Want};
+use bagreel::bag::{self, Input, OpenOptions, Report, Tier, Want};
 use bagreel::internals::base::notice::NoticeKind;
-use bagreel::internals::base::time::Stamp;
+use bagreel::internals::base::time::{Span, Stamp};
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;
@@ -97,6 +97,102 @@ fn chunked() -> Vec<(&'static str, Vec<u8>)> {
         ("front_zstd.mcap", unsummed(Some(::mcap::Compression::Zstd))),
         ("front_lz4.mcap", unsummed(Some(::mcap::Compression::Lz4))),
     ]
+}
+
+/// The same bag with more fields in its head.
+fn with_fields(bag: &[u8], fields: &[(&str, &[u8])]) -> Vec<u8> {
+    const MAGIC: usize = 13;
+    let number = |at: usize| u32::from_le_bytes(bag[at..at + 4].try_into().unwrap());
+    let head = MAGIC + 4..MAGIC + 4 + number(MAGIC) as usize;
+    let mut header = Vec::new();
+    for (name, value) in fields {
+        header.extend(
+            u32::try_from(name.len() + 1 + value.len())
+                .unwrap()
+                .to_le_bytes(),
+        );
+        header.extend([name.as_bytes(), b"=", value].concat());
+    }
+    let padding = number(head.end) as usize - header.len();
+    header.extend(&bag[head.clone()]);
+    let len = |n: usize| u32::try_from(n).unwrap().to_le_bytes();
+    let behind = &bag[head.end + 4 + number(head.end) as usize..];
+    [
+        &bag[..MAGIC],
+        &len(header.len()),
+        &header,
+        &len(padding),
+        &vec![b' '; padding],
+        behind,
+    ]
+    .concat()
+}
+
+#[test]
+fn a_range_finds_messages_in_chunks_of_which_wrong_times_are_stated() {
+    let recording = support::small();
+    let first = recording.messages[0].1;
+    let range = Span::new(Stamp(first), Stamp(first + 1_000_000));
+    // Many chunks, of which only a few are inspected, and few.
+    for (chunk, count) in [(1, 512..), (20_000, 2..)] {
+        let mut bag = rosbag1::write(&recording, Pack::None, chunk);
+        let whole = bag.len();
+        for field in [&b"start_time="[..], b"end_time="] {
+            let at = bag.windows(field.len()).position(|window| window == field);
+            let at = at.unwrap() + field.len();
+            let seconds = u32::from_le_bytes(bag[at..at + 4].try_into().unwrap()) + 100;
+            bag[at..at + 4].copy_from_slice(&seconds.to_le_bytes());
+        }
+        let chunks = bag.windows(9).filter(|w| *w == b"chunk_pos").count();
+        assert!(count.contains(&chunks) && bag.len() == whole, "{chunks}");
+        let (_dir, path) = placed("wrong.bag", &bag);
+        let options = OpenOptions::default();
+        let (_, kept) = read_as(&path, Want::Payload, Some(range), &options).unwrap();
+        assert_eq!((kept.stamps.len(), kept.messages.len()), (1, 1));
+        // Without asking for the span first.
+        let mut kept = Kept::default();
+        let mut reader = bag::open(&Input::Path(path), &options).unwrap();
+        reader.read(Some(range), &mut kept).unwrap();
+        assert_eq!(kept.stamps.len(), 1);
+    }
+}
+
+#[test]
+fn an_encrypted_bag_is_called_encrypted() {
+    let bag = rosbag1::write(&short(), Pack::None, 4000);
+    let plain = with_fields(&bag, &[("encryptor", b"")]);
+    assert_eq!(
+        read_bytes("plain.bag", &plain).1.stamps.len(),
+        short().messages.len()
+    );
+    // The encrypted key precedes the name of the encryptor.
+    let fields: [(&str, &[u8]); 2] = [
+        ("encrypted_key", &[7; 1500]),
+        ("encryptor", b"rosbag/AesCbcEncryptor"),
+    ];
+    let (_dir, path) = placed("secret.bag", &with_fields(&bag, &fields));
+    let pipe = || std::process::Stdio::from(fs::File::open(&path).unwrap());
+    for (input, from) in [
+        (path.as_os_str(), std::process::Stdio::null()),
+        ("-".as_ref(), pipe()),
+    ] {
+        let done = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .arg("info")
+            .arg(input)
+            .stdin(from)
+            .output()
+            .unwrap();
+        let text = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(1), "{text}");
+        assert!(
+            text.contains("it is encrypted by `rosbag/AesCbcEncryptor`"),
+            "{text}"
+        );
+        assert!(
+            text.contains("hint: decrypt it first with `rosbag decrypt`"),
+            "{text}"
+        );
+    }
 }
 
 #[test]

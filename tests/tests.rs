@@ -52,4 +52,5 @@ mod telling;
 mod terminal;
 mod topic_timeline;
 mod values;
+mod variants;
 mod warehouse;

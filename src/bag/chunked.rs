@@ -21,7 +21,7 @@ use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
 use crate::bag::model::{ChunkCounts, Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
-use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
+use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::rhythm::OUT_OF_ORDER_NS;
@@ -125,8 +125,8 @@ struct Piped<G> {
     grammar: PhantomData<fn() -> G>,
 }
 
-/// The number of first bytes needed to recognize the format.
-const HEAD: usize = 32;
+/// The number of first bytes that decide whether the format can be read: the head of a ROS 1 bag.
+const HEAD: usize = 4096;
 
 /// Opens a bag of this grammar.
 pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
@@ -134,7 +134,7 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
     match place {
         BagPlace::File(source) => {
             let path = source.path().to_owned();
-            let mut head = vec![0; NEAR];
+            let mut head = vec![0; HEAD];
             let got = source
                 .read_at(0, &mut head)
                 .map_err(Error::io("read", &path))?;
@@ -177,10 +177,23 @@ impl<G: Grammar> Reader for Indexed<G> {
         };
         let wants = vec![Want::Stamps; plan.connections.list().len()];
         let query = self.query(plan, &wants, None);
-        Ok(plan.span(|chunk, sink| query.read(chunk, sink)))
+        let spans = plan.spans(|chunk, sink| query.read(chunk, sink));
+        let mut whole: Option<Span> = None;
+        for (at, span) in spans {
+            whole = Some(whole.map_or(span, |whole| whole.hull(span)));
+            if let Ok(plan) = &mut self.plan {
+                plan.chunks[at].seen = Some(span);
+            }
+        }
+        Ok(whole)
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        // Stated times of chunks may be wrong.
+        let mut chunks = self.plan.iter().flat_map(|plan| &plan.chunks);
+        if range.is_some() && chunks.all(|chunk| chunk.seen.is_none()) {
+            self.span()?;
+        }
         let mut sink = Clip::new(range, sink);
         let report = match &self.plan {
             _ if self.verify => self.by_the_second_reader(&mut sink),
@@ -218,9 +231,7 @@ impl<G: Grammar> Indexed<G> {
         let connections = plan.connections.list().iter();
         let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
         Want::resolve(&mut wants);
-        plan.notices.iter().for_each(|n| sink.notice(n.clone()));
-        let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
-        let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
+        let chunks = plan.within(range);
         let (chunks, tier) = self.by_chunk_counts(plan, chunks, range, sink);
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();

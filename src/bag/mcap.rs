@@ -109,8 +109,9 @@ impl Grammar for Mcap {
     }
 
     fn index_stamps(data: &[u8]) -> Vec<Stamp> {
-        let entries = data.get(6..).unwrap_or_default();
-        let entries = entries.chunks_exact(records::ENTRY);
+        let mut cursor = FieldCursor(data);
+        let entries = cursor.u16().and_then(|_| cursor.bytes());
+        let entries = entries.unwrap_or_default().chunks_exact(records::ENTRY);
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 

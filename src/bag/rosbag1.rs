@@ -51,10 +51,10 @@ impl Grammar for Rosbag1 {
     const CLOSING: &'static [u8] = b"";
     type Description = Described;
 
-    /// Refuses bags older than version 2.
+    /// Refuses bags older than version 2, and encrypted ones.
     fn accept(path: &Path, head: &[u8]) -> Result<()> {
         if head.starts_with(b"#ROSBAG V2.") {
-            return Ok(());
+            return refuse_encrypted(path, head);
         }
         let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
         let line = String::from_utf8_lossy(&line[..line.len().min(32)]);
@@ -140,6 +140,21 @@ impl Grammar for Rosbag1 {
             },
         }
     }
+}
+
+/// Refuses a bag whose payloads and connections are encrypted.
+fn refuse_encrypted(path: &Path, head: &[u8]) -> Result<()> {
+    let mut stream = ByteStream::of_reader(head);
+    Rosbag1::begin(&mut stream);
+    let Ok((Header::Bag { encryptor, .. }, _)) = records::header(&mut stream) else {
+        return Ok(());
+    };
+    if encryptor.is_empty() {
+        return Ok(());
+    }
+    let what = format!("it is encrypted by `{encryptor}`");
+    let hint = "decrypt it first with `rosbag decrypt`, on a machine that has its key";
+    Err(Error::unsupported(path, what, hint))
 }
 
 /// The index record at `at`: its connection, its count, and the start of its entries.

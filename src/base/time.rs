@@ -80,6 +80,11 @@ impl Span {
         self.end.min(other.end).since(self.start.max(other.start))
     }
 
+    /// The shortest interval that contains both.
+    pub(crate) fn hull(&self, other: Self) -> Self {
+        Self::new(self.start.min(other.start), self.end.max(other.end))
+    }
+
     /// Sorts intervals and joins those that overlap or are at most `gap` nanoseconds apart.
     pub(crate) fn joined(mut spans: Vec<Self>, gap: i64) -> Vec<Self> {
         spans.sort_unstable_by_key(|span| (span.start, span.end));

@@ -101,14 +101,16 @@ impl Index {
         }
     }
 
-    /// Whether these are the first and last times in the index.
+    /// Whether these are the first and last times in the index. A message at 0 does not count: some writers take 0 for
+    /// an unknown time and state the time of another message.
     pub(super) fn spans(&self, first: Stamp, last: Stamp) -> bool {
         let (mut low, mut high) = (Stamp::MAX, Stamp::MIN);
         for at in &self.stamps {
             low = low.min(*at);
             high = high.max(*at);
         }
-        self.stamps.is_empty() || (low, high) == (first, last)
+        let is_first = low == first || low == Stamp(0);
+        self.stamps.is_empty() || is_first && high == last
     }
 }
 

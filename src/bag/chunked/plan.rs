@@ -6,7 +6,6 @@ use std::ops::Range;
 use super::index::IndexSum;
 use super::record::Connections;
 use crate::bag::model::{ConnectionId, Sink};
-use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 
 /// A chunk as the tail describes it. Sums of its numbers do not overflow.
@@ -25,11 +24,24 @@ pub(crate) struct Chunk {
     pub(crate) promised: Option<IndexSum>,
     /// The range of its message counts in [`ChunkPlan::counts`]; empty if they are not kept.
     pub(crate) counts: Range<usize>,
+    /// The time that its messages cover, if it was inspected.
+    pub(crate) seen: Option<Span>,
 }
 
 impl Chunk {
-    fn holds_messages(&self) -> bool {
+    pub(crate) fn holds_messages(&self) -> bool {
         self.promised.is_some_and(|sum| sum.messages > 0)
+    }
+
+    /// The time that it covers, as stated.
+    fn stated(&self) -> Option<Span> {
+        (self.first <= self.last).then(|| Span::new(self.first, self.last.plus(1)))
+    }
+
+    /// Whether it may contain messages inside `range`.
+    fn reaches(&self, range: Span) -> bool {
+        let span = self.seen.or_else(|| self.stated());
+        span.is_none_or(|span| span.start < range.end && range.start < span.end)
     }
 }
 
@@ -43,8 +55,6 @@ pub(crate) struct ChunkPlan {
     pub(crate) counts: Vec<(u32, u32)>,
     /// The part of the file that contains the chunks.
     pub(crate) body: Range<u64>,
-    /// Notices about the bag as a whole.
-    pub(crate) notices: Vec<Notice>,
 }
 
 /// The most chunks that are planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
@@ -85,19 +95,32 @@ impl ChunkPlan {
         self.chunks.iter().map(len).max().unwrap_or(0)
     }
 
-    /// The covered time: `read` inspects the chunks stated to be first and last, or all of them if they are few.
-    pub(super) fn span(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Option<Span> {
-        let mut seen = Extremes::default();
-        let full: Vec<&Chunk> = self.chunks.iter().filter(|c| c.holds_messages()).collect();
-        if full.len() <= MOST_LOOKED_INTO {
-            for chunk in full {
-                read(chunk, &mut seen);
+    /// The chunks that may contain messages inside `range`.
+    pub(super) fn within(&self, range: Option<Span>) -> Vec<&Chunk> {
+        let reaches = |c: &&Chunk| range.is_none_or(|range| c.reaches(range));
+        self.chunks.iter().filter(reaches).collect()
+    }
+
+    /// The time that each chunk covers which `read` inspects: the chunks stated to be first and last, or all of them if
+    /// they are few or one of these two has other times than stated.
+    pub(super) fn spans(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Vec<(usize, Span)> {
+        let seen = |(at, chunk): &(usize, &Chunk)| {
+            let mut seen = Extremes::default();
+            read(chunk, &mut seen);
+            Some((*at, seen.span()?))
+        };
+        let full = self.chunks.iter().enumerate();
+        let full: Vec<(usize, &Chunk)> = full.filter(|(_, c)| c.holds_messages()).collect();
+        if full.len() > MOST_LOOKED_INTO {
+            let first = full.iter().min_by_key(|(_, c)| c.first);
+            let last = full.iter().max_by_key(|(_, c)| c.last);
+            let ends: Vec<_> = first.into_iter().chain(last).filter_map(seen).collect();
+            let is_right = |(at, span): &(usize, Span)| self.chunks[*at].stated() == Some(*span);
+            if ends.iter().all(is_right) {
+                return ends;
             }
-        } else {
-            read(full.iter().min_by_key(|c| c.first)?, &mut seen);
-            read(full.iter().max_by_key(|c| c.last)?, &mut seen);
         }
-        seen.span()
+        full.iter().filter_map(seen).collect()
     }
 }
 

@@ -72,8 +72,8 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
         },
         op::HEADER | op::ATTACHMENT | op::METADATA => {
             let content = content_len(kind, stream.peek(MOST_LOOKED_AT)?);
-            let is_known = content == Some(len);
-            if !is_known && (content.is_some() || len <= MOST_LOOKED_AT as u64) {
+            let is_long = content.is_none() && len > MOST_LOOKED_AT as u64;
+            if !is_long && !content.is_some_and(|content| is_extended(content, len)) {
                 return Err(NoRecord::Broken);
             }
             RecordHead::Other { len }
@@ -156,14 +156,23 @@ fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described
     })
 }
 
-/// Parses the head of a message index, whose entries fill the rest of it.
+/// The most bytes that unknown fields at the end of a record may take; with more, a length is damaged.
+const MOST_EXTENSION: u64 = 4096;
+
+/// Whether a record of `len` bytes may have this `content`: later versions of the format may add fields at its end.
+fn is_extended(content: u64, len: u64) -> bool {
+    len.checked_sub(content)
+        .is_some_and(|unknown| unknown <= MOST_EXTENSION)
+}
+
+/// Parses the head of a message index.
 fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
     let mut cursor = FieldCursor(stream.peek(6)?);
     let (channel, entries) = (cursor.u16(), cursor.u32().map(u64::from));
     let (Some(channel), Some(entries)) = (channel, entries) else {
         return Err(NoRecord::Cut);
     };
-    if entries + 6 != len || entries % ENTRY as u64 != 0 {
+    if !is_extended(entries + 6, len) || entries % ENTRY as u64 != 0 {
         let extension = false;
         return Ok(RecordHead::Unknown { len, extension });
     }
@@ -173,9 +182,6 @@ fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>,
         len,
     })
 }
-
-/// The most padding after a chunk's records, in bytes; with more, one of the two lengths is damaged.
-const MOST_PADDING: u64 = 4096;
 
 /// The number of bytes of a chunk before the name of its compression.
 const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
@@ -211,7 +217,7 @@ pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, 
         how,
         packed,
         padding: Some(room - packed)
-            .filter(|n| *n <= MOST_PADDING)
+            .filter(|_| is_extended(packed, room))
             .unwrap_or(0),
         plain,
         crc: (crc != 0).then_some(crc),

@@ -5,7 +5,7 @@ use std::io;
 use mcap::MAGIC;
 use mcap::records::op;
 
-use super::records::{self, DATA_END, FOOTER, FieldCursor, HEAD};
+use super::records::{self, DATA_END, ENTRY, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
 use crate::bag::checksum::CrcReader;
 use crate::bag::chunked::{
@@ -97,8 +97,8 @@ struct Summary {
     grammar: Mcap,
     used: Used,
     statistics: Option<Statistics>,
-    /// Whether a chunk has records but no message index.
-    blind: bool,
+    /// Whether a channel refers to a schema that the summary does not repeat.
+    untyped: bool,
 }
 
 impl Summary {
@@ -137,6 +137,9 @@ impl Summary {
             return Err(stop);
         };
         for channel in &channels {
+            let schema = channel.get(2..4).map(FieldCursor);
+            let schema = schema.and_then(|mut id| id.u16()).unwrap_or(0);
+            self.untyped |= schema > 0 && !self.grammar.schemas.contains_key(&schema);
             let connections = &mut self.plan.connections;
             let described = self
                 .grammar
@@ -149,12 +152,7 @@ impl Summary {
     }
 
     fn chunk(&mut self, index: ChunkIndex) -> Result<(), NoRecord> {
-        let ChunkIndex {
-            chunk,
-            counts,
-            size,
-        } = index;
-        self.blind |= chunk.promised.is_none() && size > 0;
+        let ChunkIndex { chunk, counts } = index;
         if self.plan.chunks.len() >= MOST_CHUNKS {
             return Err(NoRecord::Broken);
         }
@@ -163,34 +161,57 @@ impl Summary {
         Ok(())
     }
 
-    /// Sorts the chunks and decides whether they contain all messages.
+    /// Sorts the chunks and decides whether they contain all messages. Every part of a summary is optional.
     fn into_plan(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
         let chunks = &mut self.plan.chunks;
         chunks.sort_by_key(|c| c.start);
         chunks.dedup_by_key(|c| c.start);
-        let known: u64 = chunks
-            .iter()
-            .filter_map(|c| Some(c.promised?.messages))
-            .sum();
+        let promised = chunks.iter().filter_map(|c| Some(c.promised?.messages));
+        let known: u64 = promised.sum();
         let Some(all) = &self.statistics else {
             return Unindexed::missing("its summary has no statistics to check its index by");
         };
-        if all.chunks == 0 && all.messages > 0 && chunks.is_empty() {
+        if chunks.is_empty() && all.chunks > 0 {
+            return Unindexed::missing("its summary has no index of its chunks");
+        }
+        if chunks.is_empty() && all.messages > 0 {
             return Unindexed::missing("its messages are outside chunks");
         }
         if all.chunks as usize != chunks.len() {
             return Unindexed::wrong("its index does not list all of its chunks");
         }
         if all.messages != known {
-            return if self.blind {
-                Unindexed::missing("its chunks have no message index")
-            } else {
-                Unindexed::wrong("its index and its statistics disagree")
-            };
+            are_counted(source, chunks)?;
+            return Unindexed::wrong("its index and its statistics disagree");
         }
-        self.used.are_in(&self.plan.connections)?;
+        let undescribed = self.used.are_in(&self.plan.connections);
+        let described = self.plan.connections.list().len();
+        if self.untyped || undescribed.is_err() && described < all.channels as usize {
+            return Unindexed::missing("its summary does not repeat all channels and schemas");
+        }
+        undescribed?;
         gaps(source, &self.plan)?;
         Ok(self.plan)
+    }
+}
+
+/// Checks that the offsets of the message indexes of these chunks determine the numbers of their messages.
+fn are_counted(source: &FileSource, chunks: &[Chunk]) -> Result<(), Unindexed> {
+    let first = chunks.iter().find(|chunk| !chunk.index.is_empty());
+    let first = first.map(|chunk| {
+        let mut stream = ByteStream::of_file(source, chunk.index.start, chunk.index.end, NEAR);
+        Mcap::next(&mut stream)
+    });
+    match first {
+        Some(Ok(RecordHead::Index { count, len, .. }))
+            if 2 + 4 + u64::from(count) * (ENTRY as u64) < len =>
+        {
+            Unindexed::missing("its message indexes have fields of a later version of the format")
+        }
+        _ if chunks.iter().any(|chunk| chunk.promised.is_none()) => {
+            Unindexed::missing("its chunks have no message index")
+        }
+        _ => Ok(()),
     }
 }
 
@@ -224,16 +245,20 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
 /// The counts of the whole file, as stated.
 struct Statistics {
     messages: u64,
+    channels: u32,
     chunks: u32,
 }
 
 fn statistics(record: &[u8]) -> Option<Statistics> {
     let mut cursor = FieldCursor(record);
     let messages = cursor.u64()?;
-    let (_schemas, _channels) = (cursor.u16()?, cursor.u32()?);
+    let (_schemas, channels) = (cursor.u16()?, cursor.u32()?);
     let (_attachments, _metadata) = (cursor.u32()?, cursor.u32()?);
-    let chunks = cursor.u32()?;
-    Some(Statistics { messages, chunks })
+    Some(Statistics {
+        messages,
+        channels,
+        chunks: cursor.u32()?,
+    })
 }
 
 /// A chunk index record.
@@ -241,8 +266,6 @@ struct ChunkIndex {
     chunk: Chunk,
     /// Message counts by channel.
     counts: Vec<(u32, u32)>,
-    /// The length of the chunk's records.
-    size: u64,
 }
 
 fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
@@ -252,7 +275,7 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
     let offsets = cursor.bytes()?;
     let index_len = cursor.u64()?;
     let _compression = cursor.bytes()?;
-    let (_compressed, size) = (cursor.u64()?, cursor.u64()?);
+    let _sizes = (cursor.u64()?, cursor.u64()?);
     let behind = start.checked_add(len)?;
     let end = behind.checked_add(index_len)?;
     if len < HEAD {
@@ -268,11 +291,11 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
         last: Stamp::from_nanos(last),
         promised,
         counts: 0..0,
+        seen: None,
     };
     Some(ChunkIndex {
         chunk,
         counts: counts.unwrap_or_default(),
-        size,
     })
 }
 

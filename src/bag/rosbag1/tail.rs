@@ -10,7 +10,6 @@ use crate::bag::chunked::{
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
-use crate::base::notice::{Notice, NoticeKind};
 
 /// Reads the head and the tail of `source`.
 pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
@@ -32,7 +31,7 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
         index_pos,
         connections,
         chunks,
-        encryptor,
+        ..
     } = header
     else {
         return Ok(Unindexed::wrong("it has no head"));
@@ -43,7 +42,6 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     }
     let mut tail = Tail::default();
     tail.plan.body = body..index_pos;
-    tail.plan.notices.extend(encrypted(&encryptor));
     match tail.records(source, (connections, chunks)) {
         Ok(()) => Ok(tail.into_plan()),
         Err(NoRecord::Io(e)) => Err(e),
@@ -64,13 +62,6 @@ fn placed(index_pos: u64, body: u64, len: u64) -> Result<(), Unindexed> {
     } else {
         Ok(())
     }
-}
-
-/// A notice about unknown names.
-fn encrypted(encryptor: &str) -> Option<Notice> {
-    let text =
-        format!("the bag is encrypted by `{encryptor}`: counts are right, names are unknown");
-    (!encryptor.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
 }
 
 /// The part of a tail that has been read.
@@ -159,6 +150,7 @@ impl Tail {
             last: end,
             promised: Some(promised),
             counts,
+            seen: None,
         });
         Ok(())
     }
@@ -208,10 +200,7 @@ impl Tail {
             chunk.index = end.saturating_sub(len).max(chunk.start)..end;
             end = chunk.start;
         }
-        // An encrypted bag describes none of its connections.
-        if self.plan.notices.is_empty() {
-            self.used.are_in(&self.plan.connections)?;
-        }
+        self.used.are_in(&self.plan.connections)?;
         Ok(self.plan)
     }
 }
