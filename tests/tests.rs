@@ -36,6 +36,7 @@ mod marks;
 mod options;
 mod pages;
 mod pairs;
+mod parts;
 mod phases;
 mod pictures;
 mod properties;

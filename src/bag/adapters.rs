@@ -3,7 +3,8 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use crate::bag::model::{ConnectionId, Message, Sink};
+use crate::bag::model::{ConnectionId, Message, Reader, Sink};
+use crate::base::error::Result;
 use crate::base::notice::Notice;
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
@@ -58,6 +59,21 @@ impl Sink for Clip<'_> {
         self.lost |= notice.kind.is_loss();
         self.sink.notice(notice);
     }
+}
+
+/// The time span covered by all bags; `None` unless each reports its own without being read.
+///
+/// # Errors
+/// If one cannot be read.
+pub(crate) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
+    let mut all: Option<Span> = None;
+    for reader in readers {
+        let Some(span) = reader.span()? else {
+            return Ok(None);
+        };
+        all = Some(all.map_or(span, |all| all.hull(span)));
+    }
+    Ok(all)
 }
 
 /// The bytes of `whole` that correspond to `done` of `total` equal parts.

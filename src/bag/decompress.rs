@@ -23,6 +23,16 @@ worded! {
     }
 }
 
+/// The longest header of a Zstandard frame, in bytes.
+pub(crate) const ZSTD_HEAD: usize = 18;
+
+/// The number of plain bytes that a Zstandard frame states in its header.
+pub(crate) fn zstd_stated(frame: &[u8]) -> Option<u64> {
+    zstd::zstd_safe::get_frame_content_size(frame)
+        .ok()
+        .flatten()
+}
+
 impl Compression {
     /// The compression that a bag calls `name`; `None` for an unknown one.
     pub(crate) fn named(name: &[u8]) -> Option<Self> {

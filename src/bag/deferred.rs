@@ -40,7 +40,10 @@ pub(crate) fn open_each(
 
 impl Reader for Deferred {
     fn is_straight(&self) -> bool {
-        self.open.as_ref().is_none_or(|reader| reader.is_straight())
+        match &self.open {
+            Some(reader) => reader.is_straight(),
+            None => super::open(&self.input, &self.options).map_or(true, |r| r.is_straight()),
+        }
     }
 
     fn span(&mut self) -> Result<Option<Span>> {

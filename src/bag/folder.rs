@@ -8,8 +8,11 @@ use std::time::SystemTime;
 
 use super::InputKind;
 use super::input::{Input, file_name};
+use super::source::FileSource;
 use super::split;
+use crate::bag::decompress::{ZSTD_HEAD, zstd_stated};
 use crate::base::error::{Error, Result};
+use crate::base::file::with_suffix;
 use crate::base::words;
 
 /// The depth below the folder down to which bags are searched for.
@@ -156,6 +159,7 @@ fn written(path: &Path) -> Option<SystemTime> {
 fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
+    paths.retain(|path| !is_spare(path));
     paths.sort();
     let own = own_parts(folder, &paths);
     if let Some(parts) = own {
@@ -173,6 +177,43 @@ fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The endings of recordings that are compressed as a whole.
+const PACKED: [&str; 2] = [".zstd", ".zst"];
+
+/// Whether a file is not read because its recording is beside it too, compressed or not: recorders remove the original
+/// after compressing it, and players leave the one that they decompressed. The compressed one is not needed unless the
+/// other is shorter than it states.
+pub(crate) fn is_spare(path: &Path) -> bool {
+    let is_short = |plain: &Path, packed: &Path| {
+        let stated = stated(packed);
+        let len = plain.metadata().map_or(0, |meta| meta.len());
+        stated.is_some_and(|stated| len < stated)
+    };
+    let plain = plain(path);
+    if plain != path {
+        return plain.is_file() && !is_short(&plain, path);
+    }
+    let mut packed = PACKED.iter().map(|end| with_suffix(path, end));
+    packed.any(|packed| packed.is_file() && is_short(path, &packed))
+}
+
+/// The path of a recording without the ending for compression as a whole.
+pub(crate) fn plain(path: &Path) -> PathBuf {
+    let is_packed = PACKED.iter().any(|end| ends_in(path, end));
+    if is_packed {
+        path.with_extension("")
+    } else {
+        path.to_owned()
+    }
+}
+
+/// The length of the recording in a compressed file, if the file states it.
+fn stated(packed: &Path) -> Option<u64> {
+    let mut head = [0; ZSTD_HEAD];
+    let got = FileSource::open(packed).ok()?.read_at(0, &mut head).ok()?;
+    zstd_stated(&head[..got])
 }
 
 /// Whether a folder is one rosbag2 recording, even if its `metadata.yaml` is not written yet: all of its storage files

@@ -11,7 +11,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::base::words::worded;
 
 /// The serialisation of a payload.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Encoding {
     /// ROS 1 serialisation: little-endian, packed.
     #[default]
@@ -27,7 +27,7 @@ pub enum Encoding {
 pub struct ConnectionId(pub u32);
 
 /// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Connection {
     /// The index among the reader's connections.
     pub id: ConnectionId,

@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::bag::adapters::known_span;
 use crate::bag::deferred::open_each;
-use crate::bag::folder::{Recording, only_recording, recordings};
+use crate::bag::folder::{Recording, is_spare, only_recording, recordings};
 use crate::bag::input::{BagPlace, FormatRow, Input, file_name, size_on_disk};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
@@ -16,8 +17,8 @@ use crate::bag::model::{
 use crate::bag::unknown::explain;
 use crate::base::budget::FILES;
 use crate::base::error::{Error, Result};
-use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
 use metadata::{Metadata, is_storage};
 
@@ -36,6 +37,8 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
 struct BagFolder {
     name: String,
     parts: Vec<Box<dyn Reader>>,
+    /// Whether time goes back from one part to the next, as far as is known.
+    overlaps: bool,
     /// The bytes of all files.
     size: u64,
     metadata: Metadata,
@@ -66,6 +69,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut folder = BagFolder {
         name: file_name(&path),
         parts: Vec::new(),
+        overlaps: false,
         size: 0,
         metadata: Metadata::default(),
         notices: Vec::new(),
@@ -81,6 +85,10 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     if parts.is_empty() {
         parts = folder.files(&path);
     }
+    // Decompressing whole parts to learn their times would take too long.
+    let is_packed = parts
+        .iter()
+        .any(|part| part.extension().is_some_and(|e| e == "zstd"));
     let files: Vec<Input> = parts.into_iter().map(Input::Path).collect();
     folder.size = files.iter().filter_map(size_on_disk).sum();
     for part in open_each(files, options) {
@@ -91,6 +99,9 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
                 failed.get_or_insert(e);
             }
         }
+    }
+    if folder.parts.len() > 1 && !is_packed {
+        folder.sort();
     }
     match failed {
         Some(e) if folder.parts.is_empty() => Err(e),
@@ -120,7 +131,7 @@ fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
         return (Vec::new(), Vec::new());
     };
     let files = entries.filter_map(|e| Some(e.ok()?.path()));
-    let files = files.filter(|p| is_storage(p) && p.is_file());
+    let files = files.filter(|p| is_storage(p) && p.is_file() && !is_spare(p));
     files.partition(|file| metadata::is_inside(folder, file))
 }
 
@@ -175,6 +186,24 @@ impl BagFolder {
         found
     }
 
+    /// Puts the parts in order of time, whatever their numbers and the metadata state; if they overlap by more than
+    /// messages that are merely out of order, the recorder's clock was set back, and they stay in their order.
+    fn sort(&mut self) {
+        let spans = self.parts.iter_mut().map(|part| part.span().ok().flatten());
+        let Some(spans) = spans.collect::<Option<Vec<Span>>>() else {
+            return;
+        };
+        let is_back = |pair: &[Span]| pair[0].end.since(pair[1].start) > OUT_OF_ORDER_NS;
+        let mut sorted = spans.clone();
+        sorted.sort_by_key(|span| span.start);
+        self.overlaps = sorted.windows(2).any(is_back);
+        if !self.overlaps {
+            let mut parts: Vec<_> = spans.into_iter().zip(self.parts.drain(..)).collect();
+            parts.sort_by_key(|(span, _)| span.start);
+            self.parts.extend(parts.into_iter().map(|(_, part)| part));
+        }
+    }
+
     /// Notes the numbers that are missing between these parts.
     fn note_gaps(&mut self, parts: &[PathBuf]) {
         let numbers = parts.iter().map(|part| number(part));
@@ -216,20 +245,12 @@ impl BagFolder {
 }
 
 impl Reader for BagFolder {
+    fn is_straight(&self) -> bool {
+        !self.overlaps && self.parts.iter().all(|part| part.is_straight())
+    }
+
     fn span(&mut self) -> Result<Option<Span>> {
-        let mut whole: Option<Span> = None;
-        let mut parts = 0;
-        for part in &mut self.parts {
-            let Some(span) = part.span()? else {
-                continue;
-            };
-            parts += 1;
-            whole = Some(whole.map_or(span, |w| {
-                Span::new(w.start.min(span.start), w.end.max(span.end))
-            }));
-        }
-        // A part without a span is empty or must be read first; either way the other parts' spans are not sufficient.
-        Ok(whole.filter(|_| parts == self.parts.len()))
+        known_span(&mut self.parts)
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
@@ -288,16 +309,30 @@ impl BagFolder {
     }
 }
 
-/// The identity of a connection across the parts of a recording: those with the same key are one.
-type ConnectionKey = (Arc<str>, Arc<str>, Option<NodeName>);
+/// The connections of a whole recording.
+#[derive(Default)]
+struct Joined {
+    /// The connections by their descriptions, without ids. Parts describe a connection alike.
+    known: BTreeMap<Connection, Vec<ConnectionId>>,
+    /// The wanted part of their payloads, by id.
+    wants: Vec<Want>,
+}
+
+/// The connections of one part.
+#[derive(Default)]
+struct PartConnections {
+    /// Their ids in the whole recording.
+    ids: Vec<ConnectionId>,
+    /// The numbers of those that are described alike: they stay apart, as when the part is read alone.
+    alike: BTreeMap<Connection, usize>,
+}
 
 /// A sink that maps the parts' connection ids to ids of the whole recording.
 struct PartsAdapter<'a> {
     metadata: &'a Metadata,
     sink: &'a mut dyn Sink,
-    known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
-    /// The ids of this part's connections in the whole recording.
-    part: Vec<ConnectionId>,
+    joined: Joined,
+    part: PartConnections,
     /// The sizes in bytes of the parts before this one, of this part, and of all parts.
     sizes: (u64, u64, u64),
 }
@@ -307,39 +342,38 @@ impl<'a> PartsAdapter<'a> {
         Self {
             metadata,
             sink,
-            known: BTreeMap::new(),
-            part: Vec::new(),
+            joined: Joined::default(),
+            part: PartConnections::default(),
             sizes: (0, 0, size),
         }
     }
 
     /// The next part begins.
     fn next(&mut self) {
-        self.part.clear();
+        self.part = PartConnections::default();
         self.sizes.0 += std::mem::take(&mut self.sizes.1);
     }
 
-    fn announce(&mut self, key: ConnectionKey, mut connection: Connection) -> (ConnectionId, Want) {
-        let id = ConnectionId(u32::try_from(self.known.len()).unwrap_or(u32::MAX));
-        connection.id = id;
+    /// Announces a connection that no part had before; returns its id.
+    fn announce(&mut self, key: Connection) -> ConnectionId {
+        let id = ConnectionId(u32::try_from(self.joined.wants.len()).unwrap_or(u32::MAX));
+        let mut connection = Connection { id, ..key.clone() };
         if let Some(topic) = self.metadata.topics.get(connection.topic.as_str()) {
             connection.qos = connection.qos.or_else(|| topic.qos.clone());
             connection.type_hash = connection.type_hash.or_else(|| topic.hash.clone());
         }
-        let want = self.sink.connection(&connection);
-        self.known.insert(key, (id, want));
-        (id, want)
+        self.joined.wants.push(self.sink.connection(&connection));
+        self.joined.known.entry(key).or_default().push(id);
+        id
     }
 
     /// Announces the topics that only the metadata lists: they have no messages.
     fn silent(&mut self) {
-        let known: BTreeSet<Arc<str>> = self.known.keys().map(|key| Arc::clone(&key.0)).collect();
-        for (name, topic) in &self.metadata.topics {
-            if known.contains(name.as_str()) {
-                continue;
-            }
-            let key = (Arc::from(name.as_str()), Arc::clone(&topic.type_name), None);
-            let connection = Connection {
+        let known: BTreeSet<Arc<str>> =
+            self.joined.known.keys().map(|c| c.topic.shared()).collect();
+        let topics = self.metadata.topics.iter();
+        for (name, topic) in topics.filter(|(name, _)| !known.contains(name.as_str())) {
+            self.announce(Connection {
                 topic: name.as_str().into(),
                 type_name: Arc::clone(&topic.type_name),
                 encoding: match topic.encoding.as_str() {
@@ -347,8 +381,7 @@ impl<'a> PartsAdapter<'a> {
                     other => Encoding::Other(other.to_owned()),
                 },
                 ..Connection::default()
-            };
-            self.announce(key, connection);
+            });
         }
     }
 }
@@ -359,25 +392,31 @@ impl Sink for PartsAdapter<'_> {
     }
 
     fn connection(&mut self, connection: &Connection) -> Want {
-        let publisher = connection.publisher.clone();
-        let key = (
-            connection.topic.shared(),
-            Arc::clone(&connection.type_name),
-            publisher,
-        );
-        let known = self.known.get(&key).copied();
-        let (id, want) = known.unwrap_or_else(|| self.announce(key, connection.clone()));
-        self.part.push(id);
-        want
+        let key = Connection {
+            id: ConnectionId::default(),
+            ..connection.clone()
+        };
+        let alike = self.part.alike.entry(key.clone()).or_default();
+        let known = self.joined.known.get(&key);
+        let known = known.and_then(|ids| ids.get(*alike)).copied();
+        *alike += 1;
+        let id = known.unwrap_or_else(|| self.announce(key));
+        self.part.ids.push(id);
+        self.joined.wants[id.0 as usize]
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        self.sink
-            .stamps(self.part[connection.0 as usize], stamps, sizes);
+        let id = self.part.ids[connection.0 as usize];
+        self.sink.stamps(id, stamps, sizes);
+    }
+
+    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+        let id = self.part.ids[connection.0 as usize];
+        self.sink.chunk_count(id, window, count);
     }
 
     fn message(&mut self, message: Message<'_>) {
-        let connection = self.part[message.connection.0 as usize];
+        let connection = self.part.ids[message.connection.0 as usize];
         self.sink.message(Message {
             connection,
             ..message

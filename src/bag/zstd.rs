@@ -96,6 +96,10 @@ fn unpack(
 }
 
 impl Reader for Unpacked {
+    fn is_straight(&self) -> bool {
+        self.inner.is_straight()
+    }
+
     fn span(&mut self) -> Result<Option<Span>> {
         self.inner.span()
     }

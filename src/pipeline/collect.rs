@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::inputs::{check_named, each_once, in_time, known_span, space_of};
+use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, Straightened, Watched};
-use crate::bag::{self, Input, OpenOptions, Report};
+use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;

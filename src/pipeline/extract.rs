@@ -7,10 +7,10 @@ mod messages;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::inputs::{each_once, known_span};
+use super::inputs::each_once;
 use super::read::files;
 use super::{Stage, Watch};
-use crate::bag::{self, ConnectionId, Input, OpenOptions, Reader, Report, Sink};
+use crate::bag::{self, ConnectionId, Input, OpenOptions, Reader, Report, Sink, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::name::TopicName;
 use crate::base::notice::{Notice, NoticeKind, Notices};

@@ -1,6 +1,6 @@
 //! The bags of a mission, without duplicates.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::Reading;
@@ -9,18 +9,19 @@ use crate::bag::moved::Moved;
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Stamp;
 
 /// Every input once, with a notice for duplicates, which would be counted twice.
 pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
-    let mut seen = BTreeSet::new();
+    let mut seen = BTreeMap::new();
     let (mut once, mut twice) = (Vec::new(), Vec::new());
     for input in inputs.iter().flat_map(bag::parts_of) {
         let real = match &input {
-            Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Input::Path(path) => bag::plain(&path.canonicalize().unwrap_or_else(|_| path.clone())),
             Input::Stdin => PathBuf::from("-"),
         };
-        if seen.insert(real) {
+        let first = seen.entry(real).or_insert_with(|| input.clone());
+        if !once.contains(first) {
             once.push(input);
         } else if input.is_pipe() {
             let what = format!(
@@ -29,7 +30,15 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
             );
             return Err(Error::usage(what, "give it once"));
         } else {
-            let text = format!("`{}` was given twice and read once", input.name());
+            let text = if first.name() == input.name() {
+                format!("`{}` was given twice and read once", input.name())
+            } else {
+                let names = [first.name(), input.name()];
+                format!(
+                    "`{}` and `{}` are copies of one recording, which was read once",
+                    names[0], names[1]
+                )
+            };
             twice.push(Notice::new(NoticeKind::Note, text));
         }
     }
@@ -93,20 +102,6 @@ pub(super) fn check_named(reading: &Reading, inputs: &[Input]) -> Result<()> {
             format!("write the bag as on the command line: `--{option} run_2.bag={value}`"),
         )),
     }
-}
-
-/// The time span covered by all bags; `None` unless each reports its own without being read.
-pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
-    let mut all: Option<Span> = None;
-    for reader in readers {
-        let Some(span) = reader.span()? else {
-            return Ok(None);
-        };
-        all = Some(all.map_or(span, |a| {
-            Span::new(a.start.min(span.start), a.end.max(span.end))
-        }));
-    }
-    Ok(all)
 }
 
 /// Refuses bags with the same messages, which would be counted twice: copies and conversions. Pipes are not checked.

@@ -1,10 +1,10 @@
 //! A rosbag2 folder that is still being written: its storage files, including those added by splits.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::{ConnectionKey, Metadata, PartsAdapter, metadata, storage};
-use crate::bag::model::{ConnectionId, Growing, Growth, Sink, Want};
+use super::{Joined, Metadata, PartConnections, PartsAdapter, metadata, storage};
+use crate::bag::model::{Growing, Growth, Sink};
 use crate::bag::{self, Input};
 use crate::base::budget::FILES;
 use crate::base::error::Result;
@@ -19,15 +19,14 @@ struct GrowingFolder {
     parts: Vec<Part>,
     /// The files found so far, including those that cannot be followed.
     seen: BTreeSet<PathBuf>,
-    known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
+    joined: Joined,
     quiet: u32,
 }
 
 /// A storage file.
 struct Part {
     file: Box<dyn Growing>,
-    /// The ids of its connections in the whole recording.
-    ids: Vec<ConnectionId>,
+    connections: PartConnections,
     is_over: bool,
 }
 
@@ -41,7 +40,7 @@ pub(super) fn follow(path: &Path) -> Result<Box<dyn Growing>> {
         path: path.to_owned(),
         parts: Vec::new(),
         seen: BTreeSet::new(),
-        known: BTreeMap::new(),
+        joined: Joined::default(),
         quiet: 0,
     }))
 }
@@ -52,11 +51,11 @@ impl Growing for GrowingFolder {
         let none = Metadata::default();
         let mut grew = false;
         for part in self.parts.iter_mut().filter(|part| !part.is_over) {
-            let mut joined = PartsAdapter::new(&none, sink, 0);
-            joined.known = std::mem::take(&mut self.known);
-            joined.part = std::mem::take(&mut part.ids);
-            let growth = part.file.poll(&mut joined);
-            (self.known, part.ids) = (joined.known, joined.part);
+            let mut adapter = PartsAdapter::new(&none, sink, 0);
+            adapter.joined = std::mem::take(&mut self.joined);
+            adapter.part = std::mem::take(&mut part.connections);
+            let growth = part.file.poll(&mut adapter);
+            (self.joined, part.connections) = (adapter.joined, adapter.part);
             grew |= matches!(growth, Ok(Growth::More));
             // A file that disappeared was full and has been compressed; its content was read before.
             part.is_over = matches!(growth, Ok(Growth::Ended) | Err(_));
@@ -87,7 +86,7 @@ impl GrowingFolder {
                 self.seen.insert(file);
                 self.parts.push(Part {
                     file: growing,
-                    ids: Vec::new(),
+                    connections: PartConnections::default(),
                     is_over: false,
                 });
             }

@@ -6,6 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use crate::bag::folder::is_spare;
 use crate::base::budget::YAML;
 use crate::base::file::with_suffix;
 use crate::base::yaml::{self, Value};
@@ -123,7 +124,7 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
         with_suffix(&plain, ".zstd"),
         plain.with_extension(""),
     ];
-    let is_storage = |p: &&PathBuf| p.is_file() && is_storage(p);
+    let is_storage = |p: &&PathBuf| p.is_file() && is_storage(p) && !is_spare(p);
     let Some(found) = found.iter().find(is_storage) else {
         return Err(format!("`{}` is missing", last.to_string_lossy()));
     };
