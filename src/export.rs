@@ -1,20 +1,15 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
 
 mod animated_svg;
-mod apng;
 #[cfg(feature = "arrow")]
 pub(crate) mod arrow;
 pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
-mod gexf;
 mod gif;
-mod graphml;
 pub(crate) mod html;
-mod indexed;
 mod json;
 pub(crate) mod mermaid;
-pub(crate) mod nodl;
 pub mod options;
 pub(crate) mod palette;
 #[cfg(feature = "parquet")]
@@ -25,13 +20,10 @@ pub(crate) mod report;
 pub mod run;
 pub mod sequence;
 pub(crate) mod sink;
-mod spells;
 mod still;
 pub(crate) mod tables;
 pub(crate) mod target;
 mod tex;
-#[cfg(feature = "video")]
-mod video;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -41,7 +33,7 @@ use crate::base::error::{Error, Result};
 use self::still::StillKind;
 pub(crate) use encoder::Pack;
 pub use encoder::Written;
-use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
+use encoder::{DATA, IMAGE, PICTURE};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
 pub(crate) use encoder::{Single, single};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
@@ -56,13 +48,8 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "gif",
         what: "the animation",
         start: gif::start,
-        ..ANIMATION
-    },
-    OutputFormat {
-        word: "apng",
-        what: "animation with full colour",
-        start: apng::start,
-        ..ANIMATION
+        is_limited: true,
+        ..PICTURE
     },
     OutputFormat {
         word: "svg",
@@ -112,22 +99,6 @@ pub const FORMATS: &[OutputFormat] = &[
         whole: OneDrawing::Asked,
         ..PICTURE
     },
-    #[cfg(feature = "video")]
-    OutputFormat {
-        word: "mp4",
-        what: "a video, through `ffmpeg`",
-        check: Some(video::check),
-        start: |sequence, target| video::start(sequence, target, &video::MP4),
-        ..PICTURE
-    },
-    #[cfg(feature = "video")]
-    OutputFormat {
-        word: "webm",
-        what: "a video, through `ffmpeg`",
-        check: Some(video::check),
-        start: |sequence, target| video::start(sequence, target, &video::WEBM),
-        ..PICTURE
-    },
     OutputFormat {
         word: "html",
         what: "a page to step through the mission, in one file",
@@ -149,13 +120,6 @@ pub const FORMATS: &[OutputFormat] = &[
         ..DATA
     },
     OutputFormat {
-        word: "nodl",
-        what: "a folder `nodl/` with a NoDL document per node",
-        check: Some(nodl::check),
-        start: nodl::start,
-        ..DATA
-    },
-    OutputFormat {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, log, phases, bags",
         check: Some(tables::check),
@@ -168,18 +132,6 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
         check: Some(tables::check),
         start: |sequence, target| tables::start(sequence, target, TableFormat::Parquet),
-        ..DATA
-    },
-    OutputFormat {
-        word: "gexf",
-        what: "a dynamic graph for Gephi",
-        start: gexf::start,
-        ..DATA
-    },
-    OutputFormat {
-        word: "graphml",
-        what: "the union graph for yEd, networkx and others",
-        start: graphml::start,
         ..DATA
     },
 ];
@@ -236,9 +188,6 @@ impl Output {
     pub fn named(name: &OsStr, word: Option<&str>) -> Result<Self> {
         let target = Target::parse(name);
         let word = word.map(str::to_lowercase).or_else(|| target.extension());
-        // The only format that is a folder.
-        let is_nodl = target.path().file_name().is_some_and(|name| name == "nodl");
-        let word = word.or_else(|| is_nodl.then(|| "nodl".to_owned()));
         let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
         let all = all.join(", ");
         let Some(word) = word else {
@@ -266,9 +215,6 @@ impl Output {
 pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
     check::check(&targets, kept)?;
-    for output in outputs.iter().filter(|o| o.format.word == "nodl") {
-        check::check_folder(output.target.path(), "yaml", kept)?;
-    }
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
@@ -278,7 +224,6 @@ pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
 fn files(output: &Output) -> Vec<Target> {
     match output.format.word {
         word @ ("csv" | "parquet") => tables::files(&output.target, word),
-        "nodl" => vec![Target::Path(output.target.path().join("node.nodl.yaml"))],
         _ => vec![output.target.clone()],
     }
 }
@@ -310,6 +255,6 @@ mod tests {
     fn an_unknown_format_lists_the_known_ones() {
         let error = Output::parse("a.gfi", None).unwrap_err();
         assert_eq!(error.to_string(), "unknown format `gfi`");
-        assert!(error.hint().contains("gif, apng, svg, png"));
+        assert!(error.hint().contains("gif, svg, png, webp"));
     }
 }

@@ -10,7 +10,6 @@ mod layers;
 mod layout_rs;
 mod pack;
 mod pinned;
-mod ring;
 mod route;
 mod routes;
 mod spacing;
@@ -181,11 +180,7 @@ const DEEPEST: usize = 16;
 pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
     ("layered", &layered::Layered),
     ("layout-rs", &layout_rs::LayoutRs),
-    ("ring", &ring::Ring),
 ];
-
-/// The most boxes that the engine `ring` supports.
-pub(crate) const RING: usize = ring::MOST;
 
 /// The engine with this name.
 ///

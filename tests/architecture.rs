@@ -52,16 +52,14 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["turn"],
         &["crowds", "filtered", "frames"],
     ]),
-    ("layout", &[&["isotonic", "layers", "pack", "pinned", "route", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
+    ("layout", &[&["isotonic", "layers", "pack", "pinned", "route", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip", "topic_timeline"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["indexed", "spells"],
-        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "still", "tex", "video"],
+        &["animated_svg", "arrow", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "still", "tex"],
         &["report", "run", "tables"],
-        &["nodl"],
     ]),
     ("gate", &[
         &["pattern", "range"],

@@ -7,9 +7,9 @@ use crate::architecture;
 use crate::options;
 
 /// Lines of `src` that are neither blank nor comment nor test.
-const MOST_LINES: usize = 77_680;
+const MOST_LINES: usize = 76_412;
 /// Entries of the dependency sections in `Cargo.toml`, optional ones included, those of tests not.
-const MOST_DEPENDENCIES: usize = 51;
+const MOST_DEPENDENCIES: usize = 50;
 /// Options in the help of all commands; one that three commands have counts three times.
 const MOST_OPTIONS: usize = 175;
 /// Options in the help of `render`.

@@ -445,42 +445,6 @@ fn a_recorder_is_not_a_subscriber() {
     assert_eq!(recorder, counted("/record_12345,[],[]\n"));
 }
 
-#[test]
-fn graphs_for_other_tools_contain_every_element_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let outputs = ["-o", "x.gexf", "-o", "x.graphml", "-o", "x.json"];
-    ends(
-        dir.path(),
-        &[&["render", WAREHOUSE][..], &outputs].concat(),
-        0,
-    );
-    let read = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
-    let mission: serde_json::Value = serde_json::from_str(&read("x.json")).unwrap();
-    let names = |list: &str| -> BTreeSet<String> {
-        let windows = mission["windows"].as_array().unwrap();
-        let elements = windows.iter().flat_map(|w| w[list].as_array().unwrap());
-        let name = |e: &serde_json::Value, key: &str| e[key].as_str().unwrap_or("").to_owned();
-        elements
-            .map(|e| name(e, "name") + &name(e, "node") + " " + &name(e, "topic"))
-            .collect()
-    };
-    let nodes = names("nodes").len() + names("topics").len();
-    let edges = names("publishes").len() + names("subscribes").len();
-    for text in [read("x.gexf"), read("x.graphml")] {
-        assert_eq!(text.matches("<node id=").count(), nodes);
-        assert_eq!(text.matches("<edge id=").count(), edges);
-    }
-    let gexf = read("x.gexf");
-    assert!(gexf.matches("<spell ").count() >= nodes + edges);
-    // Spells are lifetimes in continuous time: they begin inside windows of a minute, and some after a pause.
-    let starts = gexf.split("<spell start=\"").skip(1);
-    let starts: Vec<f64> = starts
-        .map(|rest| rest.split('"').next().unwrap().parse().unwrap())
-        .collect();
-    let inside = starts.iter().filter(|at| *at % 60.0 > 0.0).count();
-    assert!(inside > 10 && starts.contains(&0.0), "{starts:?}");
-}
-
 #[cfg(feature = "parquet")]
 mod parquet {
     use std::fs::File;

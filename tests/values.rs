@@ -15,7 +15,7 @@ fn example(name: &str) -> PathBuf {
 }
 
 /// All formats that are fast enough; animations consist of the frames.
-const FORMATS: [&str; 13] = [
+const FORMATS: [&str; 11] = [
     "x.svg",
     "x{n}.svg",
     "x.png",
@@ -27,8 +27,6 @@ const FORMATS: [&str; 13] = [
     "x.json",
     "x.csv",
     "x.parquet",
-    "x.gexf",
-    "x.graphml",
 ];
 /// Every file that `bagreel render` writes for `input`, by name.
 fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, Vec<u8>> {

@@ -12,7 +12,6 @@ _IMAGES = {
     ".svg": "image/svg+xml",
     ".png": "image/png",
     ".gif": "image/gif",
-    ".apng": "image/apng",
     ".webp": "image/webp",
 }
 

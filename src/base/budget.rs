@@ -55,10 +55,6 @@ pub(crate) const EVIDENCE_LINES: usize = 1 << 16;
 /// The most characters of a line of evidence, see [`EVIDENCE_LINES`].
 pub(crate) const EVIDENCE_LINE: usize = 500;
 
-#[cfg(feature = "video")]
-/// The number of last bytes kept of a child process's error output.
-pub(crate) const MESSAGES_OF_A_CHILD: usize = 1 << 16;
-
 /// The most bytes that may be decompressed from any bag: seconds of work.
 pub(crate) const UNPACKED: u64 = 4 << 30;
 

@@ -80,12 +80,7 @@ fn is_picture(output: &Output) -> bool {
 
 /// Whether the output contains the graph as data, complete unless `--filtered` is given.
 fn is_data(output: &Output) -> bool {
-    ["json", "nodl", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
-}
-
-/// Whether the output plays from frame to frame.
-fn plays(output: &Output) -> bool {
-    ["gif", "apng", "mp4", "webm"].contains(&output.format.word)
+    ["json", "csv", "parquet"].contains(&output.format.word)
 }
 
 const RULES: &[AppliesTo] = &[
@@ -96,7 +91,9 @@ const RULES: &[AppliesTo] = &[
     },
     AppliesTo {
         options: "width",
-        takes: |_, output| is_picture(output) && !plays(output) && output.format.word != "html",
+        takes: |_, output| {
+            is_picture(output) && output.format.word != "gif" && output.format.word != "html"
+        },
         what: "it is a width on paper, for `x.pdf`, `x.svg` and `x.png`; `--size` sets that of other pictures",
     },
     AppliesTo {
@@ -128,20 +125,20 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "filtered",
         takes: |_, output| is_data(output),
-        what: "it applies to data: json, nodl, csv, parquet, gexf, graphml; pictures are already filtered",
+        what: "it applies to data: json, csv, parquet; pictures are already filtered",
     },
     AppliesTo {
         options: "frame-ms",
         takes: |asked, output| {
             let is_animated = output.format.word == "svg" && !asked.is_window(output);
-            plays(output) || is_animated && !is_figure(asked.args, output)
+            output.format.word == "gif" || is_animated && !is_figure(asked.args, output)
         },
-        what: "it applies to animations: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
+        what: "it applies to animations: `x.gif`, `x.svg`",
     },
     AppliesTo {
-        options: "tween hold-changes",
-        takes: |_, output| plays(output),
-        what: "it applies to animations: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
+        options: "hold-changes",
+        takes: |_, output| output.format.word == "gif",
+        what: "it applies to `x.gif`",
     },
     AppliesTo {
         options: "strip",
@@ -151,7 +148,7 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: "max-bytes",
         takes: |_, output| output.format.is_limited,
-        what: "it applies to `x.gif` and `x.apng`",
+        what: "it applies to `x.gif`",
     },
     AppliesTo {
         options: "dot-profile",
@@ -174,11 +171,6 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to `x.json`",
     },
     AppliesTo {
-        options: "include",
-        takes: |_, output| output.format.word == "nodl",
-        what: "it applies to `nodl/`",
-    },
-    AppliesTo {
         options: "runs",
         takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
         what: "it applies to tables: `x.csv`",
@@ -190,7 +182,7 @@ const NOT_OF_FIGURES: &str = "style size line-width fit orientation layout layou
     show-recorder title";
 
 /// Options that ask for windows one after the other.
-const OF_FILMS: &str = "period step align skip-unchanged cut frame-ms tween hold-changes max-bytes poster strip figure \
+const OF_FILMS: &str = "period step align skip-unchanged cut frame-ms hold-changes max-bytes poster strip figure \
     captions phases format";
 
 /// Whether a mission without changes may become a single picture: no output is given, or it is a single picture, and no

@@ -103,7 +103,6 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> 
     let strip = strip.map(options::Choice::parse);
     Ok(options::SequenceOptions {
         frame_ms: args.frame_ms,
-        tween: args.tween,
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,

@@ -247,7 +247,6 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),
             figure: look::old_figure(args)?,
-            has_inferred: args.include.is_some(),
             ..look::sequence(&args.sequence)?
         },
         kept: kept(args),

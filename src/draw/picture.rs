@@ -22,7 +22,6 @@ mod spaces;
 mod timeline;
 pub(crate) mod title;
 mod topics;
-mod tween;
 mod union;
 mod words;
 
@@ -290,17 +289,6 @@ impl<'a> Picture<'a> {
             scene.title = format!("{}: {}", scene.title, frame.words(usize::MAX));
         }
         scene
-    }
-
-    /// The scene at `phase` (0..=1) of the transition from window `k - 1` to window `k`: first ending
-    /// elements fade, then changed ones cross-fade in place, then new ones appear. Nothing moves. At 1 it is
-    /// [`Picture::scene`].
-    pub fn between(&self, k: usize, phase: f64) -> Scene {
-        let after = self.scene(k);
-        if k == 0 || phase >= 1.0 {
-            return after;
-        }
-        tween::tween(&self.scene(k - 1), after, phase.max(0.0))
     }
 
     fn ground(&self) -> Vec<Group> {

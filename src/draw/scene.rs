@@ -33,20 +33,8 @@ pub struct Group {
     pub data: Vec<(&'static str, String)>,
     /// Its content in words; empty for none.
     pub title: String,
-    /// Its opacity: 0 (invisible) to 1 (opaque, as in every frame outside of transitions).
-    pub fade: Fade,
     /// The shapes and texts, from back to front.
     pub pieces: Vec<Piece>,
-}
-
-/// The opacity of a group, 0..=1; opaque by default.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fade(pub f64);
-
-impl Default for Fade {
-    fn default() -> Self {
-        Self(1.0)
-    }
 }
 
 /// A shape or a text.

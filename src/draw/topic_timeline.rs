@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use crate::base::cast;
 use crate::base::geometry::{Rect, Size};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::figure::band::Axis;
 use crate::draw::figure::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
@@ -97,7 +97,7 @@ impl<'a> TopicTimeline<'a> {
         let page = PageFrame::new(style, &options, 0, true);
         let (place, scale) = placed(&lives, &page, &options, fonts);
         if !is_sized {
-            // A short timeline has no empty space below; videos need an even number of rows.
+            // A short timeline has no empty space below; encoders of video need an even number of rows.
             let canvas = PaperCanvas::new(fonts, sizes, scale);
             let end = (place.top + lives.height(&canvas) + BELOW) * scale;
             options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);
@@ -132,9 +132,8 @@ impl<'a> TopicTimeline<'a> {
         (self.left_out > 0).then_some(remark).into_iter().collect()
     }
 
-    /// The timeline in window `k` of the view; `phase`, above 0 to 1, is the fraction of the playhead's
-    /// movement to it.
-    pub(crate) fn scene(&self, k: usize, phase: f64) -> Scene {
+    /// The timeline in window `k` of the view.
+    pub(crate) fn scene(&self, k: usize) -> Scene {
         let mut scene = self.empty();
         let Some(frame) = self.view.frames.get(k) else {
             return scene;
@@ -143,13 +142,8 @@ impl<'a> TopicTimeline<'a> {
             let phase = self.options.phases.get(k).map_or("", String::as_str);
             scene.groups.extend(self.title.words(frame, phase));
         }
-        let mut span = frame.shown();
-        if let Some(before) = k.checked_sub(1).and_then(|k| self.view.frames.get(k)) {
-            span.start = between(before.shown().start.0, span.start.0, phase);
-            span.end = between(before.shown().end.0, span.end.0, phase);
-        }
         let window = self.windows.get(k).copied().unwrap_or(0);
-        scene.groups.extend(self.now(window, span));
+        scene.groups.extend(self.now(window, frame.shown()));
         scene.title = format!(
             "{}, window {} of {}",
             self.options.title(),
@@ -384,15 +378,6 @@ impl<'a> TopicTimeline<'a> {
         let found = table.iter().find(|(ink, _)| *ink == of);
         found.map_or(of, |(_, color)| *color)
     }
-}
-
-fn between(from: i64, to: i64, phase: f64) -> Stamp {
-    let part = cast::to_i64((to.saturating_sub(from)) as f64 * phase.clamp(0.0, 1.0));
-    Stamp(if phase >= 1.0 {
-        to
-    } else {
-        from.saturating_add(part)
-    })
 }
 
 /// The number of messages that the topic of a row carried.

@@ -21,8 +21,8 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
         let times = sequence.frame_times();
         let busiest = sequence.view.busiest();
         let still = times.iter().rposition(|time| time.window <= busiest);
-        let scene = |time: &FrameTime| (sequence.picture.scene(time.window, 1.0), time.ms);
-        let scenes = AnimatedScenes::new(times.iter().filter(|t| t.is_settled()).map(scene));
+        let scene = |time: &FrameTime| (sequence.picture.scene(time.window), time.ms);
+        let scenes = AnimatedScenes::new(times.iter().map(scene));
         let title = sequence.picture.title().unwrap_or_default();
         let text = scenes.write(title, still.unwrap_or(0));
         sink.write_all(text.as_bytes()).map(|()| remarks)

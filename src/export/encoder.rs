@@ -128,19 +128,9 @@ pub trait Encoder: Send {
         Needs::Nothing
     }
 
-    /// Whether it is an animation, which receives staged frames in addition to the windows.
-    fn plays(&self) -> bool {
-        false
-    }
-
     /// The function that encodes its packets, which [`Encoder::take`] receives in order.
     fn pack(&self) -> Pack {
         |_| Ok(Packet::Nothing)
-    }
-
-    /// The largest number of bytes of a packet, per pixel of a frame.
-    fn packet_density(&self) -> f64 {
-        1.0
     }
 
     /// Begins, before the first packet, with the size of all frames and their palette.
@@ -302,12 +292,6 @@ pub(crate) const PICTURE: OutputFormat = OutputFormat {
     start: nothing,
 };
 
-/// The properties that animations have in common.
-pub(crate) const ANIMATION: OutputFormat = OutputFormat {
-    is_limited: true,
-    ..PICTURE
-};
-
 /// The properties that formats of single images have in common.
 pub(crate) const IMAGE: OutputFormat = OutputFormat {
     whole: OneDrawing::Always,
@@ -352,11 +336,7 @@ pub(crate) mod testing {
             title: String::new(),
             groups: Vec::new(),
         };
-        let frame_time = FrameTime {
-            window: 0,
-            phase: 1.0,
-            ms: 100,
-        };
+        let frame_time = FrameTime { window: 0, ms: 100 };
         pack(&DrawnFrame {
             time: frame_time,
             scene: &scene,

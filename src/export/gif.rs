@@ -2,11 +2,10 @@
 
 use std::io::{self, Write};
 
-use super::indexed::{self, IndexedAnimation};
-use super::{DrawnFrame, Pack, Packet, Started};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Started, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
@@ -20,7 +19,71 @@ const LONGEST: u64 = 65_535;
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    indexed::start::<Animation<OutputSink>>(sequence, target)
+    target.must_be_one("an animation contains all windows")?;
+    Ok(Box::new(GifFile {
+        target: target.clone(),
+        sink: Some(OutputSink::create(target, sequence.options.max_bytes)?),
+        animation: None,
+    }))
+}
+
+struct GifFile {
+    target: Target,
+    /// The file, until the first frame.
+    sink: Option<OutputSink>,
+    animation: Option<Animation<OutputSink>>,
+}
+
+impl GifFile {
+    fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
+        Error::io("write", self.target.path())
+    }
+
+    /// Refuses sizes in pixels that GIF cannot represent.
+    fn check(&self, (width, height): (u32, u32)) -> Result<()> {
+        if width.max(height) <= u16::MAX.into() {
+            return Ok(());
+        }
+        let reason = format!("{width} by {height} pixels exceed GIF's limit");
+        let hint = "give a `--size` below 65,536 pixels, or write `{n}.png`";
+        Err(Error::output(self.target.path(), reason, hint))
+    }
+}
+
+impl Encoder for GifFile {
+    fn needs(&self) -> Needs {
+        Needs::Indices
+    }
+
+    fn pack(&self) -> Pack {
+        pack
+    }
+
+    fn begin(&mut self, size: (u32, u32), palette: &Palette) -> Result<()> {
+        if let Some(sink) = self.sink.take() {
+            self.check(size)?;
+            let animation = Animation::new(sink, size, palette);
+            self.animation = Some(animation.map_err(self.error())?);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        let failed = self.error();
+        match &mut self.animation {
+            Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        let failed = self.error();
+        let mut written = Written::to(&self.target);
+        if let Some(animation) = self.animation.take() {
+            written.add(animation.finish().map_err(failed)?.commit()?);
+        }
+        Ok(written)
+    }
 }
 
 /// The frame compressed for GIF: all of it, or the area that differs from the previous frame.
@@ -72,19 +135,9 @@ struct Animation<W: Write> {
     now: u64,
 }
 
-impl<W: Write> IndexedAnimation<W> for Animation<W> {
-    const PACK: Pack = pack;
-
-    fn check((width, height): (u32, u32), target: &Target) -> Result<()> {
-        if width.max(height) <= u16::MAX.into() {
-            return Ok(());
-        }
-        let reason = format!("{width} by {height} pixels exceed GIF's limit");
-        let hint = "give a `--size` below 65,536 pixels, or write `.apng`";
-        Err(Error::output(target.path(), reason, hint))
-    }
-
-    fn new(out: W, size: (u32, u32), palette: &Palette, _frames: usize) -> io::Result<Self> {
+impl<W: Write> Animation<W> {
+    /// Begins an endless loop; the palette has at most 255 colours.
+    fn new(out: W, size: (u32, u32), palette: &Palette) -> io::Result<Self> {
         let mut colours = palette.bytes();
         colours.extend([0; 3]);
         let narrow = |pixels: u32| u16::try_from(pixels).map_err(io::Error::other);
@@ -100,7 +153,7 @@ impl<W: Write> IndexedAnimation<W> for Animation<W> {
         })
     }
 
-    /// An unchanged frame prolongs the previous one.
+    /// Shows a frame for `ms` milliseconds; an unchanged one prolongs the previous one.
     fn add(&mut self, packet: Packet, ms: u32) -> io::Result<()> {
         if let Packet::Patch(area, bytes) = packet {
             let is_first = self.waiting.is_none();
@@ -116,9 +169,7 @@ impl<W: Write> IndexedAnimation<W> for Animation<W> {
         self.write_waiting()?;
         self.encoder.into_inner().map_err(to_io)
     }
-}
 
-impl<W: Write> Animation<W> {
     /// Writes the waiting frame, as often as its time needs.
     fn write_waiting(&mut self) -> io::Result<()> {
         let Some(mut frame) = self.waiting.take() else {
@@ -192,7 +243,7 @@ mod tests {
     /// These frames as a decoder reads them: delays in hundredths and the colour of each pixel.
     fn played(frames: &[(Vec<u8>, u32)]) -> Vec<(u16, Vec<u8>)> {
         let palette = colours();
-        let mut animation = Animation::new(Vec::new(), (40, 30), &palette, frames.len()).unwrap();
+        let mut animation = Animation::new(Vec::new(), (40, 30), &palette).unwrap();
         let mut before: &[u8] = &[];
         for (frame, ms) in frames {
             let packet = packed(&palette, before, frame, SIZE, pack);

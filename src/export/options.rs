@@ -18,8 +18,6 @@ pub use crate::mission::JsonForm;
 pub struct SequenceOptions {
     /// The time for which a window is shown, in milliseconds, ≥ 20.
     pub frame_ms: u32,
-    /// The number of staged frames that lead into a window with a change, ≥ 0.
-    pub tween: u32,
     /// The factor by which the display time of such a window is multiplied, ≥ 1.
     pub hold_changes: u32,
     /// The step from one window that is shown to the next, in windows, ≥ 1; windows with a change are shown in any
@@ -37,8 +35,6 @@ pub struct SequenceOptions {
     pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
-    /// Whether descriptions of nodes include inferred endpoints.
-    pub has_inferred: bool,
     /// The windows of a film strip, if requested; it also replaces a sequence of drawings.
     pub strip: Option<Choice>,
     /// The figure, if requested; it replaces a strip.
@@ -55,7 +51,6 @@ impl Default for SequenceOptions {
     fn default() -> Self {
         Self {
             frame_ms: 1000,
-            tween: 0,
             hold_changes: 1,
             every: 1,
             changes_only: false,
@@ -64,7 +59,6 @@ impl Default for SequenceOptions {
             dot_profile: Profile::default(),
             json: JsonForm::Auto,
             has_runs: false,
-            has_inferred: false,
             strip: None,
             figure: None,
             pairs: None,

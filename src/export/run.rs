@@ -88,18 +88,12 @@ impl<'a> OutputJob<'a> {
         needs.unwrap_or(Needs::Nothing)
     }
 
-    fn plays(&self) -> bool {
-        self.encoder.as_ref().is_some_and(|e| e.plays())
-    }
-
     /// The data that it needs for every frame; none once it has ended.
     fn want(&self) -> FrameWant {
         let encoder = self.encoder.as_ref();
         FrameWant {
             needs: self.needs(),
-            plays: self.plays(),
             pack: encoder.map_or(|_| Ok(Packet::Nothing), |e| e.pack()),
-            density: encoder.map_or(0.0, |e| e.packet_density()),
         }
     }
 
@@ -115,7 +109,7 @@ impl<'a> OutputJob<'a> {
                 self.has_begun = true;
             }
             for Waiting(index, frame_time, packet) in packets {
-                if needs > Needs::Nothing && (frame_time.is_settled() || encoder.plays()) {
+                if needs > Needs::Nothing {
                     encoder.take(index, frame_time, packet)?;
                 }
             }
@@ -187,10 +181,7 @@ fn play(
     steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<()> {
-    let mut frame_times = sequence.frame_times();
-    if !jobs.iter().any(OutputJob::plays) {
-        frame_times.retain(FrameTime::is_settled);
-    }
+    let frame_times = sequence.frame_times();
     let wants: Vec<FrameWant> = jobs.iter().map(OutputJob::want).collect();
     let pool = RasterPool::new(sequence, &frame_times, &wants, steps)?;
     let mut done = 0;

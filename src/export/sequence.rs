@@ -17,9 +17,8 @@ use crate::view::{Frame, View};
 
 /// The drawings of the windows of a sequence.
 pub trait Drawings: Sync {
-    /// The drawing of a window, an index into [`View::frames`]; all drawings have the same size. `phase`, above 0 to 1,
-    /// is the progress of the transition into it: 1 is the window itself.
-    fn scene(&self, window: usize, phase: f64) -> Scene;
+    /// The drawing of a window, an index into [`View::frames`]; all drawings have the same size.
+    fn scene(&self, window: usize) -> Scene;
 
     /// The title of the drawing of a graph; `None` for other drawings.
     fn title(&self) -> Option<&str> {
@@ -47,8 +46,8 @@ pub struct UnionDrawings<'a> {
 }
 
 impl Drawings for Picture<'_> {
-    fn scene(&self, window: usize, phase: f64) -> Scene {
-        self.between(window, phase)
+    fn scene(&self, window: usize) -> Scene {
+        self.scene(window)
     }
 
     fn title(&self) -> Option<&str> {
@@ -64,8 +63,8 @@ impl Drawings for Picture<'_> {
 }
 
 impl Drawings for TopicTimeline<'_> {
-    fn scene(&self, window: usize, phase: f64) -> Scene {
-        self.scene(window, phase)
+    fn scene(&self, window: usize) -> Scene {
+        self.scene(window)
     }
 
     fn overview(&self) -> Option<Overview> {
@@ -116,30 +115,17 @@ pub struct Sequence<'a> {
 }
 
 /// One frame of the sequence.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameTime {
     /// The window: an index into [`View::frames`].
     pub window: usize,
-    /// The progress of the transition into this window, above 0 up to 1; 1 is the window itself.
-    pub phase: f64,
     /// The time for which it is shown, in milliseconds.
     pub ms: u32,
 }
 
-impl FrameTime {
-    /// Whether it shows the window itself rather than the transition.
-    pub fn is_settled(&self) -> bool {
-        self.phase >= 1.0
-    }
-}
-
-/// The longest and shortest time of a staged frame in milliseconds.
-const STAGED_MS: (u32, u32) = (20, 100);
-
 impl Sequence<'_> {
-    /// The frames in order. The total duration is constant: staged frames are taken from their window's time, and the
-    /// time of an omitted window is added to the previous one. A long time without messages is one frame of normal
-    /// duration.
+    /// The frames in order. The total duration is constant: the time of an omitted window is added to the previous one. A
+    /// long time without messages is one frame of normal duration.
     pub fn frame_times(&self) -> Vec<FrameTime> {
         let frames = &self.view.frames;
         let changed: Vec<bool> = frames.iter().map(Frame::is_changed).collect();
@@ -151,11 +137,10 @@ impl Sequence<'_> {
 }
 
 fn frame_times(changed: &[bool], options: &SequenceOptions) -> Vec<FrameTime> {
-    let (shortest, longest) = STAGED_MS;
     let mut frame_times: Vec<FrameTime> = Vec::with_capacity(changed.len());
     for (window, &changed) in changed.iter().enumerate() {
         let hold = if changed { options.hold_changes } else { 1 };
-        let mut ms = options.frame_ms.saturating_mul(hold.max(1));
+        let ms = options.frame_ms.saturating_mul(hold.max(1));
         let stays = if options.changes_only {
             window == 0
         } else {
@@ -165,23 +150,7 @@ fn frame_times(changed: &[bool], options: &SequenceOptions) -> Vec<FrameTime> {
             before.ms = before.ms.saturating_add(ms);
             continue;
         }
-        if changed && options.tween > 0 {
-            let each = (ms / 2 / options.tween).clamp(shortest, longest);
-            for step in 1..=options.tween {
-                let phase = f64::from(step) / f64::from(options.tween + 1);
-                frame_times.push(FrameTime {
-                    window,
-                    phase,
-                    ms: each,
-                });
-            }
-            ms = ms.saturating_sub(each * options.tween).max(shortest);
-        }
-        frame_times.push(FrameTime {
-            window,
-            phase: 1.0,
-            ms,
-        });
+        frame_times.push(FrameTime { window, ms });
     }
     frame_times
 }
@@ -192,39 +161,19 @@ mod tests {
 
     const QUIET_LOUD_QUIET: [bool; 3] = [false, true, false];
 
-    /// Window, phase and milliseconds of every frame.
-    fn plan(changed: &[bool], options: &SequenceOptions) -> Vec<(usize, f64, u32)> {
-        let numbers = |s: FrameTime| (s.window, s.phase, s.ms);
-        frame_times(changed, options)
-            .into_iter()
-            .map(numbers)
-            .collect()
+    /// Window and milliseconds of every frame.
+    fn plan(changed: &[bool], options: &SequenceOptions) -> Vec<(usize, u32)> {
+        let times = frame_times(changed, options).into_iter();
+        times.map(|time| (time.window, time.ms)).collect()
     }
 
     #[test]
     fn every_window_is_shown_once() {
-        let expected = [(0, 1.0, 1000), (1, 1.0, 1000), (2, 1.0, 1000)];
+        let expected = [(0, 1000), (1, 1000), (2, 1000)];
         assert_eq!(
             plan(&QUIET_LOUD_QUIET, &SequenceOptions::default()),
             expected
         );
-    }
-
-    #[test]
-    fn staged_frames_only_precede_changes_and_take_no_extra_time() {
-        let options = SequenceOptions {
-            tween: 3,
-            ..SequenceOptions::default()
-        };
-        let expected = [
-            (0, 1.0, 1000),
-            (1, 0.25, 100),
-            (1, 0.5, 100),
-            (1, 0.75, 100),
-            (1, 1.0, 700),
-            (2, 1.0, 1000),
-        ];
-        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
     }
 
     #[test]
@@ -233,7 +182,7 @@ mod tests {
             hold_changes: 2,
             ..SequenceOptions::default()
         };
-        let expected = [(0, 1.0, 1000), (1, 1.0, 2000), (2, 1.0, 1000)];
+        let expected = [(0, 1000), (1, 2000), (2, 1000)];
         assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
     }
 
@@ -244,29 +193,12 @@ mod tests {
             ..SequenceOptions::default()
         };
         let changed = [false, false, true, false, false, false, false];
-        let expected = [
-            (0, 1.0, 2000),
-            (2, 1.0, 1000),
-            (3, 1.0, 3000),
-            (6, 1.0, 1000),
-        ];
+        let expected = [(0, 2000), (2, 1000), (3, 3000), (6, 1000)];
         assert_eq!(plan(&changed, &options), expected);
         let options = SequenceOptions {
             changes_only: true,
             ..SequenceOptions::default()
         };
-        assert_eq!(plan(&changed, &options), [(0, 1.0, 2000), (2, 1.0, 5000)]);
-    }
-
-    #[test]
-    fn a_fast_animation_still_shows_every_frame() {
-        let options = SequenceOptions {
-            frame_ms: 20,
-            tween: 8,
-            ..SequenceOptions::default()
-        };
-        let plan = plan(&[false, true], &options);
-        assert!(plan.iter().all(|frame_time| frame_time.2 >= 20));
-        assert_eq!(plan.len(), 10);
+        assert_eq!(plan(&changed, &options), [(0, 2000), (2, 5000)]);
     }
 }

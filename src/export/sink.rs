@@ -79,31 +79,6 @@ impl OutputSink {
         Error::io("write", &self.path)
     }
 
-    #[cfg(feature = "video")]
-    /// A handle for the standard output of a child process; `None` if this process must write the bytes.
-    ///
-    /// # Errors
-    /// Where the system refuses.
-    pub(crate) fn handle(&mut self) -> Result<Option<File>> {
-        let handle = match self.to.get_ref() {
-            #[cfg(target_os = "linux")]
-            SinkTarget::Nameless(file) => Some(file.try_clone()),
-            SinkTarget::Special(file) => Some(file.try_clone()),
-            SinkTarget::Named(file, _) => Some(file.as_file().try_clone()),
-            SinkTarget::Stdout(_) | SinkTarget::Memory(_) => None,
-        };
-        handle.transpose().map_err(self.error())
-    }
-
-    #[cfg(feature = "video")]
-    /// Whether a file that a child process wrote to is empty.
-    ///
-    /// # Errors
-    /// If the system cannot determine it.
-    pub(crate) fn is_empty_file(&self) -> io::Result<bool> {
-        Ok(self.to.get_ref().size()? == Some(0))
-    }
-
     /// Finishes the file: it appears under its final name, replacing an existing file. Returns its size in bytes.
     ///
     /// # Errors
@@ -118,10 +93,8 @@ impl OutputSink {
             ..
         } = self;
         let (way, _) = to.into_parts();
-        // A child process may have written more than we did.
-        let size = way.size().ok().flatten().unwrap_or(written);
         publish(way, &place).map_err(Error::io("write", &path))?;
-        Ok(size)
+        Ok(written)
     }
 }
 
@@ -147,19 +120,6 @@ impl Write for OutputSink {
 
     fn flush(&mut self) -> io::Result<()> {
         self.to.flush()
-    }
-}
-
-impl SinkTarget {
-    /// The size of the file that will be renamed; `None` for everything else.
-    fn size(&self) -> io::Result<Option<u64>> {
-        let file = match self {
-            #[cfg(target_os = "linux")]
-            Self::Nameless(file) => file,
-            Self::Named(file, _) => file.as_file(),
-            _ => return Ok(None),
-        };
-        file.metadata().map(|m| Some(m.len()))
     }
 }
 

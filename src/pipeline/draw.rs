@@ -95,14 +95,6 @@ impl Drawing {
         }
     }
 
-    /// The same drawing with another engine.
-    pub(super) fn with(&self, engine: &'static (dyn Engine + Sync)) -> Self {
-        Self {
-            engine,
-            ..self.clone()
-        }
-    }
-
     /// The smallest legible text, in pixels.
     pub(super) fn readable(&self) -> f64 {
         self.purpose.map_or(READABLE, Purpose::readable)

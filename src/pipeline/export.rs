@@ -336,7 +336,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     if frames <= MANY_FRAMES || !job.outputs.iter().any(is_drawn) {
         return None;
     }
-    let size = sequence.picture.scene(0, 1.0).size;
+    let size = sequence.picture.scene(0).size;
     let pixels = size.w * size.h * sequence.options.scale * sequence.options.scale / 1e6;
     let cores = run::cores() as f64;
     let ms = frames as f64 * (FRAME_MS.0 + FRAME_MS.1 * pixels) / cores;

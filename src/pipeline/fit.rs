@@ -13,7 +13,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::graph::Element;
-use crate::layout::{Engine, Layout, LayoutOptions, Plan, RING, engine, extend, lay_out};
+use crate::layout::{Engine, Layout, LayoutOptions, Plan, extend, lay_out};
 use crate::mission::Mission;
 use crate::view::{Collapsible, ItemId, Mode, View, ViewOptions, headlines, outline, view};
 use notices::{parts, reported, so_that};
@@ -42,8 +42,6 @@ struct Fitting<'a> {
     drawing: &'a Drawing,
     page: PageOptions,
     options: ViewOptions,
-    /// The engine of the best drawing.
-    engine: &'static (dyn Engine + Sync),
     best: Attempt,
     layouts: Layouts,
 }
@@ -68,7 +66,6 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         drawing,
         page,
         options,
-        engine: drawing.engine,
         best,
         layouts,
     };
@@ -78,9 +75,8 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     }
     if is_styled {
         fitting.drawing = asked;
-        let engine = fitting.engine;
-        let (drawing, chosen) = (&asked.with(engine), (&fitting.options, &fitting.page));
-        fitting.best = Attempt::drawn(mission, drawing, chosen, &mut Layouts::default());
+        let chosen = (&fitting.options, &fitting.page);
+        fitting.best = Attempt::drawn(mission, asked, chosen, &mut Layouts::default());
     }
     let drawing = asked;
     let mut composed = fitting.composed();
@@ -281,21 +277,9 @@ impl Fitting<'_> {
         let outermost: Vec<&str> = outermost.into_iter().filter(|s| !is_open(s)).collect();
         let outermost = outermost.into_iter().map(Arc::from);
         bundled.collapse.extend(outermost);
-        let boxes = outline(self.mission, &bundled);
-        // Few boxes with many arrows are best arranged in a ring.
-        let is_few = boxes.items.len() <= RING && boxes.namespaces.is_empty();
-        let ring = engine("ring").ok().filter(|_| is_few);
-        let attempt = match ring {
-            None => self.attempt(&bundled, &self.page.clone()),
-            Some(engine) => {
-                let chosen = (&bundled, &self.page);
-                let drawing = self.drawing.with(engine);
-                Attempt::new(self.mission, &drawing, chosen, &mut Layouts::default())
-            }
-        };
-        if boxes.items.len() > 1 && attempt.text > self.best.text {
+        let attempt = self.attempt(&bundled, &self.page.clone());
+        if attempt.text > self.best.text && outline(self.mission, &bundled).items.len() > 1 {
             (self.options, self.best) = (bundled, attempt);
-            self.engine = ring.unwrap_or(self.engine);
         }
     }
 
@@ -319,7 +303,7 @@ impl Fitting<'_> {
             // No effort has been made to improve an illegible drawing.
             let drawing = Drawing {
                 is_fitted: false,
-                ..self.drawing.with(self.engine)
+                ..self.drawing.clone()
             };
             let chosen = (&self.options, &self.page);
             self.best = Attempt::drawn(self.mission, &drawing, chosen, &mut Layouts::default());

@@ -298,7 +298,7 @@ pub fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
 }
 
 /// Formats in which one window follows another.
-const MOVING: [&str; 5] = ["gif", "apng", "html", "mp4", "webm"];
+const MOVING: [&str; 2] = ["gif", "html"];
 
 /// The whole job of `bagreel baseline`.
 #[derive(Clone, Debug)]

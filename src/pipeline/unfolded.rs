@@ -98,8 +98,8 @@ pub(super) struct OpenedDrawings<'a> {
 }
 
 impl Drawings for OpenedDrawings<'_> {
-    fn scene(&self, window: usize, phase: f64) -> Scene {
-        self.picture.between(window, phase)
+    fn scene(&self, window: usize) -> Scene {
+        self.picture.scene(window)
     }
 
     fn graph(&self) -> Option<UnionDrawings<'_>> {

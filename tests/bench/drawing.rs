@@ -1,8 +1,8 @@
 //! Measures how fast frames are drawn: `cargo bench --bench drawing -- MISSION.json [FRAMES]`.
 //!
 //! Draws the mission (in JSON) at 1280×720 and prints a table: everything included on one core and on two,
-//! drawing alone, drawing over the last frame where less than a tenth of the elements changed, frames of a
-//! tween, and a long run with its memory. The latest results are in `drawing.md`.
+//! drawing alone, drawing over the last frame where less than a tenth of the elements changed, and a long run with
+//! its memory. The latest results are in `drawing.md`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -79,7 +79,6 @@ fn main() {
     );
 
     over_the_last(&picture, &painter, &view);
-    tweens(&picture, &painter);
     let before = peak_mb();
     let many: Vec<usize> = (0..frames).map(|k| k % picture.len()).collect();
     row(
@@ -165,19 +164,6 @@ fn differing(a: &Scene, b: &Scene) -> usize {
     elements
         .filter(|g| old.get(g.id.as_str()) != Some(g))
         .count()
-}
-
-fn tweens(picture: &Picture<'_>, painter: &Painter) {
-    let mut canvas = Canvas::new(painter, 1.0);
-    let steps: Vec<(usize, f64)> = (1..picture.len())
-        .flat_map(|k| [0.2, 0.4, 0.6, 0.8, 1.0].map(|p| (k, p)))
-        .collect();
-    let time = timed(|| {
-        for (k, phase) in &steps {
-            canvas.draw(picture.between(*k, *phase)).unwrap();
-        }
-    });
-    row("tween, five a window", steps.len(), time);
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> Duration {

@@ -69,7 +69,6 @@ fn main() {
     let page = strip(source, &choice.clone().unwrap_or(Choice::Changes), width).unwrap();
     println!("strip: {:?}", page.remarks);
     let options = SequenceOptions {
-        tween: number("TWEEN").unwrap_or(0),
         max_bytes: number("MOST").map(u64::from),
         strip: choice,
         ..SequenceOptions::default()
@@ -107,7 +106,6 @@ fn main() {
     run(&["warm.svg/{n}.svg"]);
     for name in [
         "a.gif",
-        "a.apng",
         "png/{n}.png",
         "webp/{n}.webp",
         "svg/{n}.svg",
@@ -155,10 +153,7 @@ fn worst_psnr(sequence: &Sequence<'_>, path: &Path) -> f64 {
         }
         let pixels = sequence
             .painter
-            .paint(
-                &sequence.picture.scene(frame_time.window, frame_time.phase),
-                1.0,
-            )
+            .paint(&sequence.picture.scene(frame_time.window), 1.0)
             .unwrap();
         let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
         let sum: f64 = canvas.iter().zip(&pixels.rgba).map(square).sum();

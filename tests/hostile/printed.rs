@@ -114,7 +114,7 @@ fn no_name_is_printed_raw() {
 }
 
 /// Every text format that `render` writes to a single file.
-const TEXTS: &[&str] = &["json", "dot", "mmd", "md", "svg", "html", "gexf", "graphml"];
+const TEXTS: &[&str] = &["json", "dot", "mmd", "md", "svg", "html"];
 
 #[test]
 fn no_name_is_raw_in_a_text_on_standard_output() {

@@ -167,53 +167,6 @@ fn ignored_signals_stay_ignored() {
     );
 }
 
-/// Creates a program of this name and text, first in `PATH`.
-fn with_program(folder: &Path, name: &str, text: &str) -> String {
-    use std::os::unix::fs::PermissionsExt as _;
-    let path = folder.join(name);
-    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
-    let others = std::env::var("PATH").unwrap();
-    format!("{}:{others}", folder.display())
-}
-
-#[test]
-fn a_verbose_ffmpeg_does_not_block() {
-    let dir = tempfile::tempdir().unwrap();
-    let bin = tempfile::tempdir().unwrap();
-    let chatter = "head -c 200000 /dev/zero | tr '\\0' x >&2; echo >&2; echo 'last words' >&2";
-    let path = with_program(
-        bin.path(),
-        "ffmpeg",
-        &format!("{chatter}; cat >/dev/null; echo video"),
-    );
-    let args = ["render", COURIER, "-o", "x.mp4", "--size", "320x200"];
-    let output = command(dir.path(), &args)
-        .env("PATH", &path)
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
-    assert_eq!(
-        fs::read_to_string(dir.path().join("x.mp4")).unwrap(),
-        "video\n"
-    );
-    with_program(
-        bin.path(),
-        "ffmpeg",
-        &format!("[ \"$1\" = -version ] && exit; {chatter}; exit 1"),
-    );
-    let output = command(dir.path(), &args)
-        .env("PATH", &path)
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        errors(&output).contains("last words"),
-        "{}",
-        errors(&output)
-    );
-}
-
 /// A mission of a minute has cells of a second: elements that exist throughout must not take memory in each.
 #[cfg(target_os = "linux")]
 #[test]
@@ -231,63 +184,4 @@ fn a_hundred_thousand_nodes_fit_into_memory() {
         .output()
         .unwrap();
     assert_eq!(run.status.code(), Some(0), "{}", errors(&run));
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn an_interrupted_run_leaves_no_ffmpeg() {
-    let dir = tempfile::tempdir().unwrap();
-    let bin = tempfile::tempdir().unwrap();
-    // It ends with its pipe, as ffmpeg does, and says its process id in a file's name.
-    let reads = format!(
-        "[ $# = 1 ] && exit; touch {}/$$.pid; cat > /dev/null",
-        dir.path().display()
-    );
-    let path = with_program(bin.path(), "ffmpeg", &reads);
-    let running = || {
-        let all = names(dir.path()).into_iter();
-        let ids: Vec<String> = all
-            .filter_map(|name| Some(name.strip_suffix(".pid")?.to_owned()))
-            .collect();
-        // A process that ended but was not waited for has no command line.
-        let line = |id: &String| fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
-        ids.iter().filter(|id| !line(id).is_empty()).count()
-    };
-    let await_count = |expected: usize, what: &str| {
-        let begun = Instant::now();
-        while running() != expected {
-            assert!(begun.elapsed() < Duration::from_mins(1), "{what}");
-            std::thread::sleep(Duration::from_millis(10));
-        }
-    };
-    for name in ["INT", "KILL"] {
-        let mut run = command(dir.path(), &["render", COURIER, "--period", "0.05"]);
-        run.args(["-o", "a.mp4", "-o", "b.webm"]);
-        let child = run.env("PATH", &path).spawn().unwrap();
-        await_count(2, "no video begins");
-        signal(&child, name);
-        ended(child);
-        await_count(0, "ffmpeg goes on");
-    }
-    assert!(!dir.path().join("a.mp4").exists() && !dir.path().join("b.webm").exists());
-}
-
-#[test]
-fn an_empty_video_is_an_error() {
-    let dir = tempfile::tempdir().unwrap();
-    let bin = tempfile::tempdir().unwrap();
-    for (then, code, shown) in [
-        ("exit 0", 1, "wrote nothing"),
-        ("echo no such codec >&2; exit 3", 1, "no such codec"),
-        ("echo film", 0, ""),
-    ] {
-        let path = with_program(bin.path(), "ffmpeg", &format!("cat > /dev/null; {then}"));
-        let done = command(dir.path(), &["render", COURIER, "-o", "x.mp4"])
-            .env("PATH", &path)
-            .output()
-            .unwrap();
-        assert_eq!(done.status.code(), Some(code), "{then}: {}", errors(&done));
-        assert!(errors(&done).contains(shown), "{then}: {}", errors(&done));
-        assert_eq!(dir.path().join("x.mp4").exists(), code == 0, "{then}");
-    }
 }

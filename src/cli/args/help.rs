@@ -26,7 +26,7 @@ const HEADINGS: [(&str, &str); 7] = [
     ),
     (
         "Output",
-        "outputs output format include frame_ms tween hold_changes strip max_bytes poster json runs dot_profile link \
+        "outputs output format frame_ms hold_changes strip max_bytes poster json runs dot_profile link \
          fields nested parts undecidable explain",
     ),
     ("Evidence", "topology source source_at infer why"),

@@ -43,9 +43,6 @@ pub(crate) struct RenderArgs {
     pub(crate) form: FigureForm,
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
-    /// Write inferred endpoints to `nodl/`, too.
-    #[arg(long, value_name = "inferred", value_parser = ["inferred"])]
-    pub(crate) include: Option<String>,
     /// Print the time spent in each step.
     #[arg(long)]
     pub(crate) timings: bool,
@@ -112,7 +109,7 @@ pub(crate) struct LookArgs {
     /// Direction of edges.
     #[arg(long, value_name = "LR|TB|auto", default_value = "auto", value_parser = ["LR", "TB", "auto"])]
     pub(crate) orientation: String,
-    /// Layout engine: layered, layout-rs or ring.
+    /// Layout engine: layered or layout-rs.
     #[arg(long, value_name = "ENGINE", default_value = "layered")]
     pub(crate) layout: String,
     /// Reuse the positions of an earlier run's JSON.
@@ -140,16 +137,13 @@ pub(crate) struct SequenceArgs {
     /// Duration of a frame in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=600_000))]
     pub(crate) frame_ms: u32,
-    /// Number of frames inserted at windows with a change.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=60))]
-    pub(crate) tween: u32,
     /// Show windows with a change this many times longer.
     #[arg(long, value_name = "TIMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub(crate) hold_changes: u32,
     /// Draw several windows side by side: a grid `3x2`, `changes`, or window numbers `0,4,9`.
     #[arg(long, value_name = "3x2|changes|N,M,…")]
     pub(crate) strip: Option<String>,
-    /// Limit a GIF's size, such as `5MB`, by dropping tween frames, then resolution, then frames.
+    /// Limit a GIF's size, such as `5MB`, by dropping resolution, then frames.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub(crate) max_bytes: Option<u64>,
     /// Also write the first frame of an animation to this PNG.

@@ -86,11 +86,7 @@ pub(crate) fn write(
 struct DrawnPage {
     /// Its width and height in points.
     size: (f32, f32),
-    /// The size of its scene in pixels.
-    scene: PdfRect,
     content: Vec<u8>,
-    /// The groups that are drawn faded, each with its opacity.
-    faded: Vec<(f32, Vec<u8>)>,
     entry: String,
 }
 
@@ -110,44 +106,15 @@ impl PdfFile {
 
     fn page(&mut self, drawn: &DrawnPage, tree: Ref, fonts: &[(String, Ref)]) -> Ref {
         let [id, content] = self.ids();
-        let faded: Vec<[Ref; 2]> = drawn.faded.iter().map(|_| self.ids()).collect();
         let pdf = &mut self.pdf;
         let mut page = pdf.page(id);
         page.parent(tree)
             .media_box(PdfRect::new(0.0, 0.0, drawn.size.0, drawn.size.1))
             .contents(content);
-        if !faded.is_empty() {
-            let mut group = page.group();
-            group.transparency().isolated(true);
-            group.color_space().device_rgb();
-        }
-        let mut resources = page.resources();
-        add_fonts(&mut resources, fonts);
-        let mut all = resources.x_objects();
-        for (place, [form, _]) in faded.iter().enumerate() {
-            all.pair(Name(name('X', place).as_bytes()), *form);
-        }
-        all.finish();
-        let mut all = resources.ext_g_states();
-        for (place, [_, state]) in faded.iter().enumerate() {
-            all.pair(Name(name('G', place).as_bytes()), *state);
-        }
-        all.finish();
-        resources.finish();
+        add_fonts(&mut page.resources(), fonts);
         page.finish();
         pdf.stream(content, &drawn.content)
             .filter(Filter::FlateDecode);
-        for ([form, state], (opacity, content)) in faded.iter().zip(&drawn.faded) {
-            let mut form = pdf.form_xobject(*form, content);
-            form.filter(Filter::FlateDecode);
-            form.bbox(drawn.scene);
-            form.group().transparency();
-            add_fonts(&mut form.resources(), fonts);
-            form.finish();
-            pdf.ext_graphics(*state)
-                .stroking_alpha(*opacity)
-                .non_stroking_alpha(*opacity);
-        }
         id
     }
 
@@ -209,30 +176,17 @@ impl PdfPen<'_> {
         };
         let size = (f(scene.size.w * per_px), f(scene.size.h * per_px));
         let mut content = Content::new();
-        let (mut faded, scale) = (Vec::new(), f(per_px));
+        let scale = f(per_px);
         content.transform([scale, 0.0, 0.0, -scale, 0.0, size.1]);
         let all = Rect::new(0.0, 0.0, scene.size.w, scene.size.h);
         let ground = Shape::filled(Form::Rect(all, 0.0), scene.background);
         shape(&mut content, &ground);
         for group in &scene.groups {
-            if group.fade.0 >= 1.0 {
-                self.group(&mut content, group);
-                continue;
-            }
-            let mut own = Content::new();
-            self.group(&mut own, group);
-            content
-                .save_state()
-                .set_parameters(Name(name('G', faded.len()).as_bytes()))
-                .x_object(Name(name('X', faded.len()).as_bytes()))
-                .restore_state();
-            faded.push((f(group.fade.0.clamp(0.0, 1.0)), zlib(&own.finish(), 6)));
+            self.group(&mut content, group);
         }
         DrawnPage {
             size,
-            scene: PdfRect::new(0.0, 0.0, f(scene.size.w), f(scene.size.h)),
             content: zlib(&content.finish(), 6),
-            faded,
             entry,
         }
     }

@@ -80,10 +80,6 @@ pub(super) fn write_group(xml: &mut Xml, group: &Group, fonts: Option<&Fonts>) {
         xml.attribute(format_args!("data-{key}"), value);
     }
     xml.attribute("id", &group.id);
-    if group.fade.0 < 1.0 {
-        // To a hundredth: finer steps are invisible, and a nearly invisible group vanishes.
-        xml.attribute("opacity", hundredth(group.fade.0.max(0.0)));
-    }
     xml.leaf("title", &group.title);
     for piece in &group.pieces {
         match piece {

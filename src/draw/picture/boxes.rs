@@ -145,7 +145,6 @@ impl Boxes<'_> {
             id: format!("{}..title", space.id),
             class: "namespace-title".to_owned(),
             data: space.data.clone(),
-            fade: space.fade,
             ..Group::default()
         };
         if let Some(Piece::Text(text)) = space.pieces.pop() {

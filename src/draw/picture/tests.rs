@@ -195,38 +195,6 @@ fn a_glow_is_below_all_lines() {
 }
 
 #[test]
-fn a_tween_fades_without_movement() {
-    with_picture(&MISSION, "light", PageOptions::default(), |p| {
-        assert_eq!(p.between(2, 1.0), p.scene(2));
-        assert_eq!(p.between(0, 0.5), p.scene(0));
-        let fade = |phase: f64, id: &str| {
-            let scene = p.between(2, phase);
-            scene.groups.iter().find(|g| g.id == id).map(|g| g.fade.0)
-        };
-        assert_eq!(fade(0.3, "n-teleop"), None, "new elements appear last");
-        let half = fade(0.8, "n-teleop").unwrap();
-        assert!((half - 0.5).abs() < 0.01, "{half}");
-        assert_eq!(
-            fade(0.5, "n-base-driver"),
-            Some(1.0),
-            "unchanged elements do not move"
-        );
-        let went = |phase: f64| {
-            p.between(3, phase)
-                .groups
-                .iter()
-                .find(|g| g.id == "n-cam")
-                .map(|g| g.fade.0)
-        };
-        assert!(went(0.2).is_some_and(|f| f > 0.5) && went(0.5).is_none());
-        let (before, after) = (p.scene(1), p.scene(2));
-        let forms = |scene: &Scene| -> Vec<Form> { scene.groups.iter().filter_map(body).collect() };
-        let known: Vec<Form> = forms(&before).into_iter().chain(forms(&after)).collect();
-        assert!(forms(&p.between(2, 0.45)).iter().all(|f| known.contains(f)));
-    });
-}
-
-#[test]
 fn incremental_frames_equal_fully_drawn_ones() {
     let painter = Painter::new(&Fonts::bundled());
     let options = PageOptions {
@@ -235,12 +203,11 @@ fn incremental_frames_equal_fully_drawn_ones() {
     };
     with_picture(&MISSION, "light", options, |p| {
         let mut canvas = Canvas::new(&painter, 1.0);
-        let steps = (0..p.len()).flat_map(|k| [0.2, 0.45, 0.7, 1.0].map(|phase| (k, phase)));
-        for (k, phase) in steps {
-            let scene = p.between(k, phase);
+        for k in 0..p.len() {
+            let scene = p.scene(k);
             assert!(
                 *canvas.draw(scene.clone()).unwrap().pixels == painter.paint(&scene, 1.0).unwrap(),
-                "{k} {phase}"
+                "{k}"
             );
         }
     });

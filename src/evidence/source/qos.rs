@@ -16,19 +16,6 @@ struct Offer {
     history: String,
 }
 
-/// The index in `known` of the first of these words in a quality of service.
-pub(crate) fn policy(quality: Option<&str>, known: [&str; 2]) -> Option<usize> {
-    let mut words = quality.unwrap_or_default().split([' ', ',']);
-    words.find_map(|word| known.iter().position(|k| *k == word))
-}
-
-/// The depth in a quality of service.
-pub(crate) fn depth(quality: Option<&str>) -> Option<u32> {
-    let mut words = quality.unwrap_or_default().split([' ', ',']);
-    words.find(|word| *word == "depth")?;
-    words.next()?.parse().ok()
-}
-
 /// Whether a topic's messages are kept for late subscribers.
 pub(crate) fn is_transient_local(text: &str) -> bool {
     let offers = offers(text);

@@ -35,11 +35,7 @@ const SAMPLES: usize = 12;
 #[derive(Clone, Copy)]
 pub(crate) struct FrameWant {
     pub(crate) needs: Needs,
-    /// Whether it receives staged frames too.
-    pub(crate) plays: bool,
     pub(crate) pack: Pack,
-    /// Bytes of a packet per pixel, at most.
-    pub(crate) density: f64,
 }
 
 /// A frame, drawn and packed.
@@ -145,9 +141,10 @@ impl<'a> RasterPool<'a> {
         let cores = self.threads;
         let scale = self.sequence.options.scale;
         let pixels = self.page.w * self.page.h * scale * scale;
-        let density: f64 = self.wants.iter().map(|want| want.density).sum();
+        // A packet has at most a byte per pixel.
+        let outputs = self.wants.len() as f64;
         let fits =
-            |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * density <= MOST_BYTES;
+            |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * outputs <= MOST_BYTES;
         let most = (1..=MOST_IN_A_ROW).rev().find(fits).unwrap_or(1);
         // Equally many rows per core, so that none waits for the last.
         let rows = count.div_ceil(most * cores).max(1) * cores;
@@ -158,7 +155,7 @@ impl<'a> RasterPool<'a> {
 
     fn scene(&self, frame_time: FrameTime) -> Scene {
         let picture = self.sequence.picture;
-        picture.scene(frame_time.window, frame_time.phase)
+        picture.scene(frame_time.window)
     }
 
     /// A palette from a few frames.
@@ -258,13 +255,9 @@ impl<'a> Drawer<'a> {
             indices: &self.indices,
             before: if at == 0 { &[] } else { &self.before },
         };
-        let pack = |want: &FrameWant| {
-            let is_wanted = frame_time.is_settled() || want.plays;
-            match want.needs {
-                Needs::Nothing => Ok(Packet::Nothing),
-                _ if !is_wanted => Ok(Packet::Nothing),
-                _ => (want.pack)(&frame),
-            }
+        let pack = |want: &FrameWant| match want.needs {
+            Needs::Nothing => Ok(Packet::Nothing),
+            _ => (want.pack)(&frame),
         };
         let packets = || wants.iter().map(pack).collect::<Result<_>>();
         Ok(Packed {

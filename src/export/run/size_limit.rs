@@ -1,4 +1,4 @@
-//! `--max-bytes`: drops staged frames, then resolution, then windows, until an animation is small enough.
+//! `--max-bytes`: drops resolution, then windows, until an animation is small enough.
 
 use super::{Progress, Steps, pass};
 use crate::base::error::{Error, Result};
@@ -42,19 +42,11 @@ pub(crate) fn fit(
 
 /// The options that are tried, in order.
 fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
-    let plain = SequenceOptions {
-        tween: 0,
-        ..asked.clone()
-    };
     let scaled = |by: f64| SequenceOptions {
         scale: asked.scale * by,
-        ..plain.clone()
+        ..asked.clone()
     };
-    let mut steps = Vec::new();
-    if asked.tween > 0 {
-        steps.push(plain.clone());
-    }
-    steps.extend(SCALES.map(scaled));
+    let mut steps = SCALES.map(scaled).to_vec();
     let smallest = scaled(SCALES[SCALES.len() - 1]);
     steps.extend(EVERY.map(|every| SequenceOptions {
         every,
@@ -70,9 +62,6 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
 /// What was dropped between `asked` and `now`, as text.
 fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
-    if now.tween < asked.tween {
-        words.push("left out the staged frames".to_owned());
-    }
     if now.scale < asked.scale {
         words.push(format!(
             "scaled to {:.0} %",
@@ -96,18 +85,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn motion_goes_first_then_size_then_windows() {
+    fn size_goes_first_then_windows() {
         let asked = SequenceOptions {
-            tween: 4,
             max_bytes: Some(5000),
             ..SequenceOptions::default()
         };
         let steps = steps(&asked);
-        assert_eq!(
-            (steps[0].tween, steps[0].scale, steps[0].every),
-            (0, 1.0, 1)
-        );
-        assert!(steps.iter().skip(1).all(|s| s.tween == 0 && s.scale < 1.0));
+        assert!(steps.iter().all(|s| s.scale < 1.0));
         let first_left_out = steps.iter().position(|s| s.every > 1).unwrap();
         assert!(steps[..first_left_out].iter().any(|s| s.scale <= 0.5));
         assert!(steps[steps.len() - 1].changes_only);
@@ -116,16 +100,14 @@ mod tests {
     #[test]
     fn reductions_are_reported() {
         let asked = SequenceOptions {
-            tween: 4,
             max_bytes: Some(5000),
             ..SequenceOptions::default()
         };
         let now = SequenceOptions {
-            tween: 0,
             scale: 0.7,
             ..asked.clone()
         };
-        let expected = "left out the staged frames, scaled to 70 % to stay within 5000 bytes";
+        let expected = "scaled to 70 % to stay within 5000 bytes";
         assert_eq!(given_up(&asked, &now), expected);
     }
 }

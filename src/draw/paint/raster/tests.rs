@@ -1,6 +1,6 @@
 use super::*;
 use crate::base::geometry::{Point, Rect, Size};
-use crate::draw::scene::{Anchor, Fade, Form, Shape, Step, Stroke, Text};
+use crate::draw::scene::{Anchor, Form, Shape, Step, Stroke, Text};
 use crate::draw::style::Style;
 use crate::draw::text::Weight;
 
@@ -42,7 +42,6 @@ fn element(id: usize, at: usize) -> Group {
     let x = (at * 37 % 170) as f64 + 0.3;
     let y = (at * 53 % 100) as f64 + 0.7;
     let mut group = Group::named(&format!("e{id}"));
-    group.fade = Fade(if at.is_multiple_of(5) { 0.5 } else { 1.0 });
     let curve = [
         Point::new(x, 0.0),
         Point::new(199.0, y),
