@@ -26,7 +26,7 @@ pub(crate) mod target;
 mod tex;
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::base::error::{Error, Result};
 
@@ -136,14 +136,6 @@ pub const FORMATS: &[OutputFormat] = &[
     },
 ];
 
-/// A single image of the first window, in addition to an animation.
-const POSTER: &OutputFormat = &OutputFormat {
-    word: "png",
-    what: "the first window as an image",
-    start: still::start_poster,
-    ..PICTURE
-};
-
 /// Begins SVG: single drawings if requested, otherwise an animation.
 fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
     let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
@@ -164,14 +156,6 @@ pub struct Output {
 }
 
 impl Output {
-    /// The poster: the first window as a PNG image.
-    pub fn poster(path: &Path) -> Self {
-        Self {
-            format: POSTER,
-            target: Target::Path(path.to_owned()),
-        }
-    }
-
     /// Parses an output: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
     /// name's extension.
     ///

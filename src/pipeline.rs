@@ -56,7 +56,7 @@ pub use survey::{Survey, is_survey, survey, survey_file};
 pub(crate) use {export::check as check_outputs, read::mission_file};
 
 worded! {
-    /// A stage of the work, for progress and timings.
+    /// A stage of the work, for progress.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     #[non_exhaustive]
     pub enum Stage {
@@ -85,9 +85,6 @@ pub trait Watch {
 
     /// A note for the user before the next stage begins, in a sentence.
     fn note(&mut self, _text: &str) {}
-
-    /// The shares of the stage's time: the names of its steps and the share of each, 0..=1, largest first.
-    fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
 
     /// Whether to stop as soon as possible, leaving no partial files.
     fn stopped(&self) -> bool {

@@ -53,7 +53,7 @@ pub use frame::{Frame, Headline, Phrase};
 pub use lasting::Lasting;
 pub use looks::{Looks, TopicRow};
 pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
-pub use options::{Grouping, Hide, LineWidth, Mode, ViewOptions};
+pub use options::{Grouping, Hide, Mode, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown};
 
@@ -268,8 +268,6 @@ pub struct Arrow {
     pub topics: Vec<Arc<str>>,
     /// Whether it represents only calls of services.
     pub is_service: bool,
-    /// The mean payload of its messages in kilobytes, 0 where unknown, if its thickness shows bytes per second.
-    pub kilobytes: Option<f64>,
 }
 
 impl Arrow {
@@ -281,7 +279,7 @@ impl Arrow {
 
     /// The number that determines its thickness: messages or kilobytes per second.
     pub(crate) fn flow(&self, shown: &Shown) -> Option<f64> {
-        shown.steady_hz.map(|hz| hz * self.kilobytes.unwrap_or(1.0))
+        shown.steady_hz
     }
 
     /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those

@@ -122,7 +122,7 @@ fn run(
         strip: None,
         options,
     };
-    run::run(&sequence, outputs, &run::Steps::default(), progress)
+    run::run(&sequence, outputs, progress)
 }
 
 fn png(path: &Path) -> image::RgbImage {
@@ -325,19 +325,6 @@ fn a_pdf_has_a_page_per_window_that_looks_like_the_image() {
         assert!(psnr(&still, &page) > 25.0, "page {k}");
     }
     assert!(!folder.path().join("page-9.png").exists());
-}
-
-#[test]
-fn a_poster_is_the_first_image() {
-    let folder = tempfile::tempdir().unwrap();
-    show(folder.path(), &["p{n}.png"], SequenceOptions::default()).unwrap();
-    let poster = Output::poster(&folder.path().join("poster.png"));
-    let written = shown(&[poster], SequenceOptions::default()).unwrap();
-    assert_eq!(written[0].files, 1);
-    assert_eq!(
-        png(&folder.path().join("poster.png")),
-        png(&folder.path().join("p0.png"))
-    );
 }
 
 #[test]

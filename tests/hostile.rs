@@ -142,7 +142,6 @@ fn user_files_are_not_overwritten() {
         ],
         &["render", COURIER, "--layout-from", "x.json", "-o", "x.json"],
         &["render", COURIER, "-o", "a{n}.svg", "-o", "a0.svg"],
-        &["render", COURIER, "-o", "a.gif", "--poster", "./a.gif"],
         &["render", COURIER, "-o", "a.gif", "-o", "new/../a.gif"],
         &[
             "render", COURIER, "--source", ".", "-o", "s.toml", "--format", "json",

@@ -295,11 +295,7 @@ fn the_marks_of_frames_strips_and_pages_are_events_too() {
         let at = bag.display().to_string();
         let frames = rendered(&bag, &["--period", "60"], "frame{n}.svg").unwrap();
         shown(&log, &frames, &at);
-        if let Some(strip) = rendered(
-            &bag,
-            &["--view", "graph", "--strip", "changes"],
-            "strip.svg",
-        ) {
+        if let Some(strip) = rendered(&bag, &["--view", "graph", "--strip", "3x2"], "strip.svg") {
             shown(&log, &strip, &at);
         }
         let html = rendered(&bag, &["--period", "60"], "page.html").unwrap();

@@ -335,14 +335,6 @@ fn overlapping_windows_are_shown_with_their_own_spans() {
     assert!(frame.contains(">0:05 – 0:15<"), "{frame}");
 }
 
-#[test]
-fn merged_windows_are_shown_with_their_own_spans() {
-    let (data, mission, frame) = divided(&["--period", "2", "--skip-unchanged"]);
-    holds_its_windows(&data, &mission);
-    assert!(data["starts"].as_array().unwrap().len() < 30);
-    assert!(frame.contains(">0:08 – 0:18<"), "{frame}");
-}
-
 /// The value of a run list in a window.
 fn value_at(list: &Value, window: u64) -> usize {
     let (mut from, mut value) = (0, 0);

@@ -258,7 +258,7 @@ fn results_fit_the_terminal() {
             "check C --expect expected.yaml",
             "check --explain topic-gap",
             "render W -o x.svg",
-            "render C -o x.svg --view board --line-width bytes",
+            "render C -o x.svg --view board --collapse /nav",
         ] {
             let on = if line.starts_with("render") {
                 On::Errors
@@ -550,7 +550,7 @@ fn routine_notes_are_one_line_unless_verbose() {
     assert!(said[1].starts_with("wrote x.svg: "), "{said:?}");
     let all = notes(&["-v"]);
     assert!(
-        all.len() > 2 && all.iter().any(|line| line.contains("--show-recorder")),
+        all.len() > 2 && all.iter().any(|line| line.contains("--hide none")),
         "{all:?}"
     );
     assert_eq!(notes(&["-q"]), [""; 0]);

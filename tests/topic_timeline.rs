@@ -95,7 +95,7 @@ fn the_user_chooses_between_graph_and_topic_timeline() {
     for flags in [
         &["--view", "board", "--orientation", "TB"][..],
         &["--view", "board", "--collapse", "/nav"],
-        &["--view", "board", "--strip", "changes"],
+        &["--view", "board", "--strip", "3x2"],
         &["--view", "board", "--figure", "lives"],
     ] {
         let (_folder, done) = rendered("courier.mcap", flags, &["x.svg"]);

@@ -276,20 +276,9 @@ fn a_cut_is_refused_if_inapplicable() {
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json").display().to_string();
     assert!(bagreel(&["render", &bag, "-o", &json, "-q"], b"").0);
-    let refused: [&[&str]; 5] = [
+    let refused: [&[&str]; 4] = [
         &[
             "render", &bag, "--cut", "phases", "--period", "5", "-o", "-", "--format", "json",
-        ],
-        &[
-            "render",
-            &bag,
-            "--cut",
-            "changes",
-            "--skip-unchanged",
-            "-o",
-            "-",
-            "--format",
-            "json",
         ],
         &[
             "render", &bag, "--cut", "phases", "--phases", "none", "-o", "-", "--format", "json",

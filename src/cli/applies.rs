@@ -69,8 +69,7 @@ impl Asked<'_> {
 
 /// Whether the output is a figure.
 pub(super) fn is_figure(args: &RenderArgs, output: &Output) -> bool {
-    (args.figure.is_some() || args.sequence.draws_steps())
-        && output.format.whole != OneDrawing::Never
+    args.figure.is_some() && output.format.whole != OneDrawing::Never
 }
 
 /// Whether the output is drawn; a report is text around its own chart.
@@ -85,7 +84,7 @@ fn is_data(output: &Output) -> bool {
 
 const RULES: &[AppliesTo] = &[
     AppliesTo {
-        options: "style view for size line-width fit expand orientation layout layout-from font",
+        options: "style view for size fit expand orientation layout layout-from font",
         takes: |_, output| is_picture(output),
         what: "it applies to pictures, such as `x.gif`",
     },
@@ -118,7 +117,7 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
     },
     AppliesTo {
-        options: "mode ns-filter topic-filter hide group collapse show-recorder rqt-defaults",
+        options: "mode ns-filter topic-filter hide group collapse rqt-defaults",
         takes: |asked, output| !is_data(output) || asked.args.view.filtered,
         what: "data files contain the whole graph; `--filtered` writes what a picture would show",
     },
@@ -136,11 +135,6 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to animations: `x.gif`, `x.svg`",
     },
     AppliesTo {
-        options: "hold-changes",
-        takes: |_, output| output.format.word == "gif",
-        what: "it applies to `x.gif`",
-    },
-    AppliesTo {
         options: "strip",
         takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
         what: "it applies to pictures of the whole mission: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
@@ -154,11 +148,6 @@ const RULES: &[AppliesTo] = &[
         options: "dot-profile",
         takes: |_, output| output.format.word == "dot",
         what: "it applies to `x.dot`",
-    },
-    AppliesTo {
-        options: "bytes",
-        takes: |_, output| ["json", "csv", "parquet"].contains(&output.format.word),
-        what: "data contains sizes: `x.json`, `x.csv`",
     },
     AppliesTo {
         options: "link",
@@ -177,12 +166,8 @@ const RULES: &[AppliesTo] = &[
     },
 ];
 
-/// Options that have no effect on figures.
-const NOT_OF_FIGURES: &str = "style size line-width fit orientation layout layout-from mode hide group collapse expand rqt-defaults \
-    show-recorder title";
-
 /// Options that ask for windows one after the other.
-const OF_FILMS: &str = "period step align skip-unchanged cut frame-ms hold-changes max-bytes poster strip figure \
+const OF_FILMS: &str = "period step align cut frame-ms max-bytes strip figure \
     captions phases format";
 
 /// Whether a mission without changes may become a single picture: no output is given, or it is a single picture, and no
@@ -196,11 +181,6 @@ pub(super) fn allows_still(given: &Given, outputs: &[Output]) -> bool {
 /// Refuses options that apply to none of the outputs.
 pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
     let asked = Asked { args };
-    if args.sequence.draws_steps() {
-        let what = "has no effect on `--strip changes`, which draws steps";
-        let hint = "`--strip 3x2` puts windows side by side, each as a whole";
-        given.refuse(NOT_OF_FIGURES, what, hint)?;
-    }
     for rule in RULES {
         if !outputs.iter().any(|output| (rule.takes)(&asked, output)) {
             let names = outputs.iter();
@@ -235,7 +215,8 @@ pub(super) fn check_figure(outputs: &[Output]) -> Result<()> {
 }
 
 /// Options for how bags are read and windows cut: a mission's JSON contains windows already.
-const OF_BAGS: &str = "offset ns verify period step start end align skip-unchanged cut grace roles topology source infer bytes";
+const OF_BAGS: &str =
+    "offset ns verify period step start end align cut grace topology source infer";
 
 /// Refuses options about bags if the input is a mission's JSON.
 pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
@@ -250,7 +231,7 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
 }
 
 /// Options that define windows.
-const OF_WINDOWS: &str = "period step align skip-unchanged cut grace";
+const OF_WINDOWS: &str = "period step align cut grace";
 
 /// The note for an option about windows given for `what`, which uses continuous time; `None` without one. It is not an
 /// error: scripts request the log and pictures with the same options.

@@ -117,8 +117,6 @@ pub(super) struct InfoArgs {
     pub(super) why: Vec<String>,
     #[command(flatten)]
     pub(super) graph: GraphArgs,
-    #[command(flatten)]
-    pub(super) sizes: SizeArgs,
 }
 
 #[cfg(feature = "pdf")]
@@ -152,9 +150,9 @@ pub(super) struct EventsArgs {
     #[arg(long)]
     pub(super) phases: bool,
     #[command(flatten)]
-    pub(super) time: TimeArgs,
+    pub(super) range: RangeArgs,
     #[command(flatten)]
-    pub(super) change: ChangeArgs,
+    pub(super) rate: RateArgs,
     #[command(flatten)]
     pub(super) graph: GraphArgs,
 }
@@ -187,12 +185,8 @@ pub(super) struct ExtractArgs {
     /// Topics to export, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(super) topic_filter: Option<String>,
-    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(super) start: Option<Moment>,
-    /// End time, in the same forms as `--start`.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(super) end: Option<Moment>,
+    #[command(flatten)]
+    pub(super) range: RangeArgs,
 }
 
 const EXTRACT_HELP: &str = "Columns without `--fields`: time_ns, topic, type, publisher, size_bytes; rows are sorted by time.";
@@ -247,6 +241,17 @@ pub(super) struct Inputs {
     pub(super) offset: Vec<(PathBuf, i64)>,
 }
 
+/// The part of a recording.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub(super) struct RangeArgs {
+    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) start: Option<Moment>,
+    /// End time, in the same forms as `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) end: Option<Moment>,
+}
+
 #[derive(Debug, Default, Args)]
 pub(super) struct TimeArgs {
     /// Length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s, shorter for bags below
@@ -256,47 +261,34 @@ pub(super) struct TimeArgs {
     /// Time from one window's start to the next; windows overlap if it is below `--period`. [default: the period]
     #[arg(long, value_parser = period)]
     pub(super) step: Option<Period>,
-    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(super) start: Option<Moment>,
-    /// End time, in the same forms as `--start`.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(super) end: Option<Moment>,
     /// Align windows with the first message (`bag`) or with whole periods of UTC (`clock`).
     #[arg(long, value_parser = align, value_name = "bag|clock", default_value = "bag")]
     pub(super) align: Align,
-    /// Merge consecutive windows with equal graphs.
-    #[arg(long)]
-    pub(super) skip_unchanged: bool,
     /// Make one window per phase or per reconfiguration instead of per period.
-    #[arg(long, value_parser = cut, value_name = "phases|changes", conflicts_with_all = ["period", "step", "align", "skip_unchanged"])]
+    #[arg(long, value_parser = cut, value_name = "phases|changes", conflicts_with_all = ["period", "step", "align"])]
     pub(super) cut: Option<Cut>,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ChangeArgs {
-    /// Report rates that change by more than this fraction.
-    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
-    pub(super) rate_change: f64,
     /// Number of silent windows before an element counts as gone.
     #[arg(long, value_name = "WINDOWS", default_value_t = 0)]
     pub(super) grace: u32,
 }
 
-impl Default for ChangeArgs {
+#[derive(Debug, Args)]
+pub(super) struct RateArgs {
+    /// Report rates that change by more than this fraction.
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
+    pub(super) rate_change: f64,
+}
+
+impl Default for RateArgs {
     fn default() -> Self {
         Self {
             rate_change: RATE_CHANGE,
-            grace: 0,
         }
     }
 }
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct GraphArgs {
-    /// Compare nodes by role: ignore the suffixes of anonymous names.
-    #[arg(long)]
-    pub(super) roles: bool,
     /// Add nodes and edges from a CSV, YAML, MCAP (`/rosgraph`) or launch file, or from DOT saved by rqt_graph.
     #[arg(long, value_name = "FILE")]
     pub(super) topology: Vec<PathBuf>,
@@ -311,11 +303,4 @@ pub(super) struct GraphArgs {
     /// from source code.
     #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
-}
-
-#[derive(Debug, Default, Args)]
-pub(super) struct SizeArgs {
-    /// Read the size of every message, even if the index does not contain it.
-    #[arg(long)]
-    pub(super) bytes: bool,
 }

@@ -60,8 +60,8 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
         nested: args.nested,
         topics: NameFilter::parse(args.topic_filter.as_deref().unwrap_or_default())?,
         msg_paths: args.msg_path.clone(),
-        start: args.start,
-        end: args.end,
+        start: args.range.start,
+        end: args.range.end,
     })
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::args::follow::{FollowArgs, FollowFormat};
-use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use super::reading::reading;
 use super::render;
 use super::show::NO_EVENTS;
@@ -85,7 +85,8 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let reading = reading(
         &inputs,
         &time,
-        &ChangeArgs::default(),
+        RangeArgs::default(),
+        &RateArgs::default(),
         &GraphArgs::default(),
     )?;
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
@@ -210,7 +211,7 @@ impl Follower<'_> {
         let mut done = DONE;
         if !job.outputs.is_empty() {
             let rendered = crate::pipeline::render(&job, terminal)?;
-            render::report(&rendered, false, terminal);
+            render::report(&rendered, terminal);
             done = code(&rendered.mission);
         }
         let Some(expect) = &self.args.expect else {

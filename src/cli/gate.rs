@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::applies::{self, Given};
 use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
-use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use super::args::{GraphArgs, Inputs, RateArgs, TimeArgs};
 use super::reading::reading;
 use super::render::summary;
 use super::terminal::Terminal;
@@ -267,13 +267,11 @@ fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Readin
         bags: bags.to_vec(),
         ..Inputs::default()
     };
-    let time = TimeArgs {
+    let windows = TimeArgs {
         period: time.period,
-        start: time.start,
-        end: time.end,
         ..TimeArgs::default()
     };
-    reading(&inputs, &time, &ChangeArgs::default(), graph)
+    reading(&inputs, &windows, time.range, &RateArgs::default(), graph)
 }
 
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.

@@ -16,7 +16,7 @@ use crate::export::options::{self, FigureOptions, Profile};
 use crate::layout::Orientation;
 use crate::mission::{Places, read_json};
 use crate::pipeline::{Body, Phases};
-use crate::view::{Grouping, Hide, LineWidth, Mode, NameFilter, ViewOptions};
+use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// The view options: `rqt_graph`'s defaults or ours, modified by the given options.
 pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
@@ -43,14 +43,7 @@ pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     let names = |names: &[String]| names.iter().map(|n| Arc::from(n.as_str())).collect();
     view.collapse = names(&args.collapse);
     view.expand = names(&args.expand);
-    view.show_recorder = args.show_recorder;
     Ok(view)
-}
-
-/// The number that the thickness of lines shows.
-pub(super) fn line_width(args: &LookArgs) -> LineWidth {
-    let word = args.line_width.as_deref();
-    word.and_then(LineWidth::from_word).unwrap_or_default()
 }
 
 /// A built-in style by its name, else a file.
@@ -99,11 +92,9 @@ pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
 }
 
 pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> {
-    let strip = args.strip.as_deref().filter(|_| !args.draws_steps());
-    let strip = strip.map(options::Choice::parse);
+    let strip = args.strip.as_deref().map(options::Choice::parse);
     Ok(options::SequenceOptions {
         frame_ms: args.frame_ms,
-        hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,
         json: match args.json.as_deref() {
@@ -128,9 +119,7 @@ pub(super) fn body(args: &RenderArgs) -> Result<Body> {
         ("--collapse", !view.collapse.is_empty()),
         ("--expand", !view.expand.is_empty()),
         ("--rqt-defaults", view.rqt_defaults),
-        ("--show-recorder", view.show_recorder),
         ("--orientation", look.orientation != "auto"),
-        ("--line-width", look.line_width.is_some()),
         ("--layout", look.layout != "layered"),
         ("--layout-from", look.layout_from.is_some()),
         ("--strip", args.sequence.strip.is_some()),
@@ -176,10 +165,7 @@ pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Resul
     })
 }
 
-/// The default width of the steps that `--strip changes` draws, in millimetres.
-const STEPS_MM: f64 = 181.0;
-
-/// The figure in the options of `render`, which are those of `bagreel figure`; for `--strip changes`, the steps.
+/// The figure in the options of `render`, which are those of `bagreel figure`.
 pub(super) fn old_figure(args: &RenderArgs) -> Result<Option<FigureOptions>> {
     let form = &args.form;
     let typed = [
@@ -197,11 +183,7 @@ pub(super) fn old_figure(args: &RenderArgs) -> Result<Option<FigureOptions>> {
             format!("`{flag}` is an option of figures"),
             "`bagreel figure BAG -o fig.pdf` draws one",
         )),
-        (None, None) => Ok(args.sequence.draws_steps().then(|| FigureOptions {
-            kind: FigureKind::Steps,
-            width_mm: args.look.width.unwrap_or(STEPS_MM),
-            ..FigureOptions::default()
-        })),
+        (None, None) => Ok(None),
     }
 }
 

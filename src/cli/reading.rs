@@ -1,6 +1,6 @@
 //! From input options to a reading.
 
-use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
+use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::evidence::code::{SourceCode, Version};
@@ -12,7 +12,8 @@ use crate::pipeline::{Phases, Reading};
 pub(super) fn reading(
     inputs: &Inputs,
     time: &TimeArgs,
-    change: &ChangeArgs,
+    range: RangeArgs,
+    rate: &RateArgs,
     graph: &GraphArgs,
 ) -> Result<Reading, Error> {
     let infers = |what: &str| graph.infer.iter().any(|word| word == what);
@@ -24,12 +25,11 @@ pub(super) fn reading(
         division: Division {
             length: time.period.unwrap_or(Length::Auto),
             step: time.step,
-            start: time.start,
-            end: time.end,
+            start: range.start,
+            end: range.end,
             align: time.align,
             cut: time.cut,
         },
-        skip_unchanged: time.skip_unchanged,
         is_still_if_unchanged: false,
         collect: collector::CollectOptions {
             infer_stamps: infers("stamps"),
@@ -40,14 +40,13 @@ pub(super) fn reading(
             },
             ..collector::CollectOptions::default()
         },
-        grace: change.grace as usize,
+        grace: time.grace as usize,
         conclude: conclude::ConcludeOptions {
-            roles: graph.roles,
             topology: given::read_all(&graph.topology)?,
             code: None,
         },
         code: source_code(graph)?,
-        rate_change: change.rate_change,
+        rate_change: rate.rate_change,
         phases: Phases::Found,
     })
 }

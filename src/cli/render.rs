@@ -4,22 +4,22 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::applies::{self, Given};
+use super::args::TimeArgs;
 use super::args::figure::FigureArgs;
 use super::args::render::RenderArgs;
-use super::args::{ChangeArgs, TimeArgs};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{code, look};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::notice::NoticeKind;
-use crate::base::{budget, file, words};
+use crate::base::words;
 use crate::export::Output;
 use crate::export::options::FigureOptions;
 use crate::export::target::Target;
 use crate::mission::Mission;
-use crate::pipeline::{Drawing, Purpose, Render, Rendered, Watch as _, read};
-use crate::view::{LineWidth, NameFilter, ViewOptions};
+use crate::pipeline::{Drawing, Purpose, Render, Rendered};
+use crate::view::NameFilter;
 
 /// Reads once and writes every output.
 pub(super) fn render(
@@ -27,15 +27,13 @@ pub(super) fn render(
     given: &Given,
     terminal: &mut Terminal,
 ) -> Result<u8, Error> {
-    let mut job = job(args, given)?;
+    let job = job(args, given)?;
     if let Some(kind) = &args.figure {
         let kind = format!("`bagreel figure --kind {kind}`");
         terminal.note(&format!(
             "`render --figure` will be removed; {kind} draws the same"
         ));
     }
-    let shows_bytes = job.drawing.view.line_width == LineWidth::Bytes;
-    job.reading.collect.sizes = args.sizes.bytes || shows_bytes;
     applies::check_outputs(given, args, &job.outputs)?;
     crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
@@ -48,11 +46,8 @@ pub(super) fn render(
         terminal.note(&note);
     }
     make_room(&job, terminal);
-    if args.watch {
-        return watch(args, job, terminal);
-    }
     let done = crate::pipeline::render(&job, terminal)?;
-    report(&done, args.timings, terminal);
+    report(&done, terminal);
     Ok(code(&done.mission))
 }
 
@@ -84,16 +79,8 @@ pub(super) fn figure(
 
 /// The job of `figure`.
 fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
-    let time = TimeArgs {
-        start: args.start,
-        end: args.end,
-        ..TimeArgs::default()
-    };
-    let change = ChangeArgs {
-        rate_change: args.rate_change,
-        ..ChangeArgs::default()
-    };
-    let reading = reading(&args.inputs, &time, &change, &args.graph)?;
+    let time = TimeArgs::default();
+    let reading = reading(&args.inputs, &time, args.range, &args.rate, &args.graph)?;
     let reading = reading.with_phases(look::phases(&args.phases.phases, None)?);
     let outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
@@ -110,7 +97,7 @@ fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
     let filter = |text: &Option<String>| NameFilter::parse(text.as_deref().unwrap_or_default());
     drawing.view.ns_filter = filter(&args.ns_filter)?;
     drawing.view.topic_filter = filter(&args.topic_filter)?;
-    drawing.page.rate_change = args.rate_change;
+    drawing.page.rate_change = args.rate.rate_change;
     drawing.page.width_mm = args.width;
     let kept = [args.font.clone(), Some(PathBuf::from(&args.phases.phases))];
     let figure = look::figure(&args.kind, &args.form, args.width)?;
@@ -128,46 +115,12 @@ fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
     Ok(job)
 }
 
-/// Draws again whenever the style file changes, until interrupted. The bag is read once.
-fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<u8, Error> {
-    let mission = read(&job.reading, terminal)?;
-    let path = PathBuf::from(&args.look.style);
-    if !path.is_file() {
-        return Err(Error::usage(
-            "`--watch` watches a style file",
-            "`bagreel styles light > mine.toml`, then `--style mine.toml`",
-        ));
-    }
-    let mut seen = None;
-    while !terminal.stopped() {
-        let now = file::read_text(&path, budget::USER_TEXT).ok();
-        if now == seen {
-            terminal.wait();
-            continue;
-        }
-        seen = now;
-        let style = look::style(&args.look.style);
-        let drawn = style.and_then(|style| {
-            job.drawing.style = style;
-            crate::pipeline::show(&job, mission.clone(), terminal)
-        });
-        match drawn {
-            Ok(done) => report(&done, args.timings, terminal),
-            Err(error) => terminal.error(&error),
-        }
-    }
-    Ok(code(&mission))
-}
-
 /// Prints the files written, the number of windows and changes, and the time taken.
-pub(super) fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+pub(super) fn report(done: &Rendered, terminal: &mut Terminal) {
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
     }
     terminal.notices(&done.notices);
-    if timings {
-        terminal.timings();
-    }
     let windows = format!("{}, ", division(&done.mission));
     wrote(done, &windows, terminal);
 }
@@ -199,10 +152,16 @@ fn division(mission: &Mission) -> String {
 
 /// The job of `render`.
 fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
-    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    let reading = reading(
+        &args.inputs,
+        &args.time,
+        args.range,
+        &args.rate,
+        &args.graph,
+    )?;
     let phases = look::phases(&args.phases.phases, args.look.captions.as_deref())?;
     let mut reading = reading.with_phases(phases);
-    let mut outputs = match &args.outputs[..] {
+    let outputs = match &args.outputs[..] {
         [] => {
             let extension = if args.figure.is_some() { "pdf" } else { "gif" };
             let name = default_output(&reading.inputs, extension);
@@ -217,7 +176,6 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
     reading.is_still_if_unchanged = is_still;
     let still = default_output(&reading.inputs, "png");
     let still = (is_still && args.outputs.is_empty()).then(|| Output::parse(&still, None));
-    outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
     let purpose = args
         .look
         .purpose
@@ -226,13 +184,10 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         .transpose()?;
     let drawing = Drawing {
         body: look::body(args)?,
-        view: ViewOptions {
-            line_width: look::line_width(&args.look),
-            ..look::view(&args.view)?
-        },
+        view: look::view(&args.view)?,
         style: look::style(&args.look.style)?,
         fonts: look::fonts(args.look.font.as_deref())?,
-        page: look::options(&args.look, args.change.rate_change),
+        page: look::options(&args.look, args.rate.rate_change),
         is_sized: args.look.size.is_some(),
         purpose: None,
         is_fitted: args.look.fit == "auto",

@@ -3,7 +3,7 @@
 use super::applies::{self, Given};
 #[cfg(feature = "pdf")]
 use super::args::PaperArgs;
-use super::args::{ChangeArgs, EventsArgs, EventsFormat, InfoArgs, InfoFormat, TimeArgs};
+use super::args::{EventsArgs, EventsFormat, InfoArgs, InfoFormat, RangeArgs, RateArgs, TimeArgs};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{DONE, SKIPPED, code};
@@ -30,11 +30,9 @@ pub(super) fn events(
     given: &Given,
     terminal: &mut Terminal,
 ) -> Result<u8, Error> {
-    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    let windows = TimeArgs::default();
+    let reading = reading(&args.inputs, &windows, args.range, &args.rate, &args.graph)?;
     applies::check_inputs(given, &reading)?;
-    if let Some(note) = applies::about_windows(given, "the log") {
-        terminal.note(&note);
-    }
     if args.graph.source.is_some() {
         terminal
             .note("elements that only source code declares have no times and are not in the log");
@@ -78,8 +76,13 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
         period: Some(Length::Parts(PARTS)),
         ..TimeArgs::default()
     };
-    let mut reading = reading(&args.inputs, &time, &ChangeArgs::default(), &args.graph)?;
-    reading.collect.sizes = args.sizes.bytes;
+    let reading = reading(
+        &args.inputs,
+        &time,
+        RangeArgs::default(),
+        &RateArgs::default(),
+        &args.graph,
+    )?;
     applies::check_inputs(given, &reading)?;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)

@@ -217,14 +217,6 @@ impl Terminal {
         self.progress.seconds()
     }
 
-    /// Prints the time of each stage and its largest steps.
-    pub(crate) fn timings(&mut self) {
-        self.progress.end();
-        for line in self.progress.timings() {
-            self.status(&line);
-        }
-    }
-
     fn line(&self, colour: &str, label: &str, text: &str) {
         let lead = format!("{label}: ");
         let line = hang(&lead, &visible(text), lead.len(), error_width());
@@ -318,10 +310,6 @@ impl Watch for Terminal {
 
     fn note(&mut self, text: &str) {
         Self::note(self, text);
-    }
-
-    fn shares(&mut self, shares: &[(&'static str, f64)]) {
-        self.progress.share(shares);
     }
 
     fn stopped(&self) -> bool {

@@ -11,14 +11,13 @@ use crate::base::error::Result;
 use crate::base::name::{is_service, namespace};
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::role::role;
 use crate::base::time::Stamp;
 #[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
 use crate::evidence::inference::{
     Conclusions, ElementKey, Incident, IncidentKind, Inference, Stream, Validity, offers,
 };
-use crate::evidence::observation::{Measurement, Name, Observations};
+use crate::evidence::observation::{Measurement, Name};
 use crate::evidence::source::contract::Owners;
 use crate::evidence::source_id;
 use crate::evidence::times::Stamps;
@@ -29,8 +28,6 @@ use crate::evidence::{Confidence, EvidenceLine, SOURCES, unknown};
 /// Additions to the contents of the bags.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConcludeOptions {
-    /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
-    pub roles: bool,
     /// Nodes and edges given by the user.
     pub topology: Topology,
     /// Declarations in source code.
@@ -103,22 +100,14 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         let is_sign = !matches!(inference.when, Validity::Messages(_) | Validity::Like(_));
         is_sign || node.is_none() || !gone.contains(&node)
     });
-    let roles = if options.roles {
-        fold(&mut inferences, &mut facts)
-    } else {
-        BTreeMap::new()
-    };
     inferences.shrink_to_fit();
     let new = facts.renumber();
     let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
     for inference in &mut inferences {
         inference.rename(&to);
     }
-    let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
-    let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
     for incident in &mut incidents {
-        let renamed = incident.what.renamed(&to);
-        incident.what = renamed.with_node(&mut |name| role(name));
+        incident.what = incident.what.renamed(&to);
         if let IncidentKind::Turn(from, before) = &mut incident.kind {
             (*from, *before) = (to(*from), to(*before));
         }
@@ -128,7 +117,6 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         Stream {
             topic: to(stream.topic),
             publisher,
-            sender: publisher.map(role),
             ..stream.clone()
         }
     };
@@ -136,12 +124,8 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     let mut lines = std::mem::take(&mut facts.pieces);
     lines.sort_unstable();
     lines.dedup();
-    let mut measured = std::mem::take(&mut facts.measured);
-    for one in &mut measured {
-        one.publisher = one.publisher.map(role);
-        one.subscriber = one.subscriber.map(role);
-    }
-    let mut values = StatedValues::new(&facts, role)?;
+    let measured = std::mem::take(&mut facts.measured);
+    let mut values = StatedValues::new(&facts)?;
     for entry in &options.topology.entries {
         if let NamedElement::Type(topic, kind) = &entry.element
             && let Some(topic) = facts.known(topic)
@@ -151,10 +135,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     }
     Ok(Findings {
         mission,
-        copies: copies
-            .into_iter()
-            .map(|(n, t)| (role(to(n)), to(t)))
-            .collect(),
+        copies: copies.into_iter().map(|(n, t)| (to(n), to(t))).collect(),
         values,
         offers: offers(&facts.offers, &streams),
         names: facts.into_texts(),
@@ -416,27 +397,4 @@ fn neighbour(known: &Conclusions<'_>, what: ElementKey, messages: &Stamps) -> Op
         is_near.then(|| (last.since(first), of))
     });
     streams.max().map(|(_, of)| of)
-}
-
-/// Renames every node to its role; returns the names that changed.
-fn fold(inferences: &mut [Inference], facts: &mut Observations) -> BTreeMap<Name, Name> {
-    let mut roles = BTreeMap::new();
-    let mut to = |node: Name| {
-        let text = facts.text(node);
-        match role(&text) {
-            same if *same == *text => node,
-            role => {
-                let role = facts.name(role);
-                roles.insert(node, role);
-                role
-            }
-        }
-    };
-    for inference in inferences {
-        inference.what = inference.what.with_node(&mut to);
-        if let Validity::Like(other) = &mut inference.when {
-            *other = other.with_node(&mut to);
-        }
-    }
-    roles
 }

@@ -29,8 +29,6 @@ pub(crate) struct Stream {
     pub(crate) connection: Connection,
     pub(crate) topic: Name,
     pub(crate) publisher: Option<Name>,
-    /// The node that counts as its publisher when graphs are built: by its name or by its role.
-    pub(crate) sender: Option<Name>,
     /// Whether the last message stays valid after its time: latched (ROS 1) or transient local (ROS 2).
     pub(crate) latched: bool,
     /// The reliability of its publisher's name.
@@ -74,16 +72,6 @@ impl ElementKey {
             Self::Node(node) => [Some(node), None],
             Self::Topic(topic) => [None, Some(topic)],
             Self::Publish(node, topic) | Self::Subscribe(topic, node) => [Some(node), Some(topic)],
-        }
-    }
-
-    /// The same element with its node under another name.
-    pub(crate) fn with_node(self, to: &mut impl FnMut(Name) -> Name) -> Self {
-        match self {
-            Self::Node(node) => Self::Node(to(node)),
-            Self::Topic(topic) => Self::Topic(topic),
-            Self::Publish(node, topic) => Self::Publish(to(node), topic),
-            Self::Subscribe(topic, node) => Self::Subscribe(topic, to(node)),
         }
     }
 

@@ -41,14 +41,14 @@ pub(crate) struct StatedValues {
 }
 
 impl StatedValues {
-    pub(crate) fn new(facts: &Observations, role: impl Fn(Name) -> Name) -> io::Result<Self> {
+    pub(crate) fn new(facts: &Observations) -> io::Result<Self> {
         let mut all = Self::default();
         for fact in &facts.list {
             match fact.observation {
                 Observation::Lifecycle(node, state) => {
                     let state = facts.text(state);
                     let times = facts.times(fact)?.into_iter();
-                    let states = all.states.entry(role(node)).or_default();
+                    let states = all.states.entry(node).or_default();
                     states.extend(times.map(|time| (time, Arc::clone(&state))));
                 }
                 Observation::Type(topic, kind) => {

@@ -18,8 +18,6 @@ pub use crate::mission::JsonForm;
 pub struct SequenceOptions {
     /// The time for which a window is shown, in milliseconds, ≥ 20.
     pub frame_ms: u32,
-    /// The factor by which the display time of such a window is multiplied, ≥ 1.
-    pub hold_changes: u32,
     /// The step from one window that is shown to the next, in windows, ≥ 1; windows with a change are shown in any
     /// case.
     pub every: usize,
@@ -51,7 +49,6 @@ impl Default for SequenceOptions {
     fn default() -> Self {
         Self {
             frame_ms: 1000,
-            hold_changes: 1,
             every: 1,
             changes_only: false,
             scale: 1.0,

@@ -3,7 +3,6 @@
 
 mod raster_pool;
 mod size_limit;
-mod steps;
 
 use std::io;
 use std::ops::ControlFlow;
@@ -11,8 +10,6 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use self::raster_pool::{FrameWant, Packed, RasterPool};
-use self::steps::RunStep;
-pub use self::steps::Steps;
 use crate::base::error::{Error, Result};
 use crate::export::check;
 use crate::export::palette::Palette;
@@ -23,7 +20,6 @@ use crate::export::{Encoder, Needs, Output, Packet, Written};
 pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 
 /// Writes every output, in the order given, and returns the files written. Each file appears when it is complete.
-/// `steps` sums the time of each step.
 ///
 /// A closed pipe ends that output and is not an error.
 ///
@@ -33,17 +29,16 @@ pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 pub fn run(
     sequence: &Sequence<'_>,
     outputs: &[Output],
-    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Written>> {
     for output in outputs {
         check::make_folder(&output.target)?;
     }
-    let outcomes = pass(sequence, outputs, steps, progress)?;
+    let outcomes = pass(sequence, outputs, progress)?;
     let each = outputs.iter().zip(outcomes);
     each.map(|(output, outcome)| match outcome {
         Some(written) => Ok(written),
-        None => size_limit::fit(sequence, output, steps, progress),
+        None => size_limit::fit(sequence, output, progress),
     })
     .collect()
 }
@@ -52,14 +47,13 @@ pub fn run(
 pub(crate) fn pass(
     sequence: &Sequence<'_>,
     outputs: &[Output],
-    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Option<Written>>> {
     let start = |output| OutputJob::start(sequence, output);
     let mut jobs: Vec<OutputJob<'_>> = outputs.iter().map(start).collect::<Result<_>>()?;
     let needs = jobs.iter().map(OutputJob::needs).max();
     if needs > Some(Needs::Nothing) {
-        play(sequence, &mut jobs, steps, progress)?;
+        play(sequence, &mut jobs, progress)?;
     }
     jobs.into_iter().map(OutputJob::finish).collect()
 }
@@ -178,21 +172,18 @@ struct Waiting(usize, FrameTime, Packet);
 fn play(
     sequence: &Sequence<'_>,
     jobs: &mut [OutputJob<'_>],
-    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<()> {
     let frame_times = sequence.frame_times();
     let wants: Vec<FrameWant> = jobs.iter().map(OutputJob::want).collect();
-    let pool = RasterPool::new(sequence, &frame_times, &wants, steps)?;
+    let pool = RasterPool::new(sequence, &frame_times, &wants)?;
     let mut done = 0;
     pool.run(|row| {
         done += row.len();
         let size = row.first().map_or((0, 0), |packed| packed.size);
         let queues = by_output(sequence, row, jobs.len());
-        steps.time(RunStep::Write, || {
-            let each = jobs.par_iter_mut().zip(queues);
-            each.for_each(|(job, packets)| job.take(size, pool.palette(), packets));
-        });
+        let each = jobs.par_iter_mut().zip(queues);
+        each.for_each(|(job, packets)| job.take(size, pool.palette(), packets));
         jobs.iter_mut().try_for_each(OutputJob::failure)?;
         if progress(done, frame_times.len()).is_break() {
             return Err(Error::Interrupted);

@@ -139,8 +139,7 @@ impl Sequence<'_> {
 fn frame_times(changed: &[bool], options: &SequenceOptions) -> Vec<FrameTime> {
     let mut frame_times: Vec<FrameTime> = Vec::with_capacity(changed.len());
     for (window, &changed) in changed.iter().enumerate() {
-        let hold = if changed { options.hold_changes } else { 1 };
-        let ms = options.frame_ms.saturating_mul(hold.max(1));
+        let ms = options.frame_ms;
         let stays = if options.changes_only {
             window == 0
         } else {
@@ -174,16 +173,6 @@ mod tests {
             plan(&QUIET_LOUD_QUIET, &SequenceOptions::default()),
             expected
         );
-    }
-
-    #[test]
-    fn a_change_may_be_held_longer() {
-        let options = SequenceOptions {
-            hold_changes: 2,
-            ..SequenceOptions::default()
-        };
-        let expected = [(0, 1000), (1, 2000), (2, 1000)];
-        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
     }
 
     #[test]

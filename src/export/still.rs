@@ -29,28 +29,9 @@ struct Images<'a> {
     sequence: &'a Sequence<'a>,
     /// The one drawing to write, if it is not a sequence.
     strip: Option<&'a Scene>,
-    /// Whether only the first window is written.
-    is_poster: bool,
     target: Target,
     windows: usize,
     written: Written,
-}
-
-/// Begins the PNG image of the first window.
-///
-/// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
-pub(crate) fn start_poster<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
-    target.must_be_one("a poster is one image")?;
-    Ok(Box::new(Images {
-        kind: StillKind::Png,
-        sequence,
-        strip: None,
-        is_poster: true,
-        target: target.clone(),
-        windows: 1,
-        written: Written::to(target),
-    }))
 }
 
 /// Begins the drawings, one per window; without `{n}` the single window or the strip.
@@ -72,7 +53,6 @@ pub(crate) fn start<'a>(
         kind,
         sequence,
         strip,
-        is_poster: false,
         target: target.clone(),
         windows: sequence.view.frames.len(),
         written: Written::to(target),
@@ -101,14 +81,10 @@ impl Encoder for Images<'_> {
     }
 
     fn pack(&self) -> Pack {
-        match (self.kind, self.is_poster) {
-            (_, true) => |frame| match frame.time.window {
-                0 => packed(StillKind::Png, frame),
-                _ => Ok(Packet::Nothing),
-            },
-            (StillKind::Svg, _) => |frame| Ok(Packet::Bytes(svg::write(frame.scene).into_bytes())),
-            (StillKind::Png, _) => |frame| packed(StillKind::Png, frame),
-            (StillKind::WebP, _) => |frame| packed(StillKind::WebP, frame),
+        match self.kind {
+            StillKind::Svg => |frame| Ok(Packet::Bytes(svg::write(frame.scene).into_bytes())),
+            StillKind::Png => |frame| packed(StillKind::Png, frame),
+            StillKind::WebP => |frame| packed(StillKind::WebP, frame),
         }
     }
 

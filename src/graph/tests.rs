@@ -276,25 +276,6 @@ fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
 }
 
 #[test]
-fn roles_combine_anonymous_nodes() {
-    let talks: [Talk<'_>; 2] = [
-        ("/a", Some("/probe_12_1795171273454"), false, &[0, 5]),
-        ("/a", Some("/probe_34_1795171318449"), false, &[20, 29]),
-    ];
-    let options = ConcludeOptions {
-        roles: true,
-        ..ConcludeOptions::default()
-    };
-    let all = built(&talks, 10, &options, 0);
-    let names: Vec<_> = all.elements.nodes.iter().map(|n| n.name.as_str()).collect();
-    assert_eq!(names, ["/probe", "/rosout"]);
-    assert_eq!(states(&all, "/probe"), ["active"; 3]);
-    let plain = graphs(&talks, 10);
-    assert_eq!(&*plain.elements.nodes[NodeId(0)].role, "/probe");
-    assert_eq!(plain.elements.nodes.len(), 3);
-}
-
-#[test]
 fn user_topology_is_added_without_overwriting() {
     let entry = |element, from_ns, to_ns| crate::evidence::topology::TopologyEntry {
         element,

@@ -189,9 +189,7 @@ fn drawing_of(job: &Render, mission: &Mission) -> Drawing {
     let mut drawing = job.drawing.clone();
     let is_picture = !job.outputs.iter().any(has_all_topics);
     drawing.view.is_picture = is_picture;
-    if is_picture && drawing.view.mode == Mode::Nodes {
-        drawing.view.mode = Mode::Bundles;
-    }
+    drawing.view.is_bundled = is_picture && drawing.view.mode == Mode::Nodes;
     drawing.page.title.get_or_insert_with(|| mission.title());
     if job.reading.phases.is_named() {
         drawing.page.phases = captions(mission);
@@ -307,10 +305,7 @@ fn write(job: &Render, sequence: &Sequence<'_>, watch: &mut dyn Watch) -> Result
             ControlFlow::Continue(())
         }
     };
-    let steps = run::Steps::default();
-    let written = run::run(sequence, &job.outputs, &steps, &mut progress)?;
-    watch.shares(&steps.shares());
-    Ok(written)
+    run::run(sequence, &job.outputs, &mut progress)
 }
 
 /// The name of the phase of every window: the last one that begins before its end.
@@ -351,7 +346,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
         "`--start` and `--end`".to_owned()
     };
     Some(format!(
-        "{frames} frames will take about {about}; to show less, use {advice}, or `--skip-unchanged` for changes only"
+        "{frames} frames will take about {about}; to show less, use {advice}"
     ))
 }
 

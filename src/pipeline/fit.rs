@@ -115,7 +115,8 @@ impl Fitting<'_> {
             }
         }
         if !self.is_readable() && !self.options.mode.is_direct() {
-            self.options.mode = Mode::Bundles;
+            self.options.mode = Mode::Nodes;
+            self.options.is_bundled = true;
             self.again();
             self.take_higher_page();
         }
@@ -268,7 +269,8 @@ impl Fitting<'_> {
     /// legible.
     fn bundle(&mut self) {
         let mut bundled = ViewOptions {
-            mode: Mode::Bundles,
+            mode: Mode::Nodes,
+            is_bundled: true,
             ..self.drawing.view.clone()
         };
         let nodes = self.mission.elements.nodes.iter();
@@ -314,7 +316,7 @@ impl Fitting<'_> {
             let collapsed = &self.options.collapse[drawing.view.collapse.len()..];
             let kept = &self.options.expand[drawing.view.expand.len()..];
             notices.extend(reported(drawing, &parts(collapsed, kept), &self.page, text).iter());
-            if self.options.mode != drawing.view.mode {
+            if self.options.is_bundled != drawing.view.is_bundled {
                 let text = format!(
                     "drew one line per pair of boxes{}; draw each topic with `--fit none`",
                     so_that(text >= drawing.readable())

@@ -43,8 +43,6 @@ pub struct Reading {
     pub verify: bool,
     /// The division of time into windows.
     pub division: Division,
-    /// Whether to merge runs of windows without a change.
-    pub skip_unchanged: bool,
     /// Whether a mission without changes after the first window has a single window, with rates over the whole time.
     pub is_still_if_unchanged: bool,
     /// The options of collecting evidence.
@@ -71,7 +69,6 @@ impl Default for Reading {
             namespaces: Vec::new(),
             verify: false,
             division: Division::default(),
-            skip_unchanged: false,
             is_still_if_unchanged: false,
             collect: collector::CollectOptions::default(),
             conclude: conclude::ConcludeOptions::default(),
@@ -295,12 +292,8 @@ fn mission(
     let mut windowed = graphs(&windows.spans, reading.grace)?;
     let mut list = list(&windows, &windowed, &history, &log);
     let is_still = reading.is_still_if_unchanged && is_still(&windows, &log);
-    if reading.skip_unchanged || is_still {
-        windows.spans = if is_still {
-            vec![windows.span]
-        } else {
-            merged(&list)
-        };
+    if is_still {
+        windows.spans = vec![windows.span];
         windowed = graphs(&windows.spans, reading.grace)?;
         list = self::list(&windows, &windowed, &history, &log);
     }
@@ -436,16 +429,4 @@ fn is_still(windows: &Windows, log: &EventLog) -> bool {
     let all = log.headlines(windows.span);
     let mut later = all.filter(|(_, e)| e.until.unwrap_or(e.time) >= first);
     later.next().is_none()
-}
-
-/// The windows' times, with consecutive windows without a change merged.
-fn merged(windows: &[Window]) -> Vec<Span> {
-    let mut spans: Vec<Span> = Vec::new();
-    for window in windows {
-        match spans.last_mut() {
-            Some(last) if window.changes.is_empty() => last.end = window.span.end,
-            _ => spans.push(window.span),
-        }
-    }
-    spans
 }

@@ -6,7 +6,7 @@ use super::bundles;
 use super::collapse::headlines;
 use super::homes::{ItemKey, NodeKeys, TopicKeys};
 use super::items::{EdgePlace, Viewed, arrow};
-use super::{ArrowKind, ItemKind, Mode, ViewOptions};
+use super::{ArrowKind, ItemKind, ViewOptions};
 use crate::graph::{ById, Element, Elements, TopicId};
 use crate::mission::Mission;
 
@@ -28,7 +28,7 @@ impl Viewed {
                 ends[edge.topic][way].extend(&nodes[edge.node]);
             }
         }
-        let is_bundled = options.mode == Mode::Bundles;
+        let is_bundled = options.is_bundled;
         let reported: BTreeSet<TopicId> = headlines(mission)
             .filter_map(|what| elements.ends(what).1)
             .collect();

@@ -339,10 +339,15 @@ mod tests {
     use crate::view::testing::mission;
     use crate::view::{Mark, Mode, ViewOptions, view};
 
+    fn mode(is_bundled: bool) -> Mode {
+        if is_bundled { Mode::Nodes } else { Mode::All }
+    }
+
     /// The boxes and the rows of a picture: `/a → /t`, with the windows in which each row exists.
-    fn drawn(windows: &[&str], mode: Mode) -> (Vec<String>, Vec<String>) {
+    fn drawn(windows: &[&str], is_bundled: bool) -> (Vec<String>, Vec<String>) {
         let options = ViewOptions {
-            mode,
+            mode: mode(is_bundled),
+            is_bundled,
             is_picture: true,
             ..ViewOptions::default()
         };
@@ -376,14 +381,14 @@ mod tests {
 
     #[test]
     fn a_topic_with_one_known_end_is_a_row_of_its_node() {
-        let (boxes, rows) = drawn(&["/a>/t /a>/u /b</u /b</v /a>/w /a</w"], Mode::All);
+        let (boxes, rows) = drawn(&["/a>/t /a>/u /b</u /b</v /a>/w /a</w"], false);
         assert_eq!(boxes, ["/a", "/b", "/u"]);
         assert_eq!(rows, ["/a ↔ /w .", "/a → /t .", "/b ← /v ."]);
     }
 
     #[test]
     fn infrastructure_is_a_row_of_every_node() {
-        let (boxes, rows) = drawn(&["/a>/tf /b>/tf /c</tf /a>/t /c</t"], Mode::All);
+        let (boxes, rows) = drawn(&["/a>/tf /b>/tf /c</tf /a>/t /c</t"], false);
         assert_eq!(boxes, ["/a", "/b", "/c", "/t"]);
         assert_eq!(rows, ["/a → /tf .", "/b → /tf .", "/c ← /tf ."]);
     }
@@ -391,14 +396,14 @@ mod tests {
     #[test]
     fn a_hub_of_several_namespaces_is_a_row_of_every_node() {
         let five = "/n/a>/t /n/b</t /n/c</t /n/d</t /n/e</t";
-        assert_eq!(drawn(&[&format!("{five} /n/f</t")], Mode::All).1.len(), 0);
-        let (boxes, rows) = drawn(&[&format!("{five} /m/f</t")], Mode::All);
+        assert_eq!(drawn(&[&format!("{five} /n/f</t")], false).1.len(), 0);
+        let (boxes, rows) = drawn(&[&format!("{five} /m/f</t")], false);
         assert_eq!((boxes.len(), rows.len()), (6, 6));
     }
 
     #[test]
     fn a_topic_with_two_publishers_stays_a_box() {
-        let (boxes, rows) = drawn(&["/a>/t /b>/t"], Mode::All);
+        let (boxes, rows) = drawn(&["/a>/t /b>/t"], false);
         assert_eq!(
             (boxes, rows.len()),
             (vec!["/a".into(), "/b".into(), "/t".into()], 0)
@@ -407,14 +412,14 @@ mod tests {
 
     #[test]
     fn rows_appear_and_vanish_with_their_marks() {
-        let (_, rows) = drawn(&["/a", "/a>/t@9", "/a>/t@40", "/a"], Mode::All);
+        let (_, rows) = drawn(&["/a", "/a>/t@9", "/a>/t@40", "/a"], false);
         assert_eq!(rows, ["/a → /t  +!-"]);
     }
 
     #[test]
     fn changing_topics_have_rows_instead_of_lines() {
         let windows = ["/a>/t /b</t /a>/quiet", "/a>/t /b</t /a>/quiet /a>/new"];
-        let (boxes, rows) = drawn(&windows, Mode::Bundles);
+        let (boxes, rows) = drawn(&windows, true);
         assert_eq!(boxes, ["/a", "/b"]);
         assert_eq!(rows, ["/a → /new  +"]);
     }
@@ -440,9 +445,10 @@ mod tests {
 
     #[test]
     fn a_topic_without_known_ends_is_text() {
-        for mode in [Mode::All, Mode::Bundles] {
+        for is_bundled in [false, true] {
             let options = ViewOptions {
-                mode,
+                mode: mode(is_bundled),
+                is_bundled,
                 is_picture: true,
                 ..ViewOptions::default()
             };
@@ -454,7 +460,7 @@ mod tests {
                 .flat_map(|a| &a.items)
                 .map(|i| &*i.name)
                 .collect();
-            assert_eq!(words, ["/x"], "{mode:?}");
+            assert_eq!(words, ["/x"], "bundled: {is_bundled}");
             let mark = view.also[0].shown[0].at(1).unwrap().mark;
             assert_eq!(mark, Some(Mark::Added));
         }

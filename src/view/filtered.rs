@@ -1,7 +1,7 @@
 //! The viewed part of a mission as a separate mission, for `--filtered`.
 
 use super::items::Viewed;
-use super::state::{shows_node, shows_topic};
+use super::state::shows_node;
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
@@ -50,9 +50,9 @@ impl Keep {
         let topics = viewed.topic.with_ids().map(|(id, item)| {
             let is_carried = !viewed.carriers(Element::Topic(id)).is_empty();
             match options.mode {
+                Mode::Nodes if options.is_bundled => item.is_some() || is_carried,
                 Mode::Nodes => is_carried,
-                Mode::Bundles => item.is_some() || is_carried,
-                _ => item.is_some(),
+                Mode::All => item.is_some(),
             }
         });
         let topics = numbered(topics);
@@ -137,7 +137,7 @@ impl Keep {
     fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed) -> Graph {
         let is_shown = |state: &ElementState| match state.what {
             Element::Node(_) => shows_node(state.state, options),
-            Element::Topic(_) | Element::Publish(_) => shows_topic(state.state, options),
+            Element::Topic(_) | Element::Publish(_) => true,
             Element::Subscribe(_) => true,
         };
         let is_there = |what: Element| graph.get(what).is_some_and(is_shown);
@@ -243,16 +243,6 @@ mod tests {
             },
         );
         assert_eq!(text(&view)[1], "/a /c =/clock =/t /a>/clock /a>/t /c</t");
-    }
-
-    #[test]
-    fn active_mode_hides_topics_without_messages() {
-        let all = mission(&["/a>/t~ /b</t~ /c>/u"]);
-        let options = ViewOptions {
-            mode: Mode::Active,
-            ..ViewOptions::default()
-        };
-        assert_eq!(text(&filtered(&all, &options)), ["/a /b /c =/u /c>/u"]);
     }
 
     #[test]

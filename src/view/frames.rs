@@ -407,18 +407,6 @@ mod tests {
     }
 
     #[test]
-    fn active_mode_only_shows_topics_with_messages() {
-        let options = ViewOptions {
-            mode: Mode::Active,
-            ..ViewOptions::default()
-        };
-        let windows = ["/a>/t~ /b</t~ /c>/t", "/a>/t~ /b</t~"];
-        assert_eq!(seen(&windows, &options)[0], "/a /b /c /t /c>/t /t>/b");
-        // Silence has no sign: the event log has no event for an end.
-        assert_eq!(seen(&windows, &options)[1], "/a /b -/c");
-    }
-
-    #[test]
     fn silent_nodes_are_unreachable_only_on_request() {
         let hide = Hide {
             unreachable: true,
@@ -484,7 +472,7 @@ mod tests {
         };
         assert!(seen(&windows, &all)[0].contains("/rosout>/rosout"));
         let all = ViewOptions {
-            show_recorder: true,
+            hide: Hide::NONE,
             group: Grouping::NONE,
             ..ViewOptions::default()
         };

@@ -83,7 +83,7 @@ fn words(reason: Reason) -> (&'static str, &'static str) {
         Reason::Services => ("services", "`--hide` without `services` shows them"),
         Reason::Debug => ("debugging elements", "`--hide` without `debug` shows them"),
         Reason::Quiet => ("housekeeping", "`--hide none` shows them"),
-        Reason::Recorder => ("recorder and player", "`--show-recorder` shows them"),
+        Reason::Recorder => ("recorder and player", "`--hide none` shows them"),
     }
 }
 
@@ -120,7 +120,7 @@ mod tests {
             reported(window, &ViewOptions::default()),
             [
                 "2 housekeeping left out (/clock, /rosout): `--hide none` shows them",
-                "1 recorder and player left out (/record_7): `--show-recorder` shows them",
+                "1 recorder and player left out (/record_7): `--hide none` shows them",
             ]
         );
         let all = ViewOptions {

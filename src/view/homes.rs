@@ -34,9 +34,11 @@ impl Boxes<'_> {
         let collapse = self.collapse(&names);
         let nodes = self.nodes(&names, &collapse);
         let topics = match self.options.mode {
-            Mode::Bundles => inside(self.elements, &collapse, &nodes, self.selection),
+            Mode::Nodes if self.options.is_bundled => {
+                inside(self.elements, &collapse, &nodes, self.selection)
+            }
             Mode::Nodes => ById::like(&self.elements.topics, None),
-            _ => self.topics((&collapse, &names), &nodes),
+            Mode::All => self.topics((&collapse, &names), &nodes),
         };
         (nodes, topics)
     }

@@ -10,7 +10,7 @@ use super::names::is_debug_label;
 use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
-use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, LineWidth, Mode, ViewOptions};
+use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Mode, ViewOptions};
 use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, PerElement, TopicId};
 use crate::mission::Mission;
 
@@ -84,7 +84,7 @@ impl Viewed {
         let elements = &mission.elements;
         let mut selection = select(elements, options);
         let grouping = match options.mode {
-            Mode::Nodes => super::Grouping::NONE,
+            Mode::Nodes if !options.is_bundled => super::Grouping::NONE,
             _ => options.group,
         };
         let seen: ById<TopicId, bool> = selection.topics.iter().map(Option::is_none).collect();
@@ -104,11 +104,11 @@ impl Viewed {
         };
         viewed.drawn = ById::like(&elements.topics, true);
         viewed.nodes_in_words = ById::like(&elements.nodes, false);
-        if options.mode == Mode::Bundles {
+        if options.is_bundled {
             viewed.drawn = bundles::drawn(mission, options);
         }
         // Outputs that are files of data or can be expanded have a box for each.
-        if options.mode == Mode::Bundles && options.is_picture {
+        if options.is_bundled && options.is_picture {
             viewed.nodes_in_words = bundles::nodes_in_words(
                 mission,
                 (&viewed.selection, &viewed.drawn),
@@ -119,24 +119,11 @@ impl Viewed {
         if options.mode.is_direct() {
             viewed.bundled = bundles::names(elements, &groups);
             viewed.set_direct(elements, options);
-            if options.mode == Mode::Bundles {
+            if options.is_bundled {
                 viewed.set_leaves(elements);
             }
         } else {
             viewed.set_arrows(elements);
-        }
-        if options.line_width == LineWidth::Bytes {
-            let sizes = sizes(mission);
-            for arrow in viewed.arrows.iter_mut() {
-                let topics = arrow
-                    .members
-                    .iter()
-                    .filter_map(|what| elements.ends(*what).1);
-                let topics: BTreeSet<TopicId> = topics.collect();
-                let sizes = topics.iter().map(|topic| sizes[*topic]);
-                let (count, bytes) = sizes.fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-                arrow.kilobytes = Some(bytes as f64 / 1000.0 / count.max(1) as f64);
-            }
         }
         viewed.set_carriers(elements);
         viewed
@@ -243,7 +230,7 @@ impl Viewed {
 
     /// Arrows from publishers to subscribers: one per topic between two of them, or one for all topics in a bundle.
     fn set_direct(&mut self, elements: &Elements, options: &ViewOptions) {
-        let is_bundled = options.mode == Mode::Bundles;
+        let is_bundled = options.is_bundled;
         let mut subscribers = ById::like(&elements.topics, Vec::new());
         for (id, edge) in elements.subscribes.with_ids() {
             if let Some(item) = self.item_of_node(edge.node) {
@@ -279,9 +266,10 @@ impl Viewed {
                 if pairs > MOST_PAIRS || is_bundled && from == *to {
                     continue;
                 }
-                let kind = match options.mode {
-                    Mode::Bundles => ArrowKind::Bundle,
-                    _ => ArrowKind::Direct(topic.name.shared()),
+                let kind = if is_bundled {
+                    ArrowKind::Bundle
+                } else {
+                    ArrowKind::Direct(topic.name.shared())
                 };
                 // One line for both directions.
                 let ends = if is_bundled {
@@ -432,20 +420,5 @@ pub(super) fn arrow(
         is_service: members.iter().all(|what| elements.is_service(*what)),
         members,
         topics: Vec::new(),
-        kilobytes: None,
     }
-}
-
-/// The messages and the payload bytes of each topic in all windows in which its bytes are known.
-fn sizes(mission: &Mission) -> ById<TopicId, (u64, u64)> {
-    let mut sizes = ById::like(&mission.elements.topics, (0_u64, 0_u64));
-    for (size, id) in sizes.iter_mut().zip(mission.elements.topics.ids()) {
-        for (_, row) in mission.graphs.rows(Element::Topic(id)) {
-            if let Some(bytes) = row.bytes {
-                size.0 = size.0.saturating_add(row.count.unwrap_or(0));
-                size.1 = size.1.saturating_add(bytes);
-            }
-        }
-    }
-    sizes
 }

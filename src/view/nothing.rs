@@ -30,7 +30,7 @@ pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
     let all = words::count(nodes.len() + topics.len(), "name");
     Error::usage(
         format!("nothing is left to draw of {all}"),
-        "show more with `--hide none`, `--show-recorder` or wider filters",
+        "show more with `--hide none` or wider filters",
     )
 }
 

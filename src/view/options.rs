@@ -10,14 +10,10 @@ worded! {
     /// The kinds of boxes and arrows in the picture, as in the first box of `rqt_graph`'s window.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Mode {
-        /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
+        /// Nodes only: in pictures one line between two of them with the topics in both directions, in pages and graph
+        /// files an arrow from publisher to subscriber for every topic.
         Nodes = "nodes",
-        /// Nodes and collapsed namespaces only, one line between two of them for all topics in both
-        /// directions, for a graph that does not fit any page.
-        Bundles = "bundles",
-        /// Nodes and topics, in each window only those that carry messages in it.
-        Active = "active",
-        /// Nodes and topics, all that are known.
+        /// Nodes and topics.
         #[default]
         All = "all",
     }
@@ -26,7 +22,7 @@ worded! {
 impl Mode {
     /// Whether arrows run from node to node, over topics that are not drawn.
     pub(crate) fn is_direct(self) -> bool {
-        matches!(self, Self::Nodes | Self::Bundles)
+        self == Self::Nodes
     }
 
     /// The mode of this word.
@@ -34,19 +30,7 @@ impl Mode {
     /// # Errors
     /// [`Error::Usage`] for another word.
     pub fn parse(word: &str) -> Result<Self> {
-        Self::from_word(word).ok_or_else(|| unknown("mode", word, "nodes, bundles, active, all"))
-    }
-}
-
-worded! {
-    /// The number that the thickness of lines shows.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum LineWidth {
-        /// Messages per second.
-        #[default]
-        Rate = "rate",
-        /// Payload bytes per second.
-        Bytes = "bytes",
+        Self::from_word(word).ok_or_else(|| unknown("mode", word, "nodes, all"))
     }
 }
 
@@ -213,15 +197,14 @@ pub struct ViewOptions {
     pub collapse: Vec<Arc<str>>,
     /// Namespaces to keep open, even inside a collapsed one.
     pub expand: Vec<Arc<str>>,
-    /// Whether to show the recorder and the player.
-    pub show_recorder: bool,
     /// Whether the output is only for viewing: topics with one known endpoint, and those that half the system
     /// is connected to, are rows in boxes, and topics without a known endpoint are listed as words.
     pub(crate) is_picture: bool,
+    /// Whether one line between two nodes or collapsed namespaces stands for all topics in both directions, instead of an
+    /// arrow for each; only with [`Mode::Nodes`].
+    pub(crate) is_bundled: bool,
     /// Whether bundles also list nodes that never change as words if they have a single line.
     pub(crate) are_leaves_in_words: bool,
-    /// The number that the thickness of lines shows.
-    pub line_width: LineWidth,
     /// Whether anonymous nodes are drawn under their full names, with a box for each run.
     pub exact_names: bool,
 }

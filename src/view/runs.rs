@@ -317,7 +317,6 @@ mod tests {
                 members: Vec::new(),
                 topics: Vec::new(),
                 is_service: false,
-                kilobytes: None,
             }]),
             arrows_shown: vec![Looks::of(story.iter().map(Option::as_ref))].into(),
             ..View::default()

@@ -42,7 +42,7 @@ struct TopicDegrees {
 /// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without
 /// remaining nodes.
 pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
-    let hide_recorder = options.hide.quiet && !options.show_recorder;
+    let hide_recorder = options.hide.quiet;
     let recorders: ById<NodeId, bool> = elements
         .nodes
         .iter()
@@ -228,11 +228,7 @@ mod tests {
     fn a_topic_that_only_the_hidden_recorder_waits_for_is_hidden_with_it() {
         let graph = "/a>/t /record_1</t /record_1</never";
         assert_eq!(left(graph, &ViewOptions::default()), "/a /t");
-        let recorder = ViewOptions {
-            show_recorder: true,
-            ..ViewOptions::default()
-        };
-        assert_eq!(left(graph, &recorder), "/a /record_1 /never /t");
+        assert_eq!(left(graph, &hiding("none")), "/a /record_1 /never /t");
     }
 
     #[test]

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
 use super::{
-    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Mode, Shown, TopicRow, ViewOptions,
-    sum,
+    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions, sum,
 };
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
@@ -115,11 +114,6 @@ impl LivingItems {
 /// Whether a node in this state is shown in a window.
 pub(crate) fn shows_node(state: State, options: &ViewOptions) -> bool {
     !options.hide.unreachable || matches!(state, State::Active | State::Latched)
-}
-
-/// Whether a topic or publication in this state is shown in a window.
-pub(crate) fn shows_topic(state: State, options: &ViewOptions) -> bool {
-    options.mode != Mode::Active || state == State::Active
 }
 
 /// The state of all elements in one window.
@@ -260,7 +254,6 @@ impl<'a> Now<'a> {
                     .filter(|one| shows_node(one.state, self.options)),
                 Element::Topic(topic) => self
                     .one(Element::Topic(*topic))
-                    .filter(|one| shows_topic(one.state, self.options))
                     // The nodes inside a collapsed namespace already count what they publish.
                     .map(|one| One {
                         hz: one.hz.filter(|_| !has_nodes(item)),
@@ -319,15 +312,14 @@ impl<'a> Now<'a> {
 
     fn edges(&self, id: ArrowId, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
-        let shows = |one: &One| shows_topic(one.state, self.options);
         for member in &arrow.members {
             let one = match member {
-                Element::Publish(edge) => self.one(Element::Publish(*edge)).filter(shows),
+                Element::Publish(edge) => self.one(Element::Publish(*edge)),
                 Element::Subscribe(edge) => {
                     let ends = self.viewed.subscribed.get(*edge);
                     let topic = ends.and_then(|(_, topic)| self.one(Element::Topic(*topic)));
                     self.one(Element::Subscribe(*edge))
-                        .filter(|_| topic.as_ref().is_some_and(shows))
+                        .filter(|_| topic.is_some())
                 }
                 Element::Node(_) | Element::Topic(_) => None,
             };
@@ -417,7 +409,7 @@ impl<'a> Now<'a> {
 
     /// Whether the options hide elements without messages in a window.
     pub(crate) fn hides_the_silent(&self) -> bool {
-        self.options.hide.unreachable || self.options.mode == Mode::Active
+        self.options.hide.unreachable
     }
 
     /// The item that shows an element, and the arrows.

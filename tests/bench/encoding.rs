@@ -92,9 +92,8 @@ fn main() {
         let output = |n: &&str| Output::parse(&folder.join(n).to_string_lossy(), None).unwrap();
         let outputs: Vec<Output> = names.iter().map(output).collect();
         let begin = Instant::now();
-        let steps = run::Steps::default();
         let go_on = &mut |_, _| ControlFlow::Continue(());
-        let written = run::run(&sequence, &outputs, &steps, go_on).unwrap();
+        let written = run::run(&sequence, &outputs, go_on).unwrap();
         (written, begin.elapsed().as_secs_f64() * 1e3)
     };
     if !outputs.is_empty() {

@@ -168,7 +168,7 @@ def missions_are_judged():
 
 def signatures_are_those_of_the_command():
     for command, left_out in (
-        ("render", {"output", "quiet", "verbose", "help", "timings", "watch", "color"}),
+        ("render", {"output", "quiet", "verbose", "help", "color"}),
         ("figure", {"output", "quiet", "verbose", "help", "color"}),
         ("extract", {"output", "quiet", "verbose", "help", "color"}),
     ):

@@ -6,11 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
-use super::values::{moment, points, share, width};
-use super::{GraphArgs, Inputs};
-use crate::base::time::Moment;
+use super::values::{points, width};
+use super::{GraphArgs, Inputs, RangeArgs, RateArgs};
 use crate::draw::figure::FigureKind;
-use crate::graph::diff::RATE_CHANGE;
 
 #[derive(Debug, Args)]
 pub(crate) struct FigureArgs {
@@ -36,15 +34,10 @@ pub(crate) struct FigureArgs {
     /// Font file for characters that the bundled font lacks.
     #[arg(long, value_name = "FILE")]
     pub(crate) font: Option<PathBuf>,
-    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) start: Option<Moment>,
-    /// End time, in the same forms as `--start`.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) end: Option<Moment>,
-    /// Report rates that change by more than this fraction.
-    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
-    pub(crate) rate_change: f64,
+    #[command(flatten)]
+    pub(crate) range: RangeArgs,
+    #[command(flatten)]
+    pub(crate) rate: RateArgs,
     /// Nodes to draw, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(crate) ns_filter: Option<String>,

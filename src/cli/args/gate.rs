@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::GraphArgs;
-use super::values::{length, moment, share, size};
-use crate::base::time::Moment;
+use super::values::{length, share, size};
+use super::{GraphArgs, RangeArgs};
 use crate::gate;
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
@@ -35,12 +34,8 @@ pub(crate) struct DiffArgs {
     /// Report rates that differ by more than this fraction, if statistically significant.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(crate) rate_change: f64,
-    /// Start time in both: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) start: Option<Moment>,
-    /// End time in both, in the same forms as `--start`.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) end: Option<Moment>,
+    #[command(flatten)]
+    pub(crate) range: RangeArgs,
     #[command(flatten)]
     pub(crate) graph: GraphArgs,
 }
@@ -50,8 +45,7 @@ impl DiffArgs {
     pub(crate) fn time(&self) -> GateTime {
         GateTime {
             period: None,
-            start: self.start,
-            end: self.end,
+            range: self.range,
         }
     }
 }
@@ -104,7 +98,7 @@ pub(crate) struct CheckArgs {
     pub(crate) undecidable: Undecidable,
     /// Explain a kind of finding, such as `topic-rate-low`, and exit.
     #[arg(long, value_name = "ID", conflicts_with_all = [
-        "bags", "expect", "format", "outputs", "link", "undecidable", "period", "start", "end", "roles", "topology", "source",
+        "bags", "expect", "format", "outputs", "link", "undecidable", "period", "start", "end", "topology", "source",
         "infer",
     ])]
     pub(crate) explain: Option<String>,
@@ -131,12 +125,8 @@ pub(crate) struct GateTime {
     /// Length of the windows in which rates are checked: `60`, `30s`, `500ms`. [default: the file's `period`]
     #[arg(long, short, value_parser = length)]
     pub(crate) period: Option<Length>,
-    /// Start time: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) start: Option<Moment>,
-    /// End time, in the same forms as `--start`.
-    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
-    pub(crate) end: Option<Moment>,
+    #[command(flatten)]
+    pub(crate) range: RangeArgs,
 }
 
 pub(crate) const DIFF_HELP: &str = "Exit codes: 0 equal, 1 different, 2 not compared (usage error, unreadable bag), 3 equal but data was skipped \

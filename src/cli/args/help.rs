@@ -13,24 +13,24 @@ const HEADINGS: [(&str, &str); 7] = [
     ),
     (
         "Time",
-        "offset period step start end align skip_unchanged cut rate_change grace phases idle keep",
+        "offset period step start end align cut rate_change grace phases idle keep",
     ),
     (
         "Filter",
-        "mode ns_filter topic_filter hide group collapse expand show_recorder rqt_defaults filtered roles all",
+        "mode ns_filter topic_filter hide group collapse expand rqt_defaults filtered all",
     ),
     (
         "Picture",
-        "view kind style size for width fit orientation layout layout_from title line_width rows steps text bare \
-         captions font watch figure",
+        "view kind style size for width fit orientation layout layout_from title rows steps text bare \
+         captions font figure",
     ),
     (
         "Output",
-        "outputs output format frame_ms hold_changes strip max_bytes poster json runs dot_profile link \
+        "outputs output format frame_ms strip max_bytes json runs dot_profile link \
          fields nested parts undecidable explain",
     ),
     ("Evidence", "topology source source_at infer why"),
-    ("Performance", "timings bytes tier shard skip_existing jobs"),
+    ("Performance", "tier shard skip_existing jobs"),
 ];
 
 /// What `-h` shows of each command: its most important options, and three examples.
@@ -53,7 +53,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
     ),
     (
         "info",
-        "format why bytes topology source infer",
+        "format why topology source infer",
         "
   bagreel info run.bag                                contents, evidence and limits of a bag
   bagreel info bags/ --format csv                     one row per bag in a folder
@@ -85,7 +85,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
     ),
     (
         "events",
-        "format parts all phases period start end rate_change",
+        "format parts all phases start end rate_change",
         "
   bagreel events run.bag                              one line per event
   bagreel events run.bag --parts --end 1:00           the first minute, with affected topics
@@ -93,7 +93,7 @@ const SCREENS: [(&str, &str, &str); 14] = [
     ),
     (
         "diff",
-        "format outputs size rate_change start end roles",
+        "format outputs size rate_change start end",
         "
   bagreel diff good.bag run.bag                       what differs, as text
   bagreel diff good.bag run.bag --format markdown     for a pull request

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::figure::{FigureForm, PhaseArgs, kinds};
 use super::values::{bytes, size, width};
-use super::{ChangeArgs, GraphArgs, Inputs, SizeArgs, TimeArgs};
+use super::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use crate::export::FORMATS;
 
 #[derive(Debug, Args)]
@@ -22,11 +22,11 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) time: TimeArgs,
     #[command(flatten)]
-    pub(crate) change: ChangeArgs,
+    pub(crate) range: RangeArgs,
+    #[command(flatten)]
+    pub(crate) rate: RateArgs,
     #[command(flatten)]
     pub(crate) graph: GraphArgs,
-    #[command(flatten)]
-    pub(crate) sizes: SizeArgs,
     #[command(flatten)]
     pub(crate) view: ViewArgs,
     #[command(flatten)]
@@ -36,19 +36,13 @@ pub(crate) struct RenderArgs {
     /// Draw a figure for a paper; replaced by `bagreel figure`.
     #[arg(long, value_name = "KIND", hide = true, value_parser = kinds(), conflicts_with_all = [
         "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
-        "expand", "rqt_defaults", "show_recorder", "title",
+        "expand", "rqt_defaults", "title",
     ])]
     pub(crate) figure: Option<String>,
     #[command(flatten)]
     pub(crate) form: FigureForm,
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
-    /// Print the time spent in each step.
-    #[arg(long)]
-    pub(crate) timings: bool,
-    /// Redraw whenever the style file changes, until interrupted.
-    #[arg(long)]
-    pub(crate) watch: bool,
 }
 
 #[derive(Debug, Args)]
@@ -56,8 +50,8 @@ pub(crate) struct ViewArgs {
     /// Draw the graph, or a timeline of topics. [default: graph; board if most publishers are unknown]
     #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
     pub(crate) view: Option<String>,
-    /// Draw nodes only, nodes with one line per pair, nodes and active topics, or all topics.
-    #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
+    /// Draw nodes only, with one line per pair and the topics on it, or nodes and topics.
+    #[arg(long, value_name = "nodes|all", value_parser = ["nodes", "all"])]
     pub(crate) mode: Option<String>,
     /// Nodes to draw, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
@@ -77,9 +71,6 @@ pub(crate) struct ViewArgs {
     /// Never collapse these namespaces.
     #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
     pub(crate) expand: Vec<String>,
-    /// Include the recorder and the player.
-    #[arg(long)]
-    pub(crate) show_recorder: bool,
     /// Draw what `rqt_graph` shows by default.
     #[arg(long)]
     pub(crate) rqt_defaults: bool,
@@ -118,9 +109,6 @@ pub(crate) struct LookArgs {
     /// Title. [default: the bag's name]
     #[arg(long)]
     pub(crate) title: Option<String>,
-    /// Quantity shown by the width of lines: messages or payload bytes per second. [default: rate]
-    #[arg(long, value_name = "rate|bytes", value_parser = ["rate", "bytes"])]
-    pub(crate) line_width: Option<String>,
     /// Draw the graph without title, legend or timeline.
     #[arg(long)]
     pub(crate) bare: bool,
@@ -137,18 +125,12 @@ pub(crate) struct SequenceArgs {
     /// Duration of a frame in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=600_000))]
     pub(crate) frame_ms: u32,
-    /// Show windows with a change this many times longer.
-    #[arg(long, value_name = "TIMES", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub(crate) hold_changes: u32,
-    /// Draw several windows side by side: a grid `3x2`, `changes`, or window numbers `0,4,9`.
-    #[arg(long, value_name = "3x2|changes|N,M,…")]
+    /// Draw several windows side by side: a grid `3x2`, or window numbers `0,4,9`.
+    #[arg(long, value_name = "3x2|N,M,…")]
     pub(crate) strip: Option<String>,
     /// Limit a GIF's size, such as `5MB`, by dropping resolution, then frames.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub(crate) max_bytes: Option<u64>,
-    /// Also write the first frame of an animation to this PNG.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) poster: Option<PathBuf>,
     /// Layout of JSON: every window in full, or every element once with its runs. [default: windows, above 2000 runs]
     #[arg(long, value_name = "windows|runs", value_parser = ["windows", "runs"])]
     pub(crate) json: Option<String>,
@@ -161,13 +143,6 @@ pub(crate) struct SequenceArgs {
     /// Link to add to the report, such as `player=URL`.
     #[arg(long, value_name = "NAME=URL")]
     pub(crate) link: Vec<String>,
-}
-
-impl SequenceArgs {
-    /// Whether the strip is of changes, which are drawn as steps: differences, and not whole graphs.
-    pub(crate) fn draws_steps(&self) -> bool {
-        self.strip.as_deref() == Some("changes")
-    }
 }
 
 const OUTPUT: &str = "Output file; the extension selects the format, `{n}` writes one file per window, `-` is standard \

@@ -1,6 +1,5 @@
-//! The progress bar and the time of each stage; the only file that measures time.
+//! The progress bar; the only file that measures time.
 
-use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _};
 use std::time::{Duration, Instant};
 
@@ -16,10 +15,7 @@ const TICK: Duration = Duration::from_millis(120);
 pub(super) struct Progress {
     is_shown: bool,
     bar: Option<ProgressBar>,
-    stage: Option<(Stage, Instant)>,
-    spent: BTreeMap<Stage, Duration>,
-    /// The shares of the time of each stage, as text.
-    shares: BTreeMap<Stage, String>,
+    stage: Option<Stage>,
     begun: Instant,
 }
 
@@ -30,8 +26,6 @@ impl Progress {
             is_shown: is_shown && io::stderr().is_terminal() && !is_dumb(),
             bar: None,
             stage: None,
-            spent: BTreeMap::new(),
-            shares: BTreeMap::new(),
             begun: Instant::now(),
         }
     }
@@ -45,7 +39,7 @@ impl Progress {
     /// Begins a stage and ends the previous one.
     pub(super) fn begin(&mut self, stage: Stage) {
         self.end();
-        self.stage = Some((stage, Instant::now()));
+        self.stage = Some(stage);
         self.bar = self.is_shown.then(|| bar(stage));
     }
 
@@ -67,9 +61,7 @@ impl Progress {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }
-        if let Some((stage, since)) = self.stage.take() {
-            *self.spent.entry(stage).or_default() += since.elapsed();
-        }
+        self.stage = None;
     }
 
     /// Prints something with the bar hidden.
@@ -80,33 +72,9 @@ impl Progress {
         }
     }
 
-    /// Records the time shares of the current stage.
-    pub(super) fn share(&mut self, shares: &[(&'static str, f64)]) {
-        let Some((stage, _)) = self.stage else {
-            return;
-        };
-        let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
-        let words: Vec<String> = shares
-            .map(|(word, share)| format!("{word} {:.0} %", share * 100.0))
-            .collect();
-        if !words.is_empty() {
-            self.shares
-                .insert(stage, format!(" ({})", words.join(", ")));
-        }
-    }
-
     /// Seconds since the command began.
     pub(super) fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
-    }
-
-    /// The time of each stage and its largest steps, one line each.
-    pub(super) fn timings(&self) -> Vec<String> {
-        let line = |(stage, time): (&Stage, &Duration)| {
-            let shares = self.shares.get(stage).map_or("", String::as_str);
-            format!("{:>9.3} s  {}{shares}", time.as_secs_f64(), stage.word())
-        };
-        self.spent.iter().map(line).collect()
     }
 }
 
@@ -129,8 +97,8 @@ fn bar(stage: Stage) -> ProgressBar {
 }
 
 /// The template of a bar with a known total.
-fn counted(stage: Option<(Stage, Instant)>) -> &'static str {
-    match stage.map(|(stage, _)| stage) {
+fn counted(stage: Option<Stage>) -> &'static str {
+    match stage {
         Some(Stage::Read | Stage::Verify) => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
         Some(Stage::Draw) => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
         _ => "{msg:>9} [{bar:40}] {pos}/{len}",

@@ -103,11 +103,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         (
             !view.arrows.is_empty() && any(&|s| s.hz.is_some()),
             LegendSign::Width,
-            if view.arrows.iter().any(|arrow| arrow.kilobytes.is_some()) {
-                "thicker = more bytes"
-            } else {
-                "thicker = higher rate"
-            },
+            "thicker = higher rate",
         ),
     ];
     let present = all.into_iter().filter(|(occurs, _, _)| *occurs);

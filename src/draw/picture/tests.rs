@@ -317,7 +317,8 @@ fn the_number_of_equal_namespaces_is_drawn_over_time() {
 /// The lines of each window between nodes, as their ends with the words of their labels.
 fn bundles(windows: &[&str]) -> Vec<Vec<String>> {
     let options = ViewOptions {
-        mode: Mode::Bundles,
+        mode: Mode::Nodes,
+        is_bundled: true,
         is_picture: true,
         ..ViewOptions::default()
     };

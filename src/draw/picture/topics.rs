@@ -219,7 +219,8 @@ mod tests {
     /// The words on the only line of a window, for a line to the right.
     fn words(window: &str) -> Vec<String> {
         let options = ViewOptions {
-            mode: Mode::Bundles,
+            mode: Mode::Nodes,
+            is_bundled: true,
             ..ViewOptions::default()
         };
         let (view, _) = view(&mission(&[window]), &options);

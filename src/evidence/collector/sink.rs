@@ -36,7 +36,6 @@ impl Sink for BagSink<'_> {
             connection: connection.clone(),
             topic,
             publisher: publisher.map(|p| all.facts.name(&p)),
-            sender: None,
             latched: is_held(connection),
             trust: Reliability::Whole,
             is_outside: false,

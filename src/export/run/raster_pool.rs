@@ -7,7 +7,6 @@ use std::thread;
 
 use rayon::prelude::*;
 
-use super::steps::{RunStep, Steps};
 use crate::base::error::Result;
 use crate::base::geometry::Size;
 use crate::draw::paint::raster::{Canvas, DrawnScene};
@@ -53,7 +52,6 @@ pub(crate) struct RasterPool<'a> {
     wants: &'a [FrameWant],
     needs: Needs,
     palette: Palette,
-    steps: &'a Steps,
     /// The size of a page, in the pixels of the picture.
     page: Size,
     threads: usize,
@@ -65,7 +63,6 @@ impl<'a> RasterPool<'a> {
         sequence: &'a Sequence<'a>,
         frame_times: &'a [FrameTime],
         wants: &'a [FrameWant],
-        steps: &'a Steps,
     ) -> Result<Self> {
         let needs = wants.iter().map(|want| want.needs).max();
         let mut pool = Self {
@@ -74,7 +71,6 @@ impl<'a> RasterPool<'a> {
             wants,
             needs: needs.unwrap_or(Needs::Nothing),
             palette: Palette::new(Vec::new()),
-            steps,
             page: Size::new(1.0, 1.0),
             threads: rayon::current_num_threads(),
         };
@@ -176,15 +172,14 @@ impl<'a> RasterPool<'a> {
             let mut census = Census::default();
             for at in places {
                 let scene = self.scene(self.frame_times[*at]);
-                let drawn = self.steps.time(RunStep::Paint, || canvas.draw(scene))?;
-                self.steps
-                    .time(RunStep::Colours, || census.count(&drawn.pixels.rgba));
+                let drawn = canvas.draw(scene)?;
+                census.count(&drawn.pixels.rgba);
             }
             Ok(census)
         };
         let counted = sample.par_chunks(each).map(count);
         let census = counted.try_reduce(Census::default, |a, b| Ok(a.and(b)))?;
-        Ok(self.steps.time(RunStep::Colours, || census.palette(255)))
+        Ok(census.palette(255))
     }
 }
 
@@ -223,12 +218,12 @@ impl<'a> Drawer<'a> {
     }
 
     fn frame(&mut self, at: usize, wants: &[FrameWant]) -> Result<Packed> {
-        let (steps, needs) = (self.pool.steps, self.pool.needs);
+        let needs = self.pool.needs;
         let frame_time = self.pool.frame_times[at];
-        let scene = steps.time(RunStep::Compose, || self.pool.scene(frame_time));
+        let scene = self.pool.scene(frame_time);
         let undrawn;
         let drawn = if needs >= Needs::Pixels {
-            steps.time(RunStep::Paint, || self.canvas.draw(scene))?
+            self.canvas.draw(scene)?
         } else {
             undrawn = scene;
             DrawnScene::without_pixels(&undrawn)
@@ -238,13 +233,11 @@ impl<'a> Drawer<'a> {
             std::mem::swap(&mut self.before, &mut self.indices);
             self.indices.clone_from(&self.before);
             self.indices.resize(pixels.rgba.len() / 4, 0);
-            steps.time(RunStep::Colours, || {
-                for bytes in drawn.changed() {
-                    let places = bytes.start / 4..bytes.end / 4;
-                    self.matcher
-                        .map(&pixels.rgba[bytes], &mut self.indices[places]);
-                }
-            });
+            for bytes in drawn.changed() {
+                let places = bytes.start / 4..bytes.end / 4;
+                self.matcher
+                    .map(&pixels.rgba[bytes], &mut self.indices[places]);
+            }
         }
         self.at = Some(at);
         let frame = DrawnFrame {
@@ -259,11 +252,10 @@ impl<'a> Drawer<'a> {
             Needs::Nothing => Ok(Packet::Nothing),
             _ => (want.pack)(&frame),
         };
-        let packets = || wants.iter().map(pack).collect::<Result<_>>();
         Ok(Packed {
             frame_time,
             size: (pixels.width, pixels.height),
-            packets: steps.time(RunStep::Compress, packets)?,
+            packets: wants.iter().map(pack).collect::<Result<_>>()?,
         })
     }
 }

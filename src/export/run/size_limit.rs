@@ -1,6 +1,6 @@
 //! `--max-bytes`: drops resolution, then windows, until an animation is small enough.
 
-use super::{Progress, Steps, pass};
+use super::{Progress, pass};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 use crate::export::sequence::{Sequence, SequenceOptions};
@@ -20,13 +20,12 @@ const LAST_SCALES: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
 pub(crate) fn fit(
     sequence: &Sequence<'_>,
     output: &Output,
-    times: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Written> {
     for options in steps(&sequence.options) {
         let mut smaller = sequence.clone();
         smaller.options = options;
-        let outcome = pass(&smaller, std::slice::from_ref(output), times, progress)?;
+        let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
         if let Some(Some(mut written)) = outcome.into_iter().next() {
             written
                 .remarks

@@ -77,7 +77,7 @@ pub(crate) fn doubled(recorded: &Recorded, streams: &[Stream]) -> BTreeSet<Name>
         .filter(|s| s.trust == Reliability::Whole && !s.latched);
     for stream in named.filter(|s| !crate::base::name::is_quiet(s.connection.topic.as_str())) {
         let times = recorded.messages.bounds(stream.times);
-        if let (Some(node), Some((from, to))) = (stream.sender, times) {
+        if let (Some(node), Some((from, to))) = (stream.publisher, times) {
             let all = seen.entry((node, stream.topic)).or_default();
             all.push((from, to, stream.bag));
         }

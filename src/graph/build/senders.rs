@@ -54,7 +54,7 @@ pub(crate) struct Sender {
 /// The node that sent the messages of a stream, if its name is reliable enough.
 pub(crate) fn sender(stream: &Stream) -> Option<Name> {
     stream
-        .sender
+        .publisher
         .filter(|_| !matches!(stream.trust, Reliability::First | Reliability::Gone))
 }
 
