@@ -31,6 +31,7 @@ fn recorded(bag: &Recording, options: CollectOptions) -> Recorded {
             topic: publisher.topic.as_str().into(),
             type_name: publisher.type_name.as_str().into(),
             definition: some(&publisher.definition),
+            is_idl: false,
             type_hash: None,
             publisher: (!publisher.node.is_empty()).then(|| publisher.node.as_str().into()),
             latching: publisher.latching,

@@ -231,7 +231,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("extract", "r.bag -o out/x.parquet", "--nested", "--fields"),
     ("extract", "r.bag --fields --format csv -o out", "--nested", "write Parquet"),
     ("extract", "own.db3 -o out/x.csv", "--msg-path msgs", "--fields"),
-    ("extract", "own.db3 --fields -o out", "--msg-path bags", "contains no `.msg` or `.idl` file"),
+    ("extract", "own.db3 --fields -o out", "--msg-path bags", "contains no file of messages"),
     ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
     ("tables", "r.bag -o out/t", "--shard 0/3", "`1/8` to `8/8`"),
     ("diff", "r.bag s.mcap", "--style dark", "hint: it applies to pictures"),

@@ -1,6 +1,6 @@
 //! Tests of messages and missions as tables: the files compared with each other and with independent counts.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -178,7 +178,7 @@ fn undecodable_messages_are_reported() {
     ];
     let said = ends(dir.path(), &args, 3);
     assert!(
-        said.contains("messages of `/unknown` (a/B) were left out: its definition lacks the type `C` (10 times)"),
+        said.contains("messages of `/unknown` (a/B) were left out: its definition lacks the type `C`; `--msg-path` adds it (10 times)"),
         "{said}"
     );
     assert!(
@@ -280,20 +280,28 @@ fn malformed_definitions_are_errors_of_the_topics_that_need_them() {
         (
             "Thing.msg",
             &b"# Its data\nfloat64[x] data\n"[..],
-            "its definition has an array `[x]` in line 2",
+            "line 2 of its definition is not a field: `float64[x] data`",
         ),
         (
             "Thing.msg",
             b"int8 a\nfloat64\n",
-            "`float64` is not a field in line 2",
+            "line 2 of its definition is not a field: `float64`",
         ),
         (
             "Thing.msg",
             b"\n\n??? data\n",
-            "`??? data` is not a field in line 3",
+            "line 3 of its definition is not a field: `??? data`",
         ),
-        ("Thing.msg", b"\xff\xfe", "it is not UTF-8 text"),
-        ("Thing.idl", b"hello", "it has no `module` with a `struct`"),
+        (
+            "Thing.msg",
+            b"\xff\xfe",
+            "line 1 of its definition is not a field: `\u{fffd}\u{fffd}`",
+        ),
+        (
+            "Thing.idl",
+            b"hello",
+            "its definition in IDL ends early in line 1",
+        ),
         (
             "Thing.idl",
             b"module my_msgs { module msg {\n  struct Thing {\n    double x;\n",
@@ -321,6 +329,181 @@ fn malformed_definitions_are_errors_of_the_topics_that_need_them() {
         assert!(!ends(dir.path(), &only, 0).contains("Thing"));
         fs::remove_file(dir.path().join("ws/my_msgs/msg").join(name)).unwrap();
     }
+}
+
+/// The tables of a recording in `tests/data/fields`, with `more` options, by the names of their files.
+fn fields_of(name: &str, more: &[&str]) -> (BTreeMap<String, Vec<Vec<String>>>, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let bag = format!("{}/tests/data/fields/{name}", env!("CARGO_MANIFEST_DIR"));
+    let args = ["extract", &bag, "-o", "t", "--fields", "--format", "csv"];
+    let output = bagreel(dir.path(), &[&args, more].concat());
+    let files = fs::read_dir(dir.path().join("t")).unwrap();
+    let tables = files.map(|file| {
+        let path = file.unwrap().path();
+        let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+        (stem, csv(&path))
+    });
+    (tables.collect(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// The rows without the columns of the time and the publisher, header first.
+fn decoded(table: &[Vec<String>]) -> Vec<&[String]> {
+    table.iter().map(|row| &row[2..]).collect()
+}
+
+#[test]
+fn poor_definitions_are_replaced_by_known_ones() {
+    let (tables, said) = fields_of("poor.bag", &[]);
+    let good = decoded(&tables["good"]);
+    assert_eq!(good.len(), 20 + 1);
+    assert_eq!(
+        good[0][..4],
+        [
+            "header.seq",
+            "header.stamp",
+            "header.frame_id",
+            "pose.position.x"
+        ]
+    );
+    assert_eq!(
+        good[20][1..6],
+        ["1700000001900000000", "map", "1", "2", "3"]
+    );
+    for poor in ["empty", "unnested", "sentence", "cut", "backslash"] {
+        assert_eq!(decoded(&tables[poor]), good, "{poor}");
+    }
+    assert!(!tables.contains_key("custom"));
+    let why = "messages of `/custom` (my_msgs/Reading) were left out: \
+               line 3 of its definition is not a field: `encoder_msgs/MeasurementMe` (20 times)";
+    assert!(said.contains(why), "{said}");
+
+    // The user's files take precedence over a text that fails.
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        (
+            "my_msgs/msg/Reading.msg",
+            "sensor_msgs/Imu imu\nencoder_msgs/Measurement enc\n",
+        ),
+        ("encoder_msgs/msg/Measurement.msg", "float64 angle\n"),
+    ] {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    let path = folder.path().display().to_string();
+    let (tables, said) = fields_of("poor.bag", &["--msg-path", &path]);
+    assert!(!said.contains("left out"), "{said}");
+    let custom = &tables["custom"];
+    assert_eq!(custom.len(), 20 + 1);
+    assert_eq!(custom[0].last().unwrap(), "enc.angle");
+    assert_eq!(custom[20].last().unwrap(), "19");
+}
+
+#[test]
+fn headers_of_other_packages_and_types_without_fields_are_decoded() {
+    let (tables, said) = fields_of("headers.bag", &[]);
+    assert!(!said.contains("left out"), "{said}");
+    let own = decoded(&tables["own"]);
+    let header = [
+        "header.seq",
+        "header.stamp",
+        "header.frame_id",
+        "radar.cycle",
+        "radar.mode",
+        "last",
+    ];
+    assert_eq!(own[0], header);
+    assert_eq!(
+        own[1],
+        ["0", "1700000000000000000", "radar", "7", "2", "99"]
+    );
+    for empty in ["ping", "states"] {
+        assert_eq!(tables[empty][0], ["time_ns", "publisher"]);
+        assert_eq!(tables[empty].len(), 10 + 1);
+    }
+}
+
+#[test]
+fn a_definition_is_in_idl_if_the_bag_says_so() {
+    let (tables, said) = fields_of("idl.mcap", &[]);
+    assert!(!said.contains("left out"), "{said}");
+    // Its comments contain the words `module` and `struct`.
+    let battery = decoded(&tables["battery"]);
+    assert_eq!(
+        (battery.len(), battery[0]),
+        (41, &["voltage", "current"].map(str::to_owned)[..])
+    );
+    assert_eq!(battery[1], ["24.0", "1.5"]);
+    let motor = decoded(&tables["motor"]);
+    assert_eq!(
+        (motor.len(), motor[40]),
+        (41, &["1", "0", "[20.0,30.0,40.0]"].map(str::to_owned)[..])
+    );
+    let lateral = &tables["lateral"];
+    assert_eq!(lateral[0].last().unwrap(), "steering_tire_rotation_rate");
+    assert_eq!(lateral.len(), 41);
+}
+
+#[test]
+fn bytes_that_are_not_utf8_are_replaced() {
+    for name in ["latin1.mcap", "latin1.bag"] {
+        let (tables, said) = fields_of(name, &[]);
+        assert!(!said.contains("left out"), "{said}");
+        let angle = decoded(&tables["angle"]);
+        assert_eq!(angle[0], ["angle", "name"]);
+        assert_eq!((angle.len(), angle[20][0].as_str()), (21, "19"), "{name}");
+    }
+}
+
+#[test]
+fn other_encodings_are_named() {
+    let (tables, said) = fields_of("cdr.mcap", &[]);
+    for topic in ["/xcdr2", "/xcdr2_string", "/xcdr2_delimited"] {
+        let line = said
+            .lines()
+            .find(|line| line.contains(&format!("`{topic}`")));
+        let why = "they are encoded as XCDR2, which is not decoded (20 times)";
+        assert!(line.is_some_and(|line| line.ends_with(why)), "{said}");
+    }
+    for topic in [
+        "normal",
+        "big_endian",
+        "zero_length",
+        "xcdr1",
+        "empty_std",
+        "empty_header_only",
+    ] {
+        assert_eq!(tables[topic].len(), 20 + 1, "{topic}");
+    }
+}
+
+#[test]
+fn texts_of_services_and_actions_are_split() {
+    let (composed, _) = fields_of("good.mcap", &[]);
+    let (raw, said) = fields_of("kilted.mcap", &[]);
+    assert!(!said.contains("left out"), "{said}");
+    let tables = composed.iter().filter(|(name, _)| *name != "index");
+    for (name, table) in tables.clone() {
+        assert_eq!(&raw[name], table, "{name}");
+    }
+    assert_eq!(tables.map(|(_, table)| table.len() - 1).sum::<usize>(), 123);
+    let goal = decoded(&raw["count._action.send_goal._service_event"]);
+    assert_eq!(
+        goal[0][5..],
+        ["request.goal.order", "response.accepted", "response.stamp"]
+    );
+    assert_eq!(goal[1][5..], ["[20]", "[]", "[]"]);
+    assert_eq!(goal[4][5..], ["[]", "[true]", "[1700000000000000000]"]);
+    let cancel = decoded(&raw["count._action.cancel_goal._service_event"]);
+    assert_eq!(cancel[0][6], "response.return_code");
+    assert_eq!(
+        cancel[4][6..],
+        [
+            "[0]",
+            "[[[100,101,102,103,104,105,106,107,108,109,110,111,112,113,114,115]]]",
+            "[[1700000018000000000]]"
+        ]
+    );
 }
 
 #[test]

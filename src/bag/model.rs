@@ -37,6 +37,8 @@ pub struct Connection {
     pub type_name: Arc<str>,
     /// The message definition, if the bag contains one.
     pub definition: Option<Arc<str>>,
+    /// Whether the definition is in OMG IDL (`ros2idl`), not the text of a `.msg` file.
+    pub is_idl: bool,
     /// The md5 sum (ROS 1) or RIHS01 hash (ROS 2) of the type, if the bag contains one.
     pub type_hash: Option<Arc<str>>,
     /// The node that publishes, if the header names one (`callerid`).

@@ -182,11 +182,13 @@ impl Sqlite3Bag {
             }
             self.ids.insert(raw, place);
             let type_name: Arc<str> = row.text(2).unwrap_or_default().into();
+            let stored = definition(&definitions, &type_name);
             let some = |at| row.text(at).filter(|t| !t.is_empty()).map(Arc::<str>::from);
             self.topics.push(Connection {
                 id: place,
                 topic: name.into(),
-                definition: definitions.get(&type_name).cloned(),
+                definition: stored.map(|stored| Arc::clone(&stored.text)),
+                is_idl: stored.is_some_and(|stored| stored.is_idl),
                 type_name,
                 type_hash: some(5),
                 publisher: None,
@@ -223,25 +225,51 @@ impl Sqlite3Bag {
     }
 }
 
+/// A message definition, and whether it is in IDL.
+#[derive(Clone)]
+struct StoredDefinition {
+    text: Arc<str>,
+    is_idl: bool,
+}
+
 /// Message definitions by type (schema 4).
-fn definitions(db: &Db) -> Result<BTreeMap<Arc<str>, Arc<str>>, Refusal> {
+fn definitions(db: &Db) -> Result<BTreeMap<String, StoredDefinition>, Refusal> {
     let mut found = BTreeMap::new();
     let columns = db.columns("message_definitions")?;
-    if !has(&columns, &["topic_type", "encoded_message_definition"]) {
+    if !has(
+        &columns,
+        &["topic_type", "encoding", "encoded_message_definition"],
+    ) {
         return Ok(found);
     }
-    let sql = "SELECT topic_type, encoded_message_definition FROM message_definitions LIMIT 10000";
+    let sql = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions LIMIT 10000";
     let mut held = 0;
     db.each(sql, &[], |row| {
-        if let (Some(name), Some(text)) = (row.text(0), row.text(1)) {
+        if let (Some(name), Some(encoding), Some(text)) = (row.text(0), row.text(1), row.text(2)) {
             held += text.len();
-            if held < MOST_PAYLOAD && !text.is_empty() {
-                found.insert(name.into(), text.into());
+            let is_idl = encoding.ends_with("idl");
+            if held < MOST_PAYLOAD && (!text.is_empty() || encoding.starts_with("ros")) {
+                let text = text.into();
+                found.insert(name, StoredDefinition { text, is_idl });
             }
         }
         ControlFlow::Continue(())
     })?;
     Ok(found)
+}
+
+/// The definition of a type. Those of services and actions are stored under the names of their files: that of
+/// `a/srv/B_Event` is in `a/srv/B`.
+fn definition<'a>(
+    all: &'a BTreeMap<String, StoredDefinition>,
+    type_name: &str,
+) -> Option<&'a StoredDefinition> {
+    let is_file = |name: &&str| name.contains("/srv/") || name.contains("/action/");
+    let ends = type_name.rmatch_indices('_');
+    let files = ends.map(|(at, _)| &type_name[..at]).filter(is_file);
+    std::iter::once(type_name)
+        .chain(files)
+        .find_map(|name| all.get(name))
 }
 
 /// The facts that the database states about itself (schema 3 and later).

@@ -174,7 +174,7 @@ pub(super) struct ExtractArgs {
     /// Write nested messages as Parquet structures instead of columns with dotted names.
     #[arg(long, requires = "fields")]
     pub(super) nested: bool,
-    /// Folder of `.msg` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
+    /// Folder of `.msg`, `.srv`, `.action` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
     #[arg(
         long,
         visible_alias = "source",

@@ -120,8 +120,8 @@ pub struct Collector {
     streams: Vec<Stream>,
     /// How the messages of each stream are read.
     layouts: Vec<StreamLayout>,
-    /// The schemas of all definitions.
-    schemas: BTreeMap<Arc<str>, Arc<MessageSchema>>,
+    /// The schemas of all types and definitions.
+    schemas: BTreeMap<[Arc<str>; 2], Arc<MessageSchema>>,
     /// The numbers in the headers of streams that have any, by index.
     numbers: BTreeMap<usize, Numbers>,
     /// The number of payload bytes compared so far.
@@ -215,9 +215,10 @@ impl Collector {
     /// The schema of a connection's definition, which is parsed once for all connections of its type.
     fn schema(&mut self, connection: &Connection) -> Arc<MessageSchema> {
         let definition = connection.definition.clone().unwrap_or_default();
-        let parse = |text: &Arc<str>| Arc::new(MessageSchema::of_text(text));
-        let known = self.schemas.entry(definition);
-        Arc::clone(known.or_insert_with_key(parse))
+        let type_name = Arc::clone(&connection.type_name);
+        let known = self.schemas.entry([type_name, definition]);
+        let schema = known.or_insert_with(|| Arc::new(MessageSchema::of(connection)));
+        Arc::clone(schema)
     }
 
     /// Passes the announcement of the newest stream to every source.

@@ -21,6 +21,7 @@ fn connection(id: u32, topic: &str, publisher: Option<&str>, latching: bool) -> 
         topic: topic.into(),
         type_name: "std_msgs/String".into(),
         definition: None,
+        is_idl: false,
         type_hash: None,
         publisher: publisher.map(Into::into),
         latching,

@@ -37,7 +37,7 @@ pub struct Extract {
     pub nested: bool,
     /// The topics to extract.
     pub topics: NameFilter,
-    /// Folders of `.msg` and `.idl` files for types that the bags do not define.
+    /// Folders of `.msg`, `.srv`, `.action` and `.idl` files for types that the bags do not define.
     pub msg_paths: Vec<PathBuf>,
     /// The start; earlier messages are left out.
     pub start: Option<Moment>,

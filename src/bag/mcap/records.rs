@@ -296,6 +296,7 @@ impl<'a> FieldCursor<'a> {
 pub(super) struct SchemaRecord {
     name: Arc<str>,
     definition: Option<Arc<str>>,
+    is_idl: bool,
 }
 
 /// Adds the schema of a record; `None` if it is damaged. A second one with the same id is ignored.
@@ -307,16 +308,16 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     if grammar.schemas.contains_key(&id) {
         return Some(());
     }
-    let is_text = encoding.starts_with("ros") || encoding.ends_with("idl");
-    let text = std::str::from_utf8(data)
-        .ok()
-        .filter(|t| is_text && !t.is_empty());
+    let is_idl = encoding.ends_with("idl");
+    let is_text = is_idl || encoding.starts_with("ros");
     grammar.held += data.len();
-    let definition = text.filter(|_| grammar.held < DEFINITIONS).map(Arc::from);
-    let name = name.into();
-    grammar
-        .schemas
-        .insert(id, SchemaRecord { name, definition });
+    let is_held = is_text && grammar.held < DEFINITIONS;
+    let schema = SchemaRecord {
+        name: name.into(),
+        definition: is_held.then(|| String::from_utf8_lossy(data).into()),
+        is_idl,
+    };
+    grammar.schemas.insert(id, schema);
     Some(())
 }
 
@@ -348,6 +349,7 @@ pub(super) fn channel(
         topic: topic.into(),
         type_name: schema.map_or_else(|| "".into(), |s| Arc::clone(&s.name)),
         definition: schema.and_then(|s| s.definition.clone()),
+        is_idl: schema.is_some_and(|s| s.is_idl),
         encoding: match encoding.as_str() {
             "ros1" => Encoding::Ros1,
             "cdr" => Encoding::Cdr,

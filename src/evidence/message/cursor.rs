@@ -26,6 +26,16 @@ impl fmt::Display for Malformed {
 /// The result of every reading function.
 pub(crate) type PayloadResult<T> = std::result::Result<T, Malformed>;
 
+/// The encoding that a payload's encapsulation header states, if it is another one than plain CDR (OMG DDS-XTypes 1.3, 7.6.3.1.2;
+/// the numbers of XCDR2 are those of DDSI-RTPS 2.5, 10.2).
+pub(crate) fn other_cdr(data: &[u8]) -> Option<&'static str> {
+    match data {
+        [0, 2 | 3, ..] => Some("a parameter list (PL_CDR)"),
+        [0, 6..=0xb | 0x10..=0x15, ..] => Some("XCDR2"),
+        _ => None,
+    }
+}
+
 /// A position in a payload.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadCursor<'a> {
@@ -226,7 +236,7 @@ impl<'a> PayloadCursor<'a> {
     /// The length of the next sequence, whose elements take at least `least` bytes each.
     pub(crate) fn length(&mut self, least: usize) -> PayloadResult<usize> {
         let count = self.u32()? as usize;
-        if count.saturating_mul(least.max(1)) > self.remaining() {
+        if count.saturating_mul(least) > self.remaining() {
             return Err(self.wrong("as many elements as the sequence announces"));
         }
         Ok(count)

@@ -1,6 +1,6 @@
 //! Known message layouts, recognised by type, and by definition or hash.
 
-use super::fields;
+use super::fields::{self, Form};
 use crate::bag::{Connection, Encoding};
 
 /// A message layout.
@@ -131,10 +131,10 @@ impl MessageLayout {
     }
 }
 
-/// The messages in a definition, the outermost first: the last part of the name, then `type name` of each field,
+/// The messages in the definition of a type, the outermost first: the last part of the name, then `type name` of each field,
 /// separated by `;`. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
-pub(crate) fn outline(definition: &str) -> Vec<(String, String)> {
-    let messages = fields::messages(definition).unwrap_or_default();
+pub(crate) fn outline(definition: &str, type_name: &str, form: Form) -> Vec<(String, String)> {
+    let messages = fields::messages(definition, type_name, form).unwrap_or_default();
     let fields = |message: &fields::MessageFields| {
         let fields = message.fields.iter().map(|field| {
             let kind = match field.kind.rsplit('/').next().unwrap_or_default() {
@@ -159,7 +159,7 @@ mod tests {
     fn a_definition_is_boiled_down_to_its_fields() {
         let text = "# a comment\nbyte OK=0 # fine\nstd_msgs/Header header\nuint8 level # how bad\nstring<=255 id\n\
                     KeyValue[<=3] values\nint32 n 5\n===\nMSG: some_msgs/KeyValue\nstring key\nstring X = a;b\n";
-        let fields = |at: usize| outline(text)[at].clone();
+        let fields = |at: usize| outline(text, "a/B", Form::Msg)[at].clone();
         assert_eq!(
             fields(0).1,
             "Header header;byte level;string id;KeyValue[] values;int32 n"

@@ -1,7 +1,9 @@
 //! A message as data, decoded by its own definition: for messages whose layout has changed over the years.
 
+use crate::bag::Connection;
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::outline;
+use crate::evidence::message::fields::Form;
 
 /// A part of a message.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,14 +58,20 @@ const BUILT_IN: [(&str, &str); 2] = [
 pub(crate) struct MessageSchema(Vec<(String, String)>);
 
 impl MessageSchema {
-    /// The schema of a definition's text.
+    /// The schema of a connection's definition.
+    pub(crate) fn of(connection: &Connection) -> Self {
+        let text = connection.definition.as_deref().unwrap_or_default();
+        Self(outline(text, &connection.type_name, Form::of(connection)))
+    }
+
+    /// The schema of the text of a `.msg` file.
     pub(crate) fn of_text(definition: &str) -> Self {
-        Self(outline(definition))
+        Self(outline(definition, "", Form::Msg))
     }
 
     /// The message of this name in a definition of several; empty for the first one.
     pub(crate) fn of_part(definition: &str, name: &str) -> Option<Self> {
-        let mut all = outline(definition);
+        let mut all = outline(definition, "", Form::Msg);
         let at = all.iter().position(|(own, _)| own == name)?;
         all[..=at].rotate_right(1);
         Some(Self(all))

@@ -8,25 +8,19 @@
 mod definition;
 mod idl;
 mod known;
+mod text;
 
 use std::ops::Range;
 
-use super::cursor::{Malformed, PayloadCursor};
+use super::cursor::{Malformed, PayloadCursor, other_cdr};
 use crate::bag::{Connection, Encoding};
 use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn};
-use definition::{Array, Definition, Field};
-
-pub(crate) use definition::MessageFields;
+use definition::Definition;
 use known::Carried;
-pub(crate) use known::KnownTypes;
+use text::{Array, Field};
 
-/// The messages in a definition's text, the outermost first, without a name.
-///
-/// # Errors
-/// The reason why it cannot be used.
-pub(crate) fn messages(definition: &str) -> Result<Vec<MessageFields>, String> {
-    definition::messages(definition, "")
-}
+pub(crate) use known::KnownTypes;
+pub(crate) use text::{Form, MessageFields, messages};
 
 /// The deepest nesting of messages; deeper ones are hostile.
 const DEEPEST: usize = 16;
@@ -72,39 +66,72 @@ pub(crate) struct Decoder {
     is_empty: bool,
 }
 
-impl Decoder {
-    /// The decoder of a connection's messages, and the one to try if their type is known and has changed over the
-    /// years.
+/// The ways to decode a connection's messages.
+#[derive(Debug)]
+pub(crate) struct Decoders {
+    /// In the order to try them until one has decoded a message.
+    pub(crate) all: Vec<Decoder>,
+    /// The reason to state for messages that none decodes.
+    pub(crate) why: String,
+}
+
+impl Decoders {
+    /// By the definition in the bag; where that fails, by the known definition of the type, which may have changed over the
+    /// years, and by the bag's with known types for all nested ones or for what it lacks.
     ///
     /// # Errors
-    /// The reason why its messages cannot be decoded.
-    pub(crate) fn new(
-        connection: &Connection,
-        types: &KnownTypes,
-    ) -> Result<(Self, Option<Self>), String> {
-        if let Encoding::Other(name) = &connection.encoding {
-            return Err(format!("they are encoded as `{name}`"));
-        }
-        let text = connection.definition.as_deref().unwrap_or_default();
-        let type_name = &connection.type_name;
-        let known = |carried| Definition::known(types, type_name, carried);
-        let usual = match connection.encoding {
-            Encoding::Ros1 => Carried::Ros1,
-            _ => Carried::Ros2,
-        };
-        match (Definition::parse(text, type_name), known(usual)) {
-            (Ok(definition), _) => Ok((Self::of(connection, &definition)?, None)),
-            (Err(_), Some(definition)) => {
-                let newer = Self::of(connection, &definition)?;
-                let older = (usual == Carried::Ros2).then_some(Carried::OlderRos2);
-                let older = older.and_then(known).map(|d| Self::of(connection, &d));
-                let older = older.transpose()?.filter(|older| *older != newer);
-                Ok((newer, older))
+    /// The reason why no message can be decoded.
+    pub(crate) fn new(connection: &Connection, types: &KnownTypes) -> Result<Self, String> {
+        let decoder = |definition: Result<_, _>| Decoder::of(connection, &definition?);
+        let tried: Vec<_> = definitions(connection, types)?
+            .into_iter()
+            .map(decoder)
+            .collect();
+        let failed = tried.iter().skip(1).find_map(|one| one.as_ref().err());
+        let why = failed.filter(|_| tried[0].is_err()).cloned();
+        let mut all = Vec::new();
+        for decoder in tried.into_iter().flatten() {
+            if !all.contains(&decoder) {
+                all.push(decoder);
             }
-            (Err(why), None) => Err(why),
+        }
+        match why {
+            Some(why) if all.is_empty() => Err(why),
+            why => Ok(Self {
+                all,
+                why: why.unwrap_or_else(|| "they do not match its definition".to_owned()),
+            }),
         }
     }
+}
 
+/// The definitions to try, that of the bag first; an error for one that cannot be used.
+///
+/// # Errors
+/// For an encoding that is not decoded.
+fn definitions(
+    connection: &Connection,
+    types: &KnownTypes,
+) -> Result<Vec<Result<Definition, String>>, String> {
+    let versions: &[Carried] = match &connection.encoding {
+        Encoding::Ros1 => &[Carried::Ros1],
+        Encoding::Cdr => &[Carried::Ros2, Carried::OlderRos2],
+        Encoding::Other(name) => return Err(format!("they are encoded as `{name}`")),
+    };
+    let known: Vec<_> = versions.iter().map(|one| types.all(*one)).collect();
+    let of_type = known.iter();
+    let of_type = of_type.filter_map(|all| Definition::known(all, &connection.type_name));
+    let own = Definition::parse(connection);
+    let corrected = own.clone().map(|own| own.corrected(&known[0]));
+    let completed = own.clone().map(|own| own.completed(&known[0]));
+    let mut all = vec![own];
+    all.extend(of_type.map(Ok));
+    all.extend([corrected, completed]);
+    all.extend(Definition::empty(connection).map(Ok));
+    Ok(all)
+}
+
+impl Decoder {
     fn of(connection: &Connection, definition: &Definition) -> Result<Self, String> {
         let mut plan = DecodePlan {
             definition,
@@ -159,8 +186,15 @@ impl Decoder {
         let mut payload = PayloadCursor::new(&self.encoding, data)?;
         if !self.is_empty {
             run(&self.steps, &mut payload, &mut batch.columns[first..])?;
+        } else if payload.is_cdr() && payload.remaining() > 0 {
+            payload.u8()?;
         }
         payload.finish()
+    }
+
+    /// The encoding of a payload that is not plain CDR, although its connection's is CDR.
+    pub(crate) fn other_encoding(&self, data: &[u8]) -> Option<&'static str> {
+        other_cdr(data).filter(|_| self.encoding == Encoding::Cdr)
     }
 }
 
@@ -279,7 +313,7 @@ impl DecodePlan<'_> {
                 return Ok(([sec.0, nanosec.0].concat(), 8));
             }
             _ => {
-                let inner = self.definition.find(message, kind)?;
+                let inner = self.definition.find(message, kind, self.is_cdr)?;
                 if self.definition.messages[inner].is_time() {
                     return Ok(self.time(name, levels));
                 }
@@ -347,8 +381,16 @@ fn run(
                 least,
                 element,
             } => {
-                let count = many(payload, *count, *least)?;
-                list(element, count, *least, payload, columns)?;
+                // Elements without columns and bytes need no work, however many a hostile payload states.
+                let least = if own.is_empty() {
+                    *least
+                } else {
+                    (*least).max(1)
+                };
+                let count = many(payload, *count, least)?;
+                if least > 0 {
+                    list(element, count, payload, columns)?;
+                }
                 for column in &mut columns[own.clone()] {
                     column.end_list(*level, count);
                 }
@@ -359,11 +401,11 @@ fn run(
     Ok(())
 }
 
-/// The number of elements of an array; never more than fit in the payload.
+/// The number of elements of an array; never more than fit in the payload, unless they have no bytes.
 fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
         Array::Dynamic => payload.length(least),
-        Array::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
+        Array::Fixed(count) if count.saturating_mul(least) > payload.remaining() => {
             Err(payload.wrong("a whole array"))
         }
         Array::Fixed(count) => Ok(count),
@@ -374,7 +416,6 @@ fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<u
 fn list(
     element: &[DecodeStep],
     count: usize,
-    least: usize,
     payload: &mut PayloadCursor<'_>,
     columns: &mut [TableColumn],
 ) -> Result<(), Malformed> {
@@ -382,8 +423,6 @@ fn list(
         [DecodeStep::One(column, Primitive::Number(_, size))] => {
             numbers(payload, count, *size, &mut columns[*column].values)
         }
-        // Empty elements need no work, however many a hostile payload states.
-        _ if least == 0 => Ok(()),
         _ => (0..count).try_for_each(|_| run(element, payload, columns)),
     }
 }

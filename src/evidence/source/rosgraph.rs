@@ -64,10 +64,11 @@ fn parsed(
     name: &str,
     field: &str,
 ) -> cursor::PayloadResult<MessageValue> {
-    let text = context.stream.connection.definition.as_deref();
+    let connection = &context.stream.connection;
+    let text = connection.definition.as_deref();
     // Some writers list the outermost fields only.
-    let own = text.filter(|text| text.contains(field) && !text.contains("struct "));
-    let own = own.map(MessageSchema::of_text);
+    let own = text.filter(|text| text.contains(field));
+    let own = own.map(|_| MessageSchema::of(connection));
     let forms = FORMS.iter().filter_map(|form| {
         let form = MessageSchema::of_part(form, name)?;
         Some(form.with(MessageSchema::of_text(DEFINITION)))

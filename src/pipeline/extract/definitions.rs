@@ -1,4 +1,4 @@
-//! Definitions of message types in folders of `.msg` and `.idl` files.
+//! Definitions of message types in folders of `.msg`, `.srv`, `.action` and `.idl` files.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -11,7 +11,10 @@ use crate::evidence::message::fields::KnownTypes;
 /// The most files and folders below a folder of definitions: ten times a whole installation of ROS.
 const MOST_FILES: usize = 1 << 16;
 
-/// The types of `.msg` and `.idl` files in folders. A file that cannot be used is an error of the topics that need it.
+/// The extensions of files with definitions, and the names of the folders with such files in a package.
+const KINDS: [&str; 4] = ["msg", "srv", "action", "idl"];
+
+/// The types of the files in folders. A file that cannot be used is an error of the topics that need it.
 ///
 /// # Errors
 /// If a folder cannot be read or contains no such file.
@@ -20,14 +23,16 @@ pub(super) fn read(folders: &[PathBuf]) -> Result<KnownTypes> {
     for folder in folders {
         let files = msg_files(folder)?;
         for (name, path) in &files {
-            let text = file::read_text(path, budget::USER_TEXT);
+            let text = file::read(path, budget::USER_TEXT);
+            let text = text.map(|text| String::from_utf8_lossy(&text).into_owned());
             let text = text.map_err(|error| error.to_string());
             types.add(name, path, text);
         }
         if files.is_empty() {
             return Err(Error::usage(
-                format!("`{}` contains no `.msg` or `.idl` file", folder.display()),
-                "give the folder of one or more packages, which contain files such as `my_msgs/msg/Thing.msg`",
+                format!("`{}` contains no file of messages", folder.display()),
+                "give the folder of one or more packages, which contain files such as `my_msgs/msg/Thing.msg`; \
+                 `.srv`, `.action` and `.idl` files are read as well",
             ));
         }
     }
@@ -52,9 +57,10 @@ fn msg_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
                 waiting.push(path);
             } else if path
                 .extension()
-                .is_some_and(|end| end == "msg" || end == "idl")
+                .is_some_and(|end| KINDS.iter().any(|kind| end == *kind))
             {
-                let outer = folder.parent().filter(|_| folder.ends_with("msg"));
+                let is_kind = KINDS.iter().any(|kind| folder.ends_with(kind));
+                let outer = folder.parent().filter(|_| is_kind);
                 let name = |path: Option<&OsStr>| path.map(|n| n.to_string_lossy().into_owned());
                 let package = name(outer.unwrap_or(&folder).file_name()).unwrap_or_default();
                 let own = name(path.file_stem()).unwrap_or_default();

@@ -11,7 +11,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::evidence::message::fields::{Decoder, KnownTypes};
+use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
 use crate::export::tables::TableFormat;
 use crate::export::tables::folder::{Folder, Part, file_stem};
 use crate::export::tables::writer::Writer;
@@ -100,7 +100,7 @@ fn nothing(job: &Extract, lost: &Lost) -> Error {
         .map(|(name, why)| format!("{name}: {why}"));
     let types = words::some_of(&types.collect::<Vec<String>>(), MOST_NAMED);
     let what = format!("no message could be decoded; {types}");
-    let hint = "`--msg-path DIR` names a folder of `.msg` or `.idl` files for missing definitions";
+    let hint = "`--msg-path DIR` names a folder of `.msg`, `.srv`, `.action` or `.idl` files";
     Error::unsupported(path, what, hint)
 }
 
@@ -323,10 +323,11 @@ impl FieldTables {
 struct MessageTarget {
     topic: String,
     type_name: String,
-    /// The index of the table, or the reason why there is none; `None` for topics that are not requested.
-    table: Option<Result<usize, String>>,
-    /// The decoder to try if the first message does not match the other one.
-    older: Option<Decoder>,
+    /// The indexes of the tables to try until a message fits one, or the reason why there are none; `None` for topics that
+    /// are not requested.
+    tables: Option<Result<Vec<usize>, String>>,
+    /// The reason why messages fit none of them.
+    misfit: String,
     publisher: Option<NodeName>,
     /// The number of stamped messages that have not been delivered.
     missing: u64,
@@ -347,7 +348,7 @@ impl OfBag<'_> {
     fn count_missing(&mut self) {
         let mut reasons: BTreeMap<usize, &str> = BTreeMap::new();
         for (at, source) in self.sources.iter().enumerate() {
-            match &source.table {
+            match &source.tables {
                 Some(Err(why)) => reasons.insert(at, why),
                 Some(Ok(_)) => reasons.insert(at, "they could not be read"),
                 None => None,
@@ -368,21 +369,24 @@ impl Sink for OfBag<'_> {
         let (topic, type_name) = (connection.topic.as_str(), &*connection.type_name);
         self.lost.topics.insert(connection.topic.clone());
         let is_wanted = self.job.topics.passes(topic);
-        let mut older = None;
-        let table = is_wanted.then(|| {
-            let (decoder, other) = Decoder::new(connection, self.types)?;
-            older = other;
-            Ok(self.tables.of(topic, type_name, decoder))
+        let mut misfit = String::new();
+        let tables = is_wanted.then(|| {
+            let decoders = Decoders::new(connection, self.types)?;
+            misfit = decoders.why;
+            let all = decoders.all.into_iter();
+            Ok(all
+                .map(|one| self.tables.of(topic, type_name, one))
+                .collect())
         });
-        let want = match table {
+        let want = match tables {
             Some(Ok(_)) => Want::Payload,
             _ => Want::Stamps,
         };
         self.sources.push(MessageTarget {
             topic: topic.to_owned(),
             type_name: type_name.to_owned(),
-            table,
-            older,
+            tables,
+            misfit,
             publisher: connection.publisher.clone(),
             missing: 0,
         });
@@ -399,25 +403,22 @@ impl Sink for OfBag<'_> {
         let Some(source) = self.sources.get_mut(message.connection.0 as usize) else {
             return;
         };
-        let Some(Ok(table)) = source.table else {
+        let Some(Ok(tables)) = &mut source.tables else {
             return;
         };
         // Messages may be delivered before their stamps.
         source.missing = source.missing.wrapping_sub(1);
-        let older = source.older.take();
         let publisher = source.publisher.as_ref().map(NodeName::as_str);
-        let mut is_added = self.tables.add(table, &message, publisher);
-        if let Some(older) = older.filter(|_| !is_added) {
-            let table = self.tables.of(&source.topic, &source.type_name, older);
-            is_added = self.tables.add(table, &message, publisher);
-            if is_added {
-                source.table = Some(Ok(table));
-            }
+        let mut each = tables.iter().copied();
+        if let Some(fitting) = each.find(|at| self.tables.add(*at, &message, publisher)) {
+            tables.retain(|at| *at == fitting);
+            return;
         }
-        if !is_added {
-            let why = "they do not match its definition";
-            self.lost.add(&source.topic, &source.type_name, 1, why);
-        }
+        let decoder = &self.tables.all[tables[0]].decoder;
+        let why = decoder.other_encoding(message.data);
+        let why = why.map(|name| format!("they are encoded as {name}, which is not decoded"));
+        let why = why.as_deref().unwrap_or(&source.misfit);
+        self.lost.add(&source.topic, &source.type_name, 1, why);
     }
 
     fn notice(&mut self, notice: Notice) {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::definition::{Array, Field, MessageFields};
+use super::text::{Array, Field, LONGEST_QUOTE, MessageFields};
 
 /// The member that ROS 2 adds to messages without fields, as IDL has no empty structures.
 const NOTHING: &str = "structure_needs_at_least_one_member";
@@ -25,10 +25,8 @@ const NAMES: [(&str, &str); 10] = [
 /// A type without its array, and the array.
 type Kind = (String, Array);
 
-/// Whether a definition is in IDL.
-pub(super) fn is_idl(text: &str) -> bool {
-    text.contains("module ") && text.contains("struct ")
-}
+/// The types and the numbers that names stand for.
+type Aliases<'a> = BTreeMap<&'a str, Kind>;
 
 /// All structures of a text, in order.
 ///
@@ -52,7 +50,7 @@ fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageField
     let mut tokens = tokens.peekable();
     let (mut modules, mut statement, mut found) = (Vec::new(), Vec::new(), Vec::new());
     let mut is_inside = false;
-    let mut aliases: BTreeMap<&str, Kind> = BTreeMap::new();
+    let mut aliases = Aliases::new();
     while let Some(token) = tokens.next() {
         match (token, &statement[..]) {
             // An annotation, with what is in its brackets.
@@ -73,8 +71,15 @@ fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageField
                     wrong: None,
                 });
             }
+            ("{", ["enum", name]) => {
+                tokens.by_ref().find(|token| *token == "}");
+                aliases.insert(name, ("uint32".to_owned(), Array::No));
+            }
             ("}", []) if is_inside => is_inside = false,
             ("}", []) => drop(modules.pop()),
+            (";", ["const", .., name, "=", value]) => {
+                aliases.insert(name, ((*value).to_owned(), Array::No));
+            }
             (";", [] | ["const", ..]) => {}
             (";", ["typedef", rest @ ..]) => aliases.extend(named(rest, &aliases)?),
             (";", member) if is_inside => {
@@ -97,9 +102,11 @@ fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageField
         }
         statement.clear();
     }
-    match &statement[..] {
-        [] if modules.is_empty() && !is_inside && !found.is_empty() => Ok(found),
-        _ => Err("its definition in IDL ends early".to_owned()),
+    let is_whole = statement.is_empty() && modules.is_empty() && !is_inside;
+    match found.is_empty() {
+        _ if !is_whole => Err("its definition in IDL ends early".to_owned()),
+        true => Err("its definition in IDL has no `struct`".to_owned()),
+        false => Ok(found),
     }
 }
 
@@ -134,15 +141,14 @@ fn tokens(text: &str) -> Vec<&str> {
 }
 
 /// The names that a type is given, each with its type: `sequence<long> a, b[3]`.
-fn named<'a>(
-    tokens: &[&'a str],
-    aliases: &BTreeMap<&str, Kind>,
-) -> Result<Vec<(&'a str, Kind)>, String> {
+fn named<'a>(tokens: &[&'a str], aliases: &Aliases<'_>) -> Result<Vec<(&'a str, Kind)>, String> {
     let (kind, rest) = kind(tokens, aliases)?;
     let names = rest.split(|token| *token == ",").map(|one| match one {
         [name] => Ok((*name, kind.clone())),
         [name, "[", length, "]"] => {
-            let count = length.parse().map_err(|_| unexpected(tokens))?;
+            let constant = aliases.get(last(length)).map(|(value, _)| value.as_str());
+            let count = constant.unwrap_or(length).parse();
+            let count = count.map_err(|_| unexpected(tokens))?;
             Ok((*name, array_of(kind.clone(), Array::Fixed(count))?))
         }
         _ => Err(unexpected(tokens)),
@@ -153,7 +159,7 @@ fn named<'a>(
 /// The type at the beginning, and the tokens after it.
 fn kind<'t, 'a>(
     tokens: &'t [&'a str],
-    aliases: &BTreeMap<&str, Kind>,
+    aliases: &Aliases<'_>,
 ) -> Result<(Kind, &'t [&'a str]), String> {
     let plain = |kind: &str| (kind.to_owned(), Array::No);
     match tokens {
@@ -179,11 +185,16 @@ fn kind<'t, 'a>(
     let Some((name, rest)) = tokens.split_first() else {
         return Err(unexpected(tokens));
     };
-    let last = name.rsplit("::").next().unwrap_or_default();
+    let last = last(name);
     let package = name.trim_start_matches(':').split_once("::");
     let full = package.map_or_else(|| last.to_owned(), |(own, _)| format!("{own}/{last}"));
     let alias = aliases.get(last).cloned();
     Ok((alias.unwrap_or((full, Array::No)), rest))
+}
+
+/// A name without its modules.
+fn last(name: &str) -> &str {
+    name.rsplit("::").next().unwrap_or_default()
 }
 
 const LISTS: &str = "its definition has lists of lists";
@@ -197,7 +208,7 @@ fn array_of((kind, array): Kind, outer: Array) -> Result<Kind, String> {
 
 fn unexpected(statement: &[&str]) -> String {
     let statement = statement.join(" ");
-    let start: String = statement.chars().take(60).collect();
+    let start: String = statement.chars().take(LONGEST_QUOTE).collect();
     format!("its definition in IDL has an unexpected `{start}`")
 }
 
@@ -265,6 +276,7 @@ module my_msgs { module msg { struct Part { uint8 structure_needs_at_least_one_m
                 "module a { struct b { long c[N]; };",
                 "unexpected `long c [ N ]`",
             ),
+            ("module a { const long N = 3; };", "has no `struct`"),
             ("module a { @verbatim (text=\"x", "ends early"),
             ("module a { struct b : c { };", "unexpected"),
         ] {

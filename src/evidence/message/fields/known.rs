@@ -5,9 +5,7 @@
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use super::definition::{self, MessageFields};
-use super::idl;
-use crate::base::words::visible;
+use super::text::{self, Form, MessageFields};
 
 /// The suffix of a type's name for its fields before they changed.
 const BEFORE: &str = " before";
@@ -35,7 +33,7 @@ static ROS2: LazyLock<CarriedTypes> = LazyLock::new(|| carried(include_str!("ros
 type CarriedTypes = Vec<(Arc<MessageFields>, bool)>;
 
 fn carried(text: &str) -> CarriedTypes {
-    let all = definition::messages(text, "").unwrap_or_default();
+    let all = text::messages(text, "", Form::Msg).unwrap_or_default();
     let named = all.into_iter().skip(1).map(|mut message| {
         let name = message.name.strip_suffix(BEFORE).map(str::to_owned);
         let is_older = name.is_some();
@@ -45,43 +43,38 @@ fn carried(text: &str) -> CarriedTypes {
     named.collect()
 }
 
-/// The types of a `.msg` or `.idl` file.
-fn of_file(name: &str, path: &Path, text: &str) -> Result<Vec<MessageFields>, String> {
-    let is_idl = idl::is_idl(text);
-    if path.extension().is_some_and(|end| end == "idl") && !is_idl {
-        return Err("it has no `module` with a `struct`".to_owned());
-    }
-    match definition::unreadable(text).filter(|_| !is_idl) {
-        Some((number, line)) => Err(format!(
-            "`{}` is not a field in line {number}",
-            visible(line)
-        )),
-        None => definition::messages(text, name),
-    }
-}
-
 impl KnownTypes {
-    /// Adds the type `name`, `my_msgs/Thing`, by the text of its `.msg` or `.idl` file, or the reason why there is none. One
-    /// that cannot be used is an error of the messages that need it; `path` names it.
+    /// Adds the types of the file of `name`, `my_msgs/Thing`, by its text, or the reason why there is none. One that cannot
+    /// be used is an error of the messages that need it; `path` names it.
     pub(crate) fn add(&mut self, name: &str, path: &Path, text: Result<String, String>) {
-        let all = text.and_then(|text| {
-            let all = of_file(name, path, &text);
-            all.map_err(|reason| format!("`{}`: {reason}", path.display()))
+        let end = path.extension().unwrap_or_default().to_string_lossy();
+        let form = Form::named(&end.to_uppercase()).unwrap_or(Form::Msg);
+        let all = text.and_then(|text| text::messages(&text, name, form));
+        // The file of a service or an action defines no message of its own name.
+        let all = all.map(|all| {
+            all.into_iter()
+                .skip(usize::from(form.has_parts()))
+                .collect()
         });
-        let all = all.unwrap_or_else(|reason| vec![MessageFields::malformed(name, reason)]);
+        let mut all: Vec<_> =
+            all.unwrap_or_else(|reason| vec![MessageFields::malformed(name, reason)]);
+        for reason in all.iter_mut().filter_map(|message| message.wrong.as_mut()) {
+            *reason = format!("`{}`: {reason}", path.display());
+        }
         self.own.extend(all.into_iter().map(Arc::new));
     }
 
     /// All types. The first match is used.
-    pub(super) fn all(&self, carried: Carried) -> Vec<&Arc<MessageFields>> {
+    pub(super) fn all(&self, carried: Carried) -> Vec<Arc<MessageFields>> {
         let built_in = match carried {
             Carried::Ros1 => &ROS1,
             Carried::Ros2 | Carried::OlderRos2 => &ROS2,
         };
-        let mut all: Vec<&Arc<MessageFields>> = self.own.iter().collect();
+        let mut all = self.own.clone();
         for is_older in [true, false] {
             if !is_older || carried == Carried::OlderRos2 {
-                all.extend(built_in.iter().filter(|t| t.1 == is_older).map(|t| &t.0));
+                let version = built_in.iter().filter(|t| t.1 == is_older);
+                all.extend(version.map(|t| Arc::clone(&t.0)));
             }
         }
         all
