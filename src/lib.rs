@@ -127,7 +127,7 @@ pub mod values {
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Moment, Period, Span, Stamp};
     #[cfg(feature = "source")]
-    pub use crate::evidence::code::{SourceCode, Version};
+    pub use crate::evidence::code::SourceCode;
     pub use crate::evidence::collector::{CollectOptions, Recorded};
     pub use crate::evidence::{Confidence, Evidence, EvidenceLine, conclude, topology};
     pub use crate::graph::diff::ValueKind;

@@ -7,7 +7,7 @@ use std::process::Command;
 use bagreel::commands::{Baseline, Check, Diff, Report, baseline, check, diff};
 use bagreel::values::{
     CheckFormat, DiffFormat, FindingKind, Fonts, Judgement, Severity, SourceCode, Target,
-    Unwatched, Version, Where, topology,
+    Unwatched, Where, topology,
 };
 use bagreel::{Error, Mission, Output, Reading, Render, read, render};
 
@@ -179,7 +179,6 @@ fn a_program_gives_a_topology_source_code_and_a_font() {
     reading.conclude.topology = topology::read(&file("graph.csv")).unwrap();
     reading.code = Some(SourceCode {
         folder: file("missing"),
-        version: Version::Worktree,
         infers: false,
     });
     assert!(read(&reading).is_err(), "the folder does not exist");

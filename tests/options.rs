@@ -34,7 +34,6 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -p 5 -o out/x.json", "--grace 2"),
     ("render", "r.bag -o out/x.json", "--topology t.csv"),
     ("render", "s.mcap -o out/x.json", "--source ws"),
-    ("render", "s.mcap --source ws -o out/x.json", "--source-at worktree"),
     ("render", "r.bag -o out/x.json", "--infer stamps"),
     ("render", "r.bag -o out/x.dot", "--mode nodes"),
     ("render", "r.bag -o out/x.dot", "--ns-filter /ns/.*"),
@@ -87,13 +86,11 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("info", "r.bag", "--why /chat"),
     ("info", "r.bag", "--topology t.csv"),
     ("info", "s.mcap", "--source ws"),
-    ("info", "s.mcap --source ws", "--source-at worktree"),
     ("info", "r.bag", "--infer stamps"),
     ("extract", "r.bag", "--output out/y.csv"),
     ("extract", "r.bag -o out/x.csv", "--format parquet"),
     ("extract", "r.bag -o out", "--fields"),
     ("extract", "own.db3 --fields -o out", "--msg-path msgs"),
-    ("extract", "r.bag --fields -o out", "--nested"),
     ("extract", "r.bag -o out/x.csv", "--topic-filter /chat"),
     ("extract", "r.bag -o out/x.csv", "--start 20"),
     ("extract", "r.bag -o out/x.csv", "--end 20"),
@@ -134,7 +131,6 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("check", "r.bag --expect new.yaml", "--topology t.csv"),
     ("check", "r.bag --expect stamps.yaml", "--infer stamps"),
     ("check", "s.mcap --expect code.yaml", "--source ws"),
-    ("check", "s.mcap --expect code.yaml --source ws", "--source-at worktree"),
     ("follow", "r.bag", "--format ndjson"),
     ("follow", "r.bag", "--expect all.yaml"),
     ("follow", "r.bag", "--output out/x.json"),
@@ -150,7 +146,6 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("diff", "r.bag s.mcap -o out/x.svg", "--topology t.csv"),
     ("diff", "r.bag s.mcap -o out/x.svg", "--infer stamps"),
     ("diff", "r.bag s.mcap -o out/x.svg", "--source ws"),
-    ("diff", "r.bag s.mcap --source ws -o out/x.svg", "--source-at worktree"),
 ];
 
 /// Command, its arguments, an option, and the message that it causes.
@@ -191,7 +186,6 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "old.json -o out/x.svg", "--topology t.csv", "hint: give the bag itself"),
     ("render", "old.json -o out/x.svg", "--source ws", "hint: give the bag itself"),
     ("render", "old.json -o out/x.svg", "--infer stamps", "hint: give the bag itself"),
-    ("events", "s.mcap", "--source-at HEAD", "--source <DIR>"),
     ("info", "old.json", "--verify", "hint: give the bag itself"),
     ("info", "old.json", "--topology t.csv", "hint: give the bag itself"),
     ("events", "old.json", "--start 9", "hint: give the bag itself"),
@@ -227,9 +221,6 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.svg", "--dot-profile plain", "hint: it applies to `x.dot`"),
     ("render", "r.bag -o out/x.gif", "--link a=https://b.c", "hint: it applies to reports"),
     ("render", "r.bag -o out/x.dot", "--phases p.txt", "hint: it applies to pictures, pages"),
-    ("render", "r.bag -o out/x.gif", "--source-at HEAD", "--source <DIR>"),
-    ("extract", "r.bag -o out/x.parquet", "--nested", "--fields"),
-    ("extract", "r.bag --fields --format csv -o out", "--nested", "write Parquet"),
     ("extract", "own.db3 -o out/x.csv", "--msg-path msgs", "--fields"),
     ("extract", "own.db3 --fields -o out", "--msg-path bags", "contains no file of messages"),
     ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
@@ -239,14 +230,12 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("diff", "r.bag s.mcap", "--source ws", "hint: add a picture"),
     ("diff", "r.bag s.mcap", "--infer stamps", "hint: add a picture"),
     ("diff", "r.bag s.mcap --source ws -o out/x.svg", "--infer source", "never checked"),
-    ("diff", "r.bag s.mcap", "--source-at HEAD", "--source <DIR>"),
     ("diff", "r.bag old.json", "--start 9", "hint: give the bag itself"),
     ("diff", "r.bag all.yaml", "--rate-change 3", "hint: give two missions"),
     ("baseline", "r.bag", "--only /chat", "--update <FILE>"),
     ("baseline", "r.bag --update few.yaml", "--only /chats", "the nearest is `/chat`"),
     ("baseline", "r.bag", "--source ws", "hint: use it with `check`"),
     ("baseline", "r.bag", "--infer stamps", "hint: use it with `check`"),
-    ("baseline", "r.bag --source ws", "--source-at HEAD", "hint: use it with `check`"),
     ("baseline", "old.json", "--period 9", "hint: give the bag itself"),
     ("check", "r.bag --source ws --expect all.yaml", "--infer source", "never checked"),
     ("check", "r.bag --expect all.yaml", "--link a=https://b.c", "hint: it applies to Markdown"),
@@ -256,7 +245,6 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("figure", "r.bag -o out/x.json", "--width 88mm", "hint: figures are `.pdf`"),
     ("figure", "r.bag -o out/{n}.svg", "--width 88mm", "hint: figures are `.pdf`"),
     ("figure", "r.bag -o out/x.svg", "--steps 2", "hint: it chooses the panels"),
-    ("figure", "r.bag -o out/x.svg", "--source-at HEAD", "--source <DIR>"),
     ("figure", "old.json -o out/x.svg", "--start 9", "hint: give the bag itself"),
     ("figure", "old.json -o out/x.svg", "--source ws", "hint: give the bag itself"),
 ];
@@ -385,11 +373,6 @@ fn folder() -> TempDir {
         "ws/p/p/talker.py",
         source::node("talker_late", "out_late", "/in").as_bytes(),
     );
-    git(&folder.path().join("ws"));
-    put(
-        "ws/p/p/talker.py",
-        source::node("talker_late", "out_late", "/gone").as_bytes(),
-    );
     let written = bagreel(folder.path(), "baseline", "r.bag -o all.yaml", "");
     assert_eq!(written.status.code(), Some(0), "{}", text(&written.stderr));
     let kept = bagreel(folder.path(), "tables", "r.bag -o kept", "");
@@ -400,20 +383,6 @@ fn folder() -> TempDir {
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     }
     folder
-}
-
-/// Commits the workspace with a date long before the recording.
-fn git(workspace: &Path) {
-    for args in [
-        "init -q",
-        "add .",
-        "-c user.name=a -c user.email=a@b.c commit -qm code",
-    ] {
-        let mut git = Command::new("git");
-        git.current_dir(workspace).args(args.split_whitespace());
-        git.env("GIT_COMMITTER_DATE", "2023-01-01T00:00:00Z");
-        assert!(git.status().unwrap().success(), "git {args}");
-    }
 }
 
 fn bagreel(folder: &Path, command: &str, args: &str, with: &str) -> Output {

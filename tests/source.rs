@@ -1,4 +1,4 @@
-//! Tests of source code with a bag: names from the bag, edges from the code as of the recording; nothing is executed.
+//! Tests of source code with a bag: names from the bag, edges from the code; nothing is executed.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -235,81 +235,10 @@ fn among_programs_of_one_name_the_one_with_recorded_topics_counts() {
     assert_eq!(edges(folder.path(), &[]), set(&["/n -> /b", "/c -> /n"]));
 }
 
-#[test]
-fn the_code_as_of_the_recording_is_read_from_git() {
-    let folder = folder(
-        &[("/old", STRING), ("/new", STRING)],
-        &["/n"],
-        &[PACKAGE, ("p/p/n.py", &node("n", "old", "x"))],
-    );
-    let workspace = folder.path().join("ws");
-    // The bag begins on 2024-01-01.
-    let commit = |day: &str| {
-        for words in [
-            &["add", "."][..],
-            &[
-                "-c",
-                "user.name=a",
-                "-c",
-                "user.email=a@b",
-                "commit",
-                "-qm",
-                "x",
-            ],
-        ] {
-            let mut git = Command::new("git");
-            git.current_dir(&workspace)
-                .args(words)
-                .env("GIT_AUTHOR_DATE", day)
-                .env("GIT_COMMITTER_DATE", day);
-            assert!(git.output().is_ok_and(|o| o.status.success()), "{words:?}");
-        }
-    };
-    if Command::new("git")
-        .arg("init")
-        .arg("-q")
-        .arg(&workspace)
-        .output()
-        .is_err()
-    {
-        println!("skipped: git is not there");
-        return;
-    }
-    commit("2023-12-24T12:00:00Z");
-    put(&workspace, &[("p/p/n.py", &node("n", "new", "x"))]);
-    commit("2024-03-01T12:00:00Z");
-    put(&workspace, &[("p/p/n.py", &node("n", "old", "new"))]);
-    assert_eq!(edges(folder.path(), &[]), set(&["/n -> /old"]));
-    assert_eq!(
-        edges(folder.path(), &["--source-at", "HEAD"]),
-        set(&["/n -> /new"])
-    );
-    assert_eq!(
-        edges(folder.path(), &["--source-at", "worktree"]),
-        set(&["/n -> /old", "/new -> /n"])
-    );
-    // A folder inside of the repository.
-    let inside = bagreel(folder.path(), &["info", "run.mcap", "--source", "ws/p"]);
-    let said = String::from_utf8_lossy(&inside.stderr).into_owned();
-    assert!(said.contains("code of 2023-12-24 ("), "{said}");
-    for (commit, says) in [
-        ("nowhere", "git has no commit `nowhere`"),
-        ("--output=x", "git has no commit"),
-    ] {
-        let at = format!("--source-at={commit}");
-        let refused = bagreel(folder.path(), &["info", "run.mcap", "--source", "ws", &at]);
-        assert_eq!(refused.status.code(), Some(2));
-        assert!(
-            String::from_utf8_lossy(&refused.stderr).contains(says),
-            "{refused:?}"
-        );
-    }
-}
-
-/// Any code that a repository makes git or bagreel execute would leave a file.
+/// Any code of the workspace that bagreel executes would leave a file.
 #[cfg(unix)]
 #[test]
-fn a_hostile_repository_executes_nothing() {
+fn a_hostile_workspace_executes_nothing() {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = folder(
         &[("/out", STRING)],
@@ -325,147 +254,24 @@ fn a_hostile_repository_executes_nothing() {
     .unwrap();
     fs::set_permissions(&trap, fs::Permissions::from_mode(0o755)).unwrap();
     let trap_path = trap.display().to_string();
-    let git = |words: &[&str]| {
-        let done = Command::new("git")
-            .current_dir(&workspace)
-            .args(words)
-            .env("GIT_COMMITTER_DATE", "2023-12-24T12:00:00Z")
-            .output();
-        assert!(done.is_ok_and(|o| o.status.success()), "{words:?}");
-    };
-    if Command::new("git")
-        .arg("init")
-        .arg("-q")
-        .arg(&workspace)
-        .output()
-        .is_err()
-    {
-        println!("skipped: git is not there");
-        return;
-    }
     std::os::unix::fs::symlink("/etc", workspace.join("out")).unwrap();
-    git(&["add", "."]);
-    git(&[
-        "-c",
-        "user.name=a",
-        "-c",
-        "user.email=a@b",
-        "commit",
-        "-qm",
-        "x",
-    ]);
-    for setting in [
-        "core.fsmonitor",
-        "core.sshCommand",
-        "core.pager",
-        "gpg.program",
-        "core.editor",
-        "filter.x.smudge",
-        "diff.external",
-        "alias.rev-list",
-    ] {
-        git(&["config", setting, &trap_path]);
-    }
-    for hook in [
-        "post-checkout",
-        "post-index-change",
-        "pre-commit",
-        "reference-transaction",
-    ] {
-        fs::copy(&trap, workspace.join(".git/hooks").join(hook)).unwrap();
-    }
-    fs::write(workspace.join(".git/info/attributes"), "*.py filter=x\n").unwrap();
     let cmake = format!("execute_process(COMMAND {trap_path})\n");
     let python = format!("import os\nos.system('{trap_path}')\n");
     let launch = format!(
         "{python}def generate_launch_description():\n    os.system('{trap_path}')\n    return LaunchDescription([])\n"
     );
     let macros = "#define A(x) A(A(x))\n".repeat(5000) + &"A(".repeat(20_000);
+    let git = format!("[core]\n    fsmonitor = {trap_path}\n");
     let files = [
         ("p/CMakeLists.txt", cmake.as_str()),
         ("p/setup.py", &python),
         ("p/x.launch.py", &launch),
         ("p/a.cpp", &macros),
+        (".git/config", &git),
     ];
     put(&workspace, &files);
-    for at in ["worktree", "HEAD"] {
-        assert_eq!(
-            edges(folder.path(), &["--source-at", at]),
-            set(&["/n -> /out"])
-        );
-    }
     assert_eq!(edges(folder.path(), &[]), set(&["/n -> /out"]));
     assert!(!folder.path().join("sprung").exists(), "something was run");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_git_file_must_be_referenced_by_its_repository() {
-    let folder = folder(
-        &[("/out", STRING)],
-        &["/n"],
-        &[PACKAGE, ("p/p/n.py", &node("n", "out", "x"))],
-    );
-    let workspace = folder.path().join("ws");
-    let git = |at: &Path, words: &[&str]| {
-        let mut command = Command::new("git");
-        let named = ["-c", "user.name=a", "-c", "user.email=a@b"];
-        let command = command.current_dir(at).args(named).args(words);
-        let command = command.env("GIT_COMMITTER_DATE", "2023-12-24T12:00:00Z");
-        command.output().is_ok_and(|done| done.status.success())
-    };
-    if !git(&workspace, &["init", "-q"]) {
-        println!("skipped: git is not there");
-        return;
-    }
-    assert!(git(&workspace, &["add", "."]) && git(&workspace, &["commit", "-qm", "x"]));
-    let read = |at: &str| {
-        let output = bagreel(folder.path(), &["info", "run.mcap", "--source", at]);
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
-    assert!(git(&workspace, &["worktree", "add", "-q", "../tree"]));
-    assert!(
-        read("tree").contains("code of 2023-12-24"),
-        "{}",
-        read("tree")
-    );
-    let outer = folder.path().join("outer");
-    fs::create_dir(&outer).unwrap();
-    let module = ["-c", "protocol.file.allow=always", "submodule", "add", "-q"];
-    let module = [&module[..], &["../ws", "sub"]].concat();
-    assert!(git(&outer, &["init", "-q"]) && git(&outer, &module));
-    let sub = read("outer/sub");
-    assert!(sub.contains("code of 2023-12-24"), "{sub}");
-    // A clone without the bytes of its files, which are not fetched.
-    assert!(git(
-        &workspace,
-        &["config", "uploadpack.allowFilter", "true"]
-    ));
-    let url = format!("file://{}", workspace.display());
-    let partial = ["clone", "-q", "--filter=blob:none", "--no-checkout"];
-    let partial = [&partial[..], &[&url, "partial"]].concat();
-    assert!(git(folder.path(), &partial));
-    let said = read("partial");
-    assert!(said.contains("does not have all files of commit"), "{said}");
-    // Refers to the repository of another folder.
-    for way in ["file", "link"] {
-        let foreign = folder.path().join(way);
-        fs::create_dir(&foreign).unwrap();
-        fs::write(foreign.join("package.xml"), PACKAGE.1).unwrap();
-        let own = workspace.join(".git");
-        if way == "file" {
-            let text = format!("gitdir: {}\n", own.display());
-            fs::write(foreign.join(".git"), text).unwrap();
-        } else {
-            std::os::unix::fs::symlink(own, foreign.join(".git")).unwrap();
-        }
-        let said = read(way);
-        assert!(said.contains("1 file of 1 package read;"), "{said}");
-        assert!(
-            said.contains("does not refer back to this folder"),
-            "{said}"
-        );
-    }
 }
 
 /// The output of `info` with the workspace, on both streams.
@@ -636,21 +442,6 @@ fn types_owned_by_another_program_are_not_inferred() {
 }
 
 #[test]
-fn code_outside_git_is_read_and_reported_as_such() {
-    let code = node("n", "out", "x");
-    let folder = folder(
-        &[("/out", STRING)],
-        &["/n"],
-        &[PACKAGE, ("p/p/n.py", &code)],
-    );
-    let text = said(folder.path(), &[]);
-    let note = "the code was read from the working tree, since it is not in a git repository; it may have changed since 2024-01-01";
-    assert!(text.contains(note), "{text}");
-    let asked = said(folder.path(), &["--source-at", "worktree"]);
-    assert!(!asked.contains("as it lies"), "{asked}");
-}
-
-#[test]
 fn a_simulation_is_rejected_if_another_launch_file_starts_the_same_nodes() {
     let launch = |nodes: &[&str]| {
         let node = |n: &&str| format!("Node(package='p', executable='{n}', name='{n}')");
@@ -744,7 +535,6 @@ fn inapplicable_options_are_refused() {
             &["info", "run.mcap", "--source", "nowhere"][..],
             "cannot read `nowhere`",
         ),
-        (&["info", "run.mcap", "--source-at", "HEAD"], "--source"),
         (
             &["info", "run.mcap", "--infer", "source"],
             "`--infer source` requires source code",

@@ -139,7 +139,6 @@ def render(
     grace: int | None = None,
     topology: Iterable[str | os.PathLike[str]] = (),
     source: str | os.PathLike[str] | None = None,
-    source_at: str | None = None,
     infer: str | None = None,
     view: str | None = None,
     mode: str | None = None,
@@ -207,7 +206,6 @@ def figure(
     verify: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
     source: str | os.PathLike[str] | None = None,
-    source_at: str | None = None,
     infer: str | None = None,
 ) -> Rendered:
     """Draws a figure for a paper, as `bagreel figure` does: lifelines, a map of publishers and subscribers, or the
@@ -348,7 +346,6 @@ def extract(
     *,
     format: str | None = None,  # noqa: A002
     fields: bool = False,
-    nested: bool = False,
     msg_path: Iterable[str | os.PathLike[str]] = (),
     topic_filter: str | None = None,
     start: str | None = None,

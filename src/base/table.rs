@@ -174,15 +174,10 @@ impl ColumnValues {
     }
 }
 
-/// The suffix of a list's name in a path of names.
-pub(crate) const LIST: &str = "[]";
-
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
-    /// Whether the name is a dotted path of structures, with [`LIST`] after the names of lists.
-    pub(crate) is_nested: bool,
     pub(crate) kind: ColumnKind,
     pub(crate) values: ColumnValues,
     /// The end of each list among the lists of the next level, or among the values; the rows' own lists first. Empty
@@ -209,7 +204,6 @@ impl TableColumn {
     ) -> Self {
         Self {
             name: name.into(),
-            is_nested: false,
             kind,
             values: ColumnValues::new(kind),
             lists: vec![Vec::new(); levels],

@@ -171,9 +171,6 @@ pub(super) struct ExtractArgs {
     /// Decode messages into a table per topic with a column per field.
     #[arg(long)]
     pub(super) fields: bool,
-    /// Write nested messages as Parquet structures instead of columns with dotted names.
-    #[arg(long, requires = "fields")]
-    pub(super) nested: bool,
     /// Folder of `.msg`, `.srv`, `.action` and `.idl` files for types that the bag does not define (repeatable; common types are built in).
     #[arg(
         long,
@@ -296,9 +293,6 @@ pub(super) struct GraphArgs {
     /// executed.
     #[arg(long, value_name = "DIR")]
     pub(super) source: Option<PathBuf>,
-    /// Read the newest commit, another one, or the working tree. [default: the last commit before the recording ended]
-    #[arg(long, value_name = "HEAD|COMMIT|worktree", requires = "source")]
-    pub(super) source_at: Option<String>,
     /// Also infer subscriptions from equal header stamps, from equal payloads in bags above 64 MB, or unnamed nodes
     /// from source code.
     #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]

@@ -46,18 +46,11 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
         ));
     }
     let format = format(args, &target)?;
-    if args.nested && format == TableFormat::Csv {
-        return Err(Error::usage(
-            "CSV has no structures for `--nested`",
-            "omit `--nested`, or write Parquet",
-        ));
-    }
     Ok(Extract {
         inputs,
         format,
         target,
         fields: args.fields,
-        nested: args.nested,
         topics: NameFilter::parse(args.topic_filter.as_deref().unwrap_or_default())?,
         msg_paths: args.msg_path.clone(),
         start: args.range.start,

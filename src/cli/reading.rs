@@ -3,7 +3,7 @@
 use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use crate::bag::Input;
 use crate::base::error::Error;
-use crate::evidence::code::{SourceCode, Version};
+use crate::evidence::code::SourceCode;
 use crate::evidence::{collector, conclude, given};
 use crate::graph::window::{Division, Length};
 use crate::pipeline::{Phases, Reading};
@@ -64,14 +64,5 @@ fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
             Ok(None)
         };
     };
-    let version = match graph.source_at.as_deref() {
-        None => Version::Recording,
-        Some("worktree") => Version::Worktree,
-        Some(commit) => Version::Commit(commit.to_owned()),
-    };
-    Ok(Some(SourceCode {
-        folder,
-        version,
-        infers,
-    }))
+    Ok(Some(SourceCode { folder, infers }))
 }

@@ -7,8 +7,6 @@
 mod cpp;
 mod declaration;
 mod files;
-mod git;
-mod git_link;
 pub(crate) mod matching;
 mod only;
 mod packages;
@@ -21,7 +19,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::base::error::Result;
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::topology::launch;
 use declaration::FileCode;
@@ -31,24 +28,10 @@ use workspace::{FileDeclaration, Instance, Workspace};
 /// The source code to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceCode {
-    /// A workspace or repository.
+    /// A workspace or repository, of which the working tree is read.
     pub folder: PathBuf,
-    /// The version to read.
-    pub version: Version,
     /// Whether the only possible declaration counts too, although the bag does not name its node.
     pub infers: bool,
-}
-
-/// The version of the code to read.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Version {
-    /// The last commit before the recording's end if the folder is in a git repository; else the working tree.
-    #[default]
-    Recording,
-    /// A commit, branch or tag; `HEAD` is the newest.
-    Commit(String),
-    /// The working tree.
-    Worktree,
 }
 
 /// The source code after reading.
@@ -59,28 +42,17 @@ pub struct Code {
     places: Vec<FileDeclaration>,
     files: usize,
     packages: usize,
-    /// The commit that was read, as text.
-    version: Option<String>,
     infers: bool,
     notices: Vec<Notice>,
 }
 
-/// Reads source code; `end` is the recording's end.
+/// Reads source code.
 ///
 /// # Errors
-/// If the folder cannot be read, or a requested commit does not exist.
-pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
-    let (files, version, mut notices) = match git::files(&wanted.folder, &wanted.version, end)? {
-        git::Checkout::Commit { files, words } => (files, Some(words), Vec::new()),
-        git::Checkout::Lying { note } => {
-            let note = note.map(|text| Notice::new(NoticeKind::Note, text));
-            (
-                files::of_folder(&wanted.folder)?,
-                None,
-                note.into_iter().collect(),
-            )
-        }
-    };
+/// If the folder cannot be read.
+pub fn read(wanted: &SourceCode) -> Result<Code> {
+    let files = files::of_folder(&wanted.folder)?;
+    let mut notices = Vec::new();
     if files.is_cut {
         let text = format!(
             "`{}` contains more than {} or {} of source code; the rest was not read",
@@ -106,7 +78,6 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
         places: workspace.places(),
         files: files.list.len(),
         packages: workspace.packages.len(),
-        version,
         infers: wanted.infers,
         notices,
     })

@@ -19,7 +19,7 @@ use ::parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPro
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
-use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn, TextColumn, span};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
 
 /// The most rows in a group, as in other writers.
 const MOST_ROWS: usize = 1 << 20;
@@ -119,7 +119,7 @@ impl<W: Write + Send> Rows<W> {
 
 /// Chooses the encoding of a column if a dictionary of its values, the default, is unsuitable.
 fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterPropertiesBuilder {
-    let path = || ColumnPath::new(path(column).into_iter().map(str::to_owned).collect());
+    let path = || ColumnPath::new(vec![column.name.to_string()]);
     match &column.values {
         // Times and counts differ little between rows and are rarely equal; they are delta-encoded, which all Parquet 2
         // readers support.
@@ -135,53 +135,10 @@ fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterP
 }
 
 fn schema(batch: &Batch) -> ParquetResult<TypePtr> {
-    let columns = batch.columns.iter();
-    let columns: Vec<PathOf<'_>> = columns.map(|c| (path(c), c)).collect();
-    let root = Type::group_type_builder("schema").with_fields(fields(&columns, 0)?);
+    let fields = batch.columns.iter().map(field);
+    let fields = fields.collect::<ParquetResult<_>>()?;
+    let root = Type::group_type_builder("schema").with_fields(fields);
     root.build().map(Arc::new)
-}
-
-/// A column with its path: the names of the enclosing structures, then its own.
-type PathOf<'a> = (Vec<&'a str>, &'a TableColumn);
-
-fn path(column: &TableColumn) -> Vec<&str> {
-    if column.is_nested {
-        column.name.split('.').collect()
-    } else {
-        vec![column.name.as_ref()]
-    }
-}
-
-/// The fields of the structure, `depth` names deep, that contains these columns.
-fn fields(columns: &[PathOf<'_>], depth: usize) -> ParquetResult<Vec<TypePtr>> {
-    let groups = columns.chunk_by(|(a, _), (b, _)| {
-        a.get(depth) == b.get(depth) && a.len() > depth + 1 && b.len() > depth + 1
-    });
-    let fields = groups.map(|group| {
-        let (path, column) = &group[0];
-        let name = path.get(depth).copied().unwrap_or_default();
-        let plain = name.trim_end_matches(LIST);
-        let is_list = plain != name;
-        if path.len() == depth + 1 {
-            let levels = if column.is_nested {
-                usize::from(is_list)
-            } else {
-                column.lists.len()
-            };
-            return field(column, plain, levels);
-        }
-        let own = if is_list { "element" } else { plain };
-        let inner = Type::group_type_builder(own)
-            .with_repetition(Repetition::REQUIRED)
-            .with_fields(fields(group, depth + 1)?);
-        let inner = Arc::new(inner.build()?);
-        if is_list {
-            list(plain, inner)
-        } else {
-            Ok(inner)
-        }
-    });
-    fields.collect()
 }
 
 /// A list of these elements.
@@ -196,9 +153,10 @@ fn list(name: &str, element: TypePtr) -> ParquetResult<TypePtr> {
     outer.build().map(Arc::new)
 }
 
-/// The schema of a column inside `levels` lists.
-fn field(column: &TableColumn, name: &str, levels: usize) -> ParquetResult<TypePtr> {
-    let own = |levels: usize| if levels == 0 { name } else { "element" };
+/// The schema of a column.
+fn field(column: &TableColumn) -> ParquetResult<TypePtr> {
+    let levels = column.lists.len();
+    let own = |level: usize| if level == 0 { &*column.name } else { "element" };
     let optional = column.valid.is_some() && levels == 0;
     let (physical, logical) = kind(column.kind);
     let value = Type::primitive_type_builder(own(levels), physical)

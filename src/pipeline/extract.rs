@@ -33,8 +33,6 @@ pub struct Extract {
     pub format: TableFormat,
     /// Whether messages are decoded.
     pub fields: bool,
-    /// Whether nested messages are structures; otherwise columns with dotted names.
-    pub nested: bool,
     /// The topics to extract.
     pub topics: NameFilter,
     /// Folders of `.msg`, `.srv`, `.action` and `.idl` files for types that the bags do not define.

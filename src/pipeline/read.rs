@@ -51,7 +51,7 @@ pub struct Reading {
     pub conclude: conclude::ConcludeOptions,
     /// The number of silent windows before an element counts as gone.
     pub grace: usize,
-    /// The source code to read once the recording's date is known; replaces `conclude.code`.
+    /// The source code to read; replaces `conclude.code`.
     #[cfg(feature = "source")]
     pub code: Option<SourceCode>,
     /// The fraction by which a rate must change to be reported, ≥ 0.
@@ -264,13 +264,12 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     Ok(mission)
 }
 
-/// The findings from everything read, with the source code as of the recording.
+/// The findings from everything read, and from source code.
 fn concluded(collected: &Collected, reading: &Reading) -> Result<Findings> {
     #[cfg(feature = "source")]
     if let Some(wanted) = &reading.code {
-        let span = collected.recorded.span.unwrap_or(collected.range);
         let mut options = reading.conclude.clone();
-        options.code = Some(Arc::new(code::read(wanted, span.end)?));
+        options.code = Some(Arc::new(code::read(wanted)?));
         return conclude(&collected.recorded, &options);
     }
     conclude(&collected.recorded, &reading.conclude)

@@ -162,7 +162,7 @@ def missions_are_judged():
         other = bagreel.diff(COURIER, WAREHOUSE, page)
         assert not other.same and len(other) > 50 and other[0]["kind"] == "node" and page.exists()
         assert bagreel.diff(COURIER, COURIER).same
-        table = bagreel.extract(COURIER, Path(folder) / "t", fields=True, nested=True, topic_filter="/scan")
+        table = bagreel.extract(COURIER, Path(folder) / "t", fields=True, topic_filter="/scan")
         assert sorted(path.name for path in table.iterdir()) == ["index.parquet", "scan.parquet"]
 
 

@@ -27,9 +27,9 @@ const HEADINGS: [(&str, &str); 7] = [
     (
         "Output",
         "outputs output format frame_ms strip max_bytes json runs dot_profile link \
-         fields nested parts undecidable explain",
+         fields parts undecidable explain",
     ),
-    ("Evidence", "topology source source_at infer why"),
+    ("Evidence", "topology source infer why"),
     ("Performance", "tier shard skip_existing jobs"),
 ];
 

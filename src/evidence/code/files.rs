@@ -31,7 +31,7 @@ pub(super) enum FileKind {
 }
 
 /// The longest file that is read, in bytes: longer ones are generated or data.
-pub(super) const LONGEST: u64 = 600_000;
+const LONGEST: u64 = 600_000;
 
 /// The most files that are read.
 pub(super) const MOST_FILES: usize = 50_000;
@@ -66,7 +66,7 @@ pub(super) struct Files {
 
 impl Files {
     /// Adds a file if the limits allow.
-    pub(super) fn add(&mut self, path: String, bytes: &[u8]) {
+    fn add(&mut self, path: String, bytes: &[u8]) {
         if self.list.len() >= MOST_FILES || self.bytes + bytes.len() > MOST_BYTES {
             self.is_cut = true;
             return;
@@ -120,7 +120,7 @@ fn is_python(bytes: &[u8]) -> bool {
     first.starts_with(b"#!") && first.windows(6).any(|w| w == b"python")
 }
 
-/// The files below a folder in the working tree. Links are not followed, and nothing but regular files is opened.
+/// The files below a folder. Links are not followed, and nothing but regular files is opened.
 ///
 /// # Errors
 /// If the folder itself cannot be read; unreadable files inside are left out.

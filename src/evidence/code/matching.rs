@@ -120,7 +120,7 @@ fn draw_named(
         let matches = best(candidates, text, recorded);
         let mut drawn = 0;
         for found in &matches {
-            drawn += usize::from(draw(code, known, recorded, (*node, words), found));
+            drawn += usize::from(draw(known, recorded, (*node, words), found));
             all.explained.insert(found.instance.program.clone());
         }
         if let Some(found) = matches.first() {
@@ -136,7 +136,7 @@ fn draw_named(
 /// The most nodes without code that are named.
 const MOST_NAMES: usize = 8;
 
-/// `412 files of 6 packages read (code of …); 22 edges for 4 named nodes; 6 declarations not drawn (4: …, 2:
+/// `412 files of 6 packages read; 22 edges for 4 named nodes; 6 declarations not drawn (4: …, 2:
 /// …)`
 fn summary(
     code: &Code,
@@ -144,12 +144,8 @@ fn summary(
     inferred: usize,
     undrawn: &only::Undrawn,
 ) -> Notice {
-    let version = code
-        .version
-        .as_ref()
-        .map_or(String::new(), |v| format!(" ({v})"));
     let mut text = format!(
-        "{} of {} read{version}; {} for {}",
+        "{} of {} read; {} for {}",
         count(code.files, "file"),
         count(code.packages, "package"),
         count(edges, "edge"),
@@ -367,7 +363,6 @@ fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
 
 /// Adds an edge unless the bag already contains or contradicts it; returns whether it was added.
 fn draw(
-    code: &Code,
     known: &mut Conclusions<'_>,
     recorded: &RecordedTopics,
     (node, words): (Name, &BTreeSet<&str>),
@@ -380,7 +375,7 @@ fn draw(
     }
     let when = Validity::Like(ElementKey::Node(node));
     let inference = Inference::new(source_id("source"), what, Confidence::Declared, when);
-    known.because(inference, None, |_| sentence(code, found, words));
+    known.because(inference, None, |_| sentence(found, words));
     true
 }
 
@@ -392,8 +387,8 @@ fn has_room(known: &Conclusions<'_>, recorded: &RecordedTopics, topic: Name) -> 
     !recorded.stated.contains(&topic) && publishers < offered
 }
 
-/// `arm/servo.py:41  create_subscription(…); the node is named by rosout; launched at arm.launch.py:67; code of …`
-fn sentence(code: &Code, found: &Match<'_>, words: &BTreeSet<&str>) -> String {
+/// `arm/servo.py:41  create_subscription(…); the node is named by rosout; launched at arm.launch.py:67`
+fn sentence(found: &Match<'_>, words: &BTreeSet<&str>) -> String {
     let declaration = &found.placed.declaration;
     let words: Vec<&str> = words.iter().copied().collect();
     let mut text = format!(
@@ -408,9 +403,6 @@ fn sentence(code: &Code, found: &Match<'_>, words: &BTreeSet<&str>) -> String {
     }
     if let Some((path, line)) = &found.instance.launched {
         text.extend(["; launched at ", path, ":", &line.to_string()]);
-    }
-    if let Some(version) = &code.version {
-        text.extend(["; ", version]);
     }
     text
 }

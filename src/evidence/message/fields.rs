@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::cursor::{Malformed, PayloadCursor, other_cdr};
 use crate::bag::{Connection, Encoding};
-use crate::base::table::{Batch, ColumnKind, ColumnValues, LIST, TableColumn};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
 use definition::Definition;
 use known::Carried;
 use text::{Array, Field};
@@ -149,27 +149,16 @@ impl Decoder {
         })
     }
 
-    /// A column for each field, in the order of the definition, with names distinct from `taken`. With `is_nested` they
-    /// are paths of names, with [`LIST`] after lists.
-    pub(crate) fn columns(
-        &self,
-        taken: &[&str],
-        is_nested: bool,
-    ) -> impl Iterator<Item = TableColumn> {
+    /// A column for each field, in the order of the definition, with names distinct from `taken`.
+    pub(crate) fn columns(&self, taken: &[&str]) -> impl Iterator<Item = TableColumn> {
         let mut names: Vec<String> = Vec::new();
         self.columns.iter().map(move |(path, kind, levels)| {
             let mut name = path.clone();
-            if !is_nested {
-                name = path.replace(LIST, "");
-            }
             while taken.contains(&name.as_str()) || names.contains(&name) {
                 name.push('_');
             }
             names.push(name.clone());
-            TableColumn {
-                is_nested,
-                ..TableColumn::full(name, *kind, *levels)
-            }
+            TableColumn::full(name, *kind, *levels)
         })
     }
 
@@ -266,8 +255,7 @@ impl DecodePlan<'_> {
             return Ok((vec![step], bytes(1)));
         }
         let start = self.columns.len();
-        let name = format!("{name}{LIST}");
-        let (element, least) = self.one(message, &field.kind, &name, levels + 1, depth)?;
+        let (element, least) = self.one(message, &field.kind, name, levels + 1, depth)?;
         let list = DecodeStep::List {
             count,
             columns: start..self.columns.len(),

@@ -39,7 +39,6 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     let mut tables = FieldTables {
         folder: Folder::create(job.target.path())?,
         format: job.format,
-        is_nested: job.nested,
         all: Vec::new(),
         names: BTreeSet::from([INDEX.to_owned()]),
         waiting: 0,
@@ -143,7 +142,6 @@ struct FieldTable {
 struct FieldTables {
     folder: Folder,
     format: TableFormat,
-    is_nested: bool,
     all: Vec<FieldTable>,
     /// The file names in use, in lower case: some file systems are case-insensitive.
     names: BTreeSet<String>,
@@ -163,7 +161,7 @@ impl FieldTables {
             TableColumn::full(TIME, ColumnKind::Time, 0),
             TableColumn::known(PUBLISHER, ColumnKind::Text),
         ];
-        let fields = decoder.columns(&[TIME, PUBLISHER], self.is_nested);
+        let fields = decoder.columns(&[TIME, PUBLISHER]);
         self.all.push(FieldTable {
             topic: topic.to_owned(),
             type_name: type_name.to_owned(),

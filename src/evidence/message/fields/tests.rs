@@ -28,7 +28,7 @@ fn decoded(connection: &Connection, data: &[u8]) -> Result<Batch, String> {
 fn decoded_by(connection: &Connection, types: &KnownTypes, data: &[u8]) -> Result<Batch, String> {
     let decoders = Decoders::new(connection, types)?;
     let batch = decoders.all.iter().find_map(|decoder| {
-        let mut batch = Batch::of(decoder.columns(&["time_ns"], false));
+        let mut batch = Batch::of(decoder.columns(&["time_ns"]));
         decoder.decode(data, &mut batch, 0).ok()?;
         batch.rows = 1;
         Some(batch)
@@ -153,7 +153,7 @@ fn common_types_need_no_definition_in_either_version() {
         panic!("two decoders");
     };
     let fits = |decoder: &Decoder, lists: usize| {
-        let mut batch = Batch::of(decoder.columns(&[], false));
+        let mut batch = Batch::of(decoder.columns(&[]));
         let mut data = vec![0, 1, 0, 0, 7, 0, 0, 0];
         data.extend(vec![0; 4 * lists]);
         decoder.decode(&data, &mut batch, 0).is_ok()
