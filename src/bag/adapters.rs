@@ -5,6 +5,7 @@ use std::thread;
 
 use crate::bag::model::{ConnectionId, Message, Reader, Sink};
 use crate::base::error::Result;
+use crate::base::ids::ById;
 use crate::base::notice::Notice;
 use crate::base::rhythm::OUT_OF_ORDER_NS;
 use crate::base::time::{Span, Stamp};
@@ -87,12 +88,12 @@ pub(crate) fn share(done: usize, total: usize, whole: u64) -> u64 {
 pub(crate) struct Gather {
     /// Whether the sizes are not known.
     pub(crate) sizeless: bool,
-    runs: Vec<(Vec<Stamp>, Vec<u32>)>,
+    runs: ById<ConnectionId, (Vec<Stamp>, Vec<u32>)>,
     touched: Vec<ConnectionId>,
     held: usize,
     last: Stamp,
     /// For each point at which time went back, the number of stamps batched per connection.
-    cuts: Vec<Vec<usize>>,
+    cuts: Vec<ById<ConnectionId, usize>>,
     /// Whether some stamps were flushed early.
     spilled: bool,
 }
@@ -106,17 +107,13 @@ const MOST_GATHERED: usize = 1 << 18;
 impl Gather {
     /// Adds one message.
     pub(crate) fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
-        let at = id.0 as usize;
-        if self.runs.len() <= at {
-            self.runs.resize_with(at + 1, Default::default);
-        }
         if self.last.since(time) > OUT_OF_ORDER_NS && self.cuts.len() < MOST_CUTS {
             self.cuts
                 .push(self.runs.iter().map(|run| run.0.len()).collect());
             self.last = time;
         }
         self.last = self.last.max(time);
-        let run = &mut self.runs[at];
+        let run = self.runs.grown(id);
         if run.0.is_empty() {
             self.touched.push(id);
         }
@@ -131,13 +128,13 @@ impl Gather {
 
     /// The number of messages batched for a connection.
     pub(crate) fn count(&self, id: ConnectionId) -> u64 {
-        let run = self.runs.get(id.0 as usize);
+        let run = self.runs.get(id);
         run.map_or(0, |run| run.0.len() as u64)
     }
 
     /// Whether exactly these stamps are batched for a connection, in any order.
     pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
-        let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
+        let held = self.runs.get(id).map_or(&[][..], |run| &run.0);
         let sorted = |stamps: &[Stamp]| {
             let mut stamps = stamps.to_vec();
             stamps.sort_unstable();
@@ -152,7 +149,7 @@ impl Gather {
         if self.spilled {
             return None;
         }
-        let Some(run) = self.runs.get_mut(id.0 as usize) else {
+        let Some(run) = self.runs.get_mut(id) else {
             return Some(0);
         };
         let held = run.0.len();
@@ -169,7 +166,7 @@ impl Gather {
         let mut gone = 0;
         self.cuts.clear();
         for id in &self.touched {
-            let (stamps, sizes) = &mut self.runs[id.0 as usize];
+            let (stamps, sizes) = &mut self.runs[*id];
             let before = stamps.len();
             let mut pairs: Vec<_> = stamps.drain(..).zip(sizes.drain(..)).collect();
             pairs.retain(|(at, _)| is_right(*at));
@@ -185,23 +182,22 @@ impl Gather {
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
         self.spilled = false;
-        let mut from = vec![0; self.runs.len()];
+        let mut from = ById::like(&self.runs, 0);
         let whole = self.runs.iter().map(|run| run.0.len()).collect();
         for to in self.cuts.drain(..).chain([whole]) {
             sink.part();
             for id in &self.touched {
-                let at = id.0 as usize;
-                let (stamps, sizes) = &self.runs[at];
-                let part = from[at]..to.get(at).copied().unwrap_or(0);
+                let (stamps, sizes) = &self.runs[*id];
+                let part = from[*id]..to.get(*id).copied().unwrap_or(0);
                 if !part.is_empty() {
                     let sizes = (!self.sizeless).then(|| &sizes[part.clone()]);
-                    from[at] = part.end;
+                    from[*id] = part.end;
                     sink.stamps(*id, &stamps[part], sizes);
                 }
             }
         }
         for id in self.touched.drain(..) {
-            let (stamps, sizes) = &mut self.runs[id.0 as usize];
+            let (stamps, sizes) = &mut self.runs[id];
             stamps.clear();
             sizes.clear();
         }

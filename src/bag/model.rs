@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::base::error::Result;
+use crate::base::ids::ids;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Period, Span, Stamp};
@@ -22,9 +23,10 @@ pub enum Encoding {
     Other(String),
 }
 
-/// The index of a connection among those that a reader has announced, from 0 without gaps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ConnectionId(pub u32);
+ids! {
+    /// The index of a connection among those that a reader has announced, from 0 without gaps.
+    ConnectionId,
+}
 
 /// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

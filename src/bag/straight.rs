@@ -4,7 +4,8 @@
 //! The first reading detects where time goes back, in file order; if it does, a second reading shifts each run to
 //! after the previous one.
 
-use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
+use crate::bag::model::{ConnectionId, Message, Sink};
+use crate::base::ids::ById;
 use crate::base::rhythm::{OUT_OF_ORDER_NS, RUN_FEWEST, RUN_SHARE};
 use crate::base::time::Stamp;
 
@@ -17,8 +18,8 @@ pub(crate) struct Seam {
     /// The last time of the previous run and the first of this run, as recorded.
     pub(crate) before: Stamp,
     pub(crate) after: Stamp,
-    /// The number of messages before it, by connection.
-    counts: Vec<u64>,
+    /// The number of messages before it; 0 for connections that are described after it.
+    counts: ById<ConnectionId, u64>,
 }
 
 /// The state of a connection.
@@ -50,8 +51,8 @@ struct Suspect {
 /// A sink that detects seams.
 pub(crate) struct Watched<'a> {
     sink: &'a mut dyn Sink,
-    lines: Vec<Line>,
-    touched: Vec<usize>,
+    lines: ById<ConnectionId, Line>,
+    touched: Vec<ConnectionId>,
     last: Stamp,
     suspect: Option<Suspect>,
     seams: Vec<Seam>,
@@ -61,7 +62,7 @@ impl<'a> Watched<'a> {
     pub(crate) fn new(sink: &'a mut dyn Sink) -> Self {
         Self {
             sink,
-            lines: Vec::new(),
+            lines: ById::default(),
             touched: Vec::new(),
             last: Stamp::MIN,
             suspect: None,
@@ -75,8 +76,8 @@ impl<'a> Watched<'a> {
         self.seams
     }
 
-    fn watch(&mut self, at: usize, time: Stamp) {
-        let line = &mut self.lines[at];
+    fn watch(&mut self, at: ConnectionId, time: Stamp) {
+        let line = self.lines.grown(at);
         if let Some(suspect) = &mut self.suspect {
             suspect.messages += 1;
             let latest = line.last.max(line.next);
@@ -86,7 +87,7 @@ impl<'a> Watched<'a> {
                 suspect.went_on -= u64::from(line.fell == Some(false));
                 suspect.fell += 1;
                 suspect.is_past = false;
-                suspect.seam.counts[at] = line.count;
+                *suspect.seam.counts.grown(at) = line.count;
                 suspect.seam.before = suspect.seam.before.max(latest.unwrap_or(Stamp::MIN));
                 (line.last, line.next, line.fell) = (latest, None, Some(true));
             } else if let (Some(last), None) = (line.last, line.next) {
@@ -109,13 +110,14 @@ impl<'a> Watched<'a> {
         }
         let fall = line.last.map_or(0, |last| last.since(time));
         if fall > OUT_OF_ORDER_NS && fall < LONGEST_NS {
-            let counts = self.lines.iter().map(|line| line.before_part).collect();
-            let mut seam = Seam {
+            let own = line.count;
+            let mut counts: ById<_, _> = self.lines.iter().map(|line| line.before_part).collect();
+            counts[at] = own;
+            let seam = Seam {
                 before: self.last,
                 after: time,
                 counts,
             };
-            seam.counts[at] = self.lines[at].count;
             self.suspect = Some(Suspect {
                 seam,
                 fell: 0,
@@ -142,7 +144,7 @@ impl<'a> Watched<'a> {
         let all = suspect.fell + suspect.went_on;
         let most = suspect.fell * 100 >= all * RUN_SHARE && suspect.fell >= fewest;
         let is_run = most && suspect.messages >= RUN_FEWEST;
-        for line in &mut self.lines {
+        for line in self.lines.iter_mut() {
             let next = line.next.take();
             line.fell = None;
             line.last = if is_run { next } else { line.last.max(next) };
@@ -158,30 +160,23 @@ impl Sink for Watched<'_> {
         Some(&mut *self.sink)
     }
 
-    fn connection(&mut self, connection: &Connection) -> Want {
-        self.lines.push(Line::default());
-        self.sink.connection(connection)
-    }
-
     fn part(&mut self) {
         self.decide(false);
         if let Some(suspect) = &mut self.suspect {
             suspect.is_in_part = false;
         }
         for at in self.touched.drain(..) {
-            self.lines[at].before_part = self.lines[at].count;
+            let line = self.lines.grown(at);
+            line.before_part = line.count;
         }
         self.sink.part();
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
-        let at = connection.0 as usize;
-        if at < self.lines.len() {
-            self.touched.push(at);
-            for time in stamps {
-                self.watch(at, *time);
-                self.lines[at].count += 1;
-            }
+        self.touched.push(connection);
+        for time in stamps {
+            self.watch(connection, *time);
+            self.lines.grown(connection).count += 1;
         }
         self.sink.stamps(connection, stamps, sizes);
     }
@@ -203,7 +198,7 @@ pub(crate) struct Straightened<'a> {
     /// The shift of each run in nanoseconds; 0 for the first.
     shifts: Vec<i64>,
     /// The number of stamps and of messages per connection so far.
-    counts: Vec<[u64; 2]>,
+    counts: ById<ConnectionId, [u64; 2]>,
 }
 
 /// The shifts of all runs; 0 for the first.
@@ -237,16 +232,19 @@ impl<'a> Straightened<'a> {
             sink,
             seams,
             shifts: shifts(seams),
-            counts: Vec::new(),
+            counts: ById::default(),
         }
     }
 
     /// The shifted time of a connection's next stamp or message.
     fn moved(&mut self, connection: ConnectionId, kind: usize, time: Stamp) -> Stamp {
-        let at = connection.0 as usize;
-        let count = self.counts[at][kind];
-        self.counts[at][kind] += 1;
-        let behind = |seam: &Seam| seam.counts.get(at).is_none_or(|before| *before <= count);
+        let next = &mut self.counts.grown(connection)[kind];
+        let count = *next;
+        *next += 1;
+        let behind = |seam: &Seam| {
+            let before = seam.counts.get(connection);
+            before.is_none_or(|before| *before <= count)
+        };
         let run = self.seams.partition_point(behind);
         time.plus(self.shifts[run])
     }
@@ -255,11 +253,6 @@ impl<'a> Straightened<'a> {
 impl Sink for Straightened<'_> {
     fn behind(&mut self) -> Option<&mut dyn Sink> {
         Some(&mut *self.sink)
-    }
-
-    fn connection(&mut self, connection: &Connection) -> Want {
-        self.counts.push([0; 2]);
-        self.sink.connection(connection)
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -308,7 +301,6 @@ mod tests {
     fn seams(parts: Parts<'_>) -> Vec<Seam> {
         let mut kept = Kept::default();
         let mut watched = Watched::new(&mut kept);
-        watched.lines.resize(3, Line::default());
         feed(parts, &mut watched);
         watched.seams()
     }
@@ -327,7 +319,6 @@ mod tests {
         assert_eq!(reported, [(59, 19)]);
         let mut kept = Kept::default();
         let mut moved = Straightened::new(&found, &mut kept);
-        moved.counts.resize(3, [0; 2]);
         feed(parts, &mut moved);
         assert_eq!(kept.0[0], (0..60).chain(59..109).collect::<Vec<_>>());
         assert_eq!(kept.0[1], [0, 30, 77]);
@@ -340,7 +331,6 @@ mod tests {
         let found = seams(parts);
         let mut kept = Kept::default();
         let mut moved = Straightened::new(&found, &mut kept);
-        moved.counts.resize(3, [0; 2]);
         feed(parts, &mut moved);
         assert_eq!(found.len(), 1);
         assert_eq!(kept.0[0], (0..60).chain(60..110).collect::<Vec<_>>());

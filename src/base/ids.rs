@@ -59,6 +59,18 @@ impl<I: Id, T> ById<I, T> {
         self.list.get_mut(id.at())
     }
 
+    /// The value of an id, to change it; the list is extended as far as it, so that its length never depends on how many
+    /// ids were known at some time.
+    pub(crate) fn grown(&mut self, id: I) -> &mut T
+    where
+        T: Default,
+    {
+        if self.list.len() <= id.at() {
+            self.list.resize_with(id.at() + 1, T::default);
+        }
+        &mut self.list[id.at()]
+    }
+
     /// Every id.
     pub fn ids(&self) -> impl ExactSizeIterator<Item = I> + Clone + use<I, T> {
         (0..self.list.len()).map(I::of)

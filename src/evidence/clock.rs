@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::base::budget;
+use crate::base::rhythm::GAP_NS;
 use crate::base::time::{Span, Stamp};
+use crate::evidence::times::Calendar;
 
 pub(crate) const DAY: i64 = 86_400_000_000_000;
 /// The distance in days beyond which times count as far from all others.
@@ -27,53 +29,98 @@ struct DayCluster {
 pub(crate) struct Belief {
     /// The credible times, if some messages are far from the bulk; `None` if all are credible.
     pub(crate) span: Option<Span>,
-    /// A sentence about clock jumps, if too many messages to be an accident are far apart and stay on one
-    /// axis.
-    pub(crate) jump: Option<String>,
+    /// Sentences about clock jumps, if too many messages of a bag to be an accident are far apart and stay on one axis.
+    pub(crate) jumps: Vec<String>,
+    /// The bags of which no message is at a credible time: those of another clock.
+    pub(crate) others: Vec<usize>,
 }
 
-/// Assesses the times of a mission by the number of messages of each day.
-pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
-    let clusters = clusters(days);
-    let Some(bulk) = clusters.iter().max_by_key(|c| c.messages) else {
-        return Belief::default();
+/// Assesses the times of a mission by the messages of each bag: first each bag's, since each recorder has its own clock,
+/// then those of all clocks.
+pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
+    let mut belief = Belief::default();
+    let own = bags.iter().filter_map(|(bag, all)| {
+        let (kept, jump) = of_bag(all)?;
+        belief.jumps.extend(jump);
+        Some((*bag, kept))
+    });
+    let mut own: Vec<(usize, DayCluster)> = own.collect();
+    own.sort_by_key(|(_, kept)| kept.first);
+    let eras = clusters(own.iter().map(|(_, kept)| *kept));
+    let Some(bulk) = eras.iter().max_by_key(|era| era.messages) else {
+        return belief;
     };
-    let outliers: u64 = days.values().sum::<u64>() - bulk.messages;
-    let is_rare = outliers <= (days.values().sum::<u64>() / RARE).max(1);
-    let others = || clusters.iter().filter(|c| *c != bulk);
-    let is_unset = bulk.first > UNSET_DAYS && others().all(|c| (0..=UNSET_DAYS).contains(&c.last));
-    let whole = clusters.last().map_or(0, |c| c.last) - clusters.first().map_or(0, |c| c.first);
-    let is_too_long = whole >= budget::SPAN_DAYS;
-    if outliers < bulk.messages && (is_rare || is_unset) || is_too_long {
-        let last = bulk.last.min(bulk.first + budget::SPAN_DAYS - 1);
-        let span = Span::new(
-            Stamp(bulk.first.saturating_mul(DAY)),
-            Stamp((last + 1).saturating_mul(DAY)),
-        );
-        return Belief {
-            span: (outliers > 0 || is_too_long).then_some(span),
-            jump: None,
-        };
+    let bulk = limited(*bulk);
+    let is_kept = |kept: &DayCluster| kept.first <= bulk.last && bulk.first <= kept.last;
+    let (kept, others): (Vec<_>, Vec<_>) = own.into_iter().partition(|(_, own)| is_kept(own));
+    belief.others = others.into_iter().map(|(bag, _)| bag).collect();
+    let start = bulk.first.saturating_mul(DAY);
+    let begins_at_0 = kept.iter().any(|(bag, _)| begins_at_0(&bags[bag]));
+    let span = Span::new(
+        Stamp(if start == 0 && !begins_at_0 { 1 } else { start }),
+        Stamp(bulk.last.saturating_add(1).saturating_mul(DAY)),
+    );
+    let is_inside = |day: &i64| (bulk.first..=bulk.last).contains(day);
+    let is_whole = |bag: &Calendar| {
+        bag.days.keys().all(is_inside) && (bag.zeros == 0 || span.contains(Stamp(0)))
+    };
+    belief.span = (!bags.values().all(is_whole)).then_some(span);
+    belief
+}
+
+/// Whether the clock of a bag begins at 0 and goes on from there. Otherwise messages at exactly 0, however many, are from
+/// before a simulation's clock was known.
+fn begins_at_0(bag: &Calendar) -> bool {
+    bag.zeros > 0 && bag.next.is_none_or(|next| next.0 <= GAP_NS)
+}
+
+/// The credible days of a bag, and a sentence about clock jumps between them; `None` for a bag without messages.
+fn of_bag(bag: &Calendar) -> Option<(DayCluster, Option<String>)> {
+    let mut days = bag.days.clone();
+    if begins_at_0(bag) {
+        *days.entry(0).or_default() += bag.zeros;
     }
-    Belief {
-        span: None,
-        jump: (clusters.len() > 1).then(|| stated(&clusters)),
+    let clusters = clusters(days.into_iter().map(|(day, messages)| DayCluster {
+        first: day,
+        last: day,
+        messages,
+    }));
+    let bulk = *clusters.iter().max_by_key(|c| c.messages)?;
+    let all: u64 = clusters.iter().map(|c| c.messages).sum();
+    let outliers = all - bulk.messages;
+    let is_rare = outliers <= (all / RARE).max(1);
+    let others = || clusters.iter().filter(|c| **c != bulk);
+    let is_unset = bulk.first > UNSET_DAYS && others().all(|c| (0..=UNSET_DAYS).contains(&c.last));
+    let whole = DayCluster {
+        first: clusters.first()?.first,
+        last: clusters.last()?.last,
+        messages: all,
+    };
+    if outliers < bulk.messages && (is_rare || is_unset) || limited(whole) != whole {
+        return Some((limited(bulk), None));
+    }
+    Some((whole, (clusters.len() > 1).then(|| stated(&clusters))))
+}
+
+/// The first days of a cluster, if it is longer than any mission.
+fn limited(all: DayCluster) -> DayCluster {
+    let last = all.first.saturating_add(budget::SPAN_DAYS - 1);
+    DayCluster {
+        last: all.last.min(last),
+        ..all
     }
 }
 
-fn clusters(days: &BTreeMap<i64, u64>) -> Vec<DayCluster> {
+/// Joins clusters, sorted by their first days.
+fn clusters(all: impl Iterator<Item = DayCluster>) -> Vec<DayCluster> {
     let mut clusters: Vec<DayCluster> = Vec::new();
-    for (day, count) in days {
+    for one in all {
         match clusters.last_mut() {
-            Some(before) if day - before.last <= FAR_DAYS => {
-                before.last = *day;
-                before.messages += count;
+            Some(before) if one.first.saturating_sub(before.last) <= FAR_DAYS => {
+                before.last = before.last.max(one.last);
+                before.messages += one.messages;
             }
-            _ => clusters.push(DayCluster {
-                first: *day,
-                last: *day,
-                messages: *count,
-            }),
+            _ => clusters.push(one),
         }
     }
     clusters
@@ -102,9 +149,59 @@ fn stated(clusters: &[DayCluster]) -> String {
 mod tests {
     use super::*;
 
+    fn bag(days: &[(i64, u64)]) -> Calendar {
+        Calendar {
+            days: days.iter().copied().collect(),
+            ..Calendar::default()
+        }
+    }
+
+    fn all(bags: &[Calendar]) -> Belief {
+        believed(&bags.iter().cloned().enumerate().collect())
+    }
+
     fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
-        let span = believed(&days.iter().copied().collect()).span?;
-        Some((span.start.0 / DAY, span.end.0 / DAY))
+        let span = all(&[bag(days)]).span?;
+        Some((span.start.0.div_euclid(DAY), span.end.0 / DAY))
+    }
+
+    #[test]
+    fn each_bag_has_its_own_clock_and_most_messages_decide() {
+        let wall = bag(&[(20_000, 30)]);
+        let simulated = |many| bag(&[(0, many)]);
+        let span = |first: i64, last: i64| Some(Span::new(Stamp(first), Stamp(last * DAY)));
+        let found = all(&[wall.clone(), simulated(29)]);
+        assert_eq!(
+            (found.span, found.others),
+            (span(20_000 * DAY, 20_001), vec![1])
+        );
+        assert_eq!(all(&[wall.clone(), simulated(30)]).others, [1]);
+        let found = all(&[wall.clone(), simulated(31)]);
+        assert_eq!((found.span, found.others), (span(1, 1), vec![0]));
+        assert_eq!(found.jumps, [] as [&str; 0]);
+        assert_eq!(all(&[wall, bag(&[(20_300, 900)])]), Belief::default());
+    }
+
+    #[test]
+    fn messages_at_0_are_from_before_the_clock_unless_it_begins_there() {
+        let at_0 = |zeros, next| Calendar {
+            zeros,
+            next: Some(Stamp(next)),
+            ..bag(&[(0, 5)])
+        };
+        let late = at_0(900, 2 * GAP_NS);
+        assert_eq!(all(&[late.clone()]).span.unwrap().start, Stamp(1));
+        assert_eq!(
+            all(&[late.clone(), bag(&[(0, 9)])]).span.unwrap().start,
+            Stamp(1)
+        );
+        assert_eq!(all(&[at_0(2, GAP_NS / 10)]), Belief::default());
+        assert_eq!(all(&[late, at_0(2, 1)]), Belief::default());
+        let only = Calendar {
+            zeros: 3,
+            ..Calendar::default()
+        };
+        assert_eq!(all(&[only]), Belief::default());
     }
 
     #[test]
@@ -140,13 +237,12 @@ mod tests {
 
     #[test]
     fn a_plausible_clock_jump_is_reported() {
-        let days = [(10_957, 249), (20_000, 250)].into_iter().collect();
-        let stated = believed(&days).jump.unwrap();
+        let stated = &all(&[bag(&[(10_957, 249), (20_000, 250)])]).jumps[0];
         assert!(
             stated.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
             "{stated}"
         );
-        let one = [(20_000, 249), (20_001, 250)].into_iter().collect();
-        assert_eq!(believed(&one).jump, None);
+        let one = all(&[bag(&[(20_000, 249), (20_001, 250)])]);
+        assert_eq!(one, Belief::default());
     }
 }

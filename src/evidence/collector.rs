@@ -5,12 +5,13 @@ use std::io;
 use std::sync::Arc;
 
 use super::clock::{Belief, believed};
+use super::offsets::offsets;
 
 use crate::bag::{Connection, Message, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::is_log;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::inference::Stream;
 use crate::evidence::message::cursor::PayloadCursor;
@@ -22,6 +23,7 @@ use crate::evidence::source::equal_stamps::FirstHeader;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
 
+use recorded::OtherClock;
 pub use recorded::Recorded;
 pub use sink::BagSink;
 
@@ -349,10 +351,19 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
-        source::rosout::interpret_lists(&mut self.facts);
-        let Belief { span, jump } = believed(self.messages.days());
+        let Belief {
+            span,
+            jumps,
+            others,
+        } = believed(self.messages.calendars());
+        let jumps = jumps.into_iter();
         self.notices
-            .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
+            .extend(jumps.map(|text| Notice::new(NoticeKind::Note, text)));
+        // What is set aside may show how to set a clock.
+        let offsets = offsets(&self.streams, &self.facts).map_err(spool_error)?;
+        let aside = span.map(|span| self.set_aside(span, &others));
+        let others = aside.transpose().map_err(spool_error)?;
+        source::rosout::interpret_lists(&mut self.facts);
         let (streams, facts) = (&mut self.streams, &mut self.facts);
         let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers);
         self.notices.extend(judged.map_err(spool_error)?);
@@ -375,11 +386,38 @@ impl Collector {
             notices: self.notices,
             falls: Vec::new(),
             overlaps: false,
-            believed: span,
+            offsets,
+            others: others.unwrap_or_default(),
             span: None,
         };
-        all.span = all.measure().map_err(spool_error)?;
+        all.span = all.measure();
         Ok(all)
+    }
+
+    /// Removes the messages at other times than these, and everything that they state: they prove nothing. Returns those
+    /// of other clocks.
+    fn set_aside(&mut self, span: Span, others: &[usize]) -> io::Result<Vec<OtherClock>> {
+        let mut clocks: Vec<OtherClock> = others.iter().map(|bag| OtherClock::new(*bag)).collect();
+        let mut aside = 0;
+        for stream in &self.streams {
+            let bounds = self.messages.bounds(stream.times);
+            let removed = self.messages.clip(stream.times, span)?;
+            match clocks.iter_mut().find(|clock| clock.bag == stream.bag) {
+                Some(clock) => clock.add(bounds, removed),
+                None => aside += removed,
+            }
+        }
+        self.facts.clip(span)?;
+        let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
+        self.facts.headers.retain(|at, _| has_messages(at));
+        self.numbers.values_mut().for_each(|own| own.clip(span));
+        self.texts.retain(|(time, _)| span.contains(*time));
+        if aside > 0 {
+            let text = "message at an impossible time, set aside";
+            let kind = NoticeKind::ImpossibleTime;
+            self.notices.add(Notice::counted(kind, aside, text));
+        }
+        Ok(clocks)
     }
 }
 

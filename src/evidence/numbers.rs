@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::bag::{Connection, Encoding};
 use crate::base::rhythm::{BEGUN_AGAIN, GAP_NS};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::message::dynamic::MessageSchema;
 
 /// The number of bytes from a payload's start to the end of its header's stamp.
@@ -81,6 +81,15 @@ impl Numbers {
         if self.kept.len() < MOST {
             self.kept.insert(time, number);
         }
+    }
+
+    /// Drops the numbers of messages at other times than these.
+    pub(crate) fn clip(&mut self, span: Span) {
+        self.last = self.last.filter(|(time, _)| span.contains(*time));
+        self.kept.retain(|time, _| span.contains(*time));
+        self.fell.retain(|time| span.contains(*time));
+        let is_inside = |(from, to): &(Stamp, Stamp)| span.contains(*from) && span.contains(*to);
+        self.falls.retain(is_inside);
     }
 
     /// Whether the numbers continued to grow from the last message before `from` to the first after `to`.

@@ -333,6 +333,32 @@ impl Observations {
         Arc::get_mut(&mut self.times).map_or(Ok(()), Stamps::finish)
     }
 
+    /// Removes everything that messages at other times than these state.
+    ///
+    /// # Errors
+    /// If the temporary file of times cannot be read or written.
+    pub(crate) fn clip(&mut self, span: Span) -> io::Result<()> {
+        let Some(times) = Arc::get_mut(&mut self.times) else {
+            return Ok(());
+        };
+        for series in self.payloads.values().chain(self.ages.values()) {
+            times.clip(*series, span)?;
+        }
+        let mut left = Vec::new();
+        for fact in self.list.drain(..) {
+            if times.clip(fact.times, span)? == 0 || times.count(fact.times) > 0 {
+                left.push(fact);
+            }
+        }
+        self.list = left;
+        // They are places in the old list.
+        self.places = HashMap::new();
+        self.pieces
+            .retain(|piece| piece.time.is_none_or(|time| span.contains(time)));
+        self.logged.clip(span);
+        Ok(())
+    }
+
     /// Adds an observation by `source`, at `time` if it has one.
     pub(crate) fn add(&mut self, source: SourceId, said: Statement, time: Option<Stamp>) {
         if self.overflow.is_some() && said.observation.names().contains(&self.overflow) {

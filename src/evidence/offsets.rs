@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use super::collector::Recorded;
 use crate::base::time::Stamp;
+use crate::evidence::inference::Stream;
+use crate::evidence::observation::Observations;
 
 /// The fewest common messages that are significant.
 const FEWEST: usize = 10;
@@ -35,19 +36,19 @@ type Contents<'a> = BTreeMap<(&'a str, u32), Option<Stamp>>;
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn offsets(recorded: &Recorded) -> io::Result<Vec<ClockOffset>> {
-    let last = recorded.streams.iter().map(|stream| stream.bag).max();
+pub(crate) fn offsets(streams: &[Stream], facts: &Observations) -> io::Result<Vec<ClockOffset>> {
+    let last = streams.iter().map(|stream| stream.bag).max();
     let mut bags: Vec<Contents<'_>> = vec![Contents::new(); last.map_or(0, |last| last + 1)];
     if bags.len() < 2 {
         return Ok(Vec::new());
     }
-    for (at, series) in &recorded.facts.payloads {
-        let stream = &recorded.streams[*at];
+    for (at, series) in &facts.payloads {
+        let stream = &streams[*at];
         if stream.latched {
             continue;
         }
         let contents = &mut bags[stream.bag];
-        recorded.facts.times.merge(&[*series], |timed| {
+        facts.times.merge(&[*series], |timed| {
             let key = (stream.connection.topic.as_str(), timed.size);
             let time = contents.entry(key).or_insert(Some(timed.time));
             *time = time.filter(|time| *time == timed.time);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 
 /// A text of a logger.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,6 +62,12 @@ impl LoggedTexts {
                 value: value.into(),
             });
         }
+    }
+
+    /// Drops those at other times than these.
+    pub(crate) fn clip(&mut self, span: Span) {
+        self.said.retain(|text| span.contains(text.time));
+        self.shown.retain(|value| span.contains(value.time));
     }
 
     /// Log texts and values, sorted; of values that a field repeats, only the first.

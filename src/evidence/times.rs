@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::SpooledTempFile;
 
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 
 pub(crate) use merge::Timed;
 
@@ -24,6 +24,34 @@ const IN_MEMORY: usize = 16 << 20;
 /// The number of stamps not yet in a block, of all series together (8 MB), at which all of them are put into blocks.
 const MOST_OPEN: usize = 1 << 19;
 const DAY: i64 = 86_400_000_000_000;
+
+/// The messages of one bag by day.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Calendar {
+    /// The number of messages of each day since 1970, without those at exactly 0.
+    pub(crate) days: BTreeMap<i64, u64>,
+    /// The number of messages at exactly 0.
+    pub(crate) zeros: u64,
+    /// The first time after 0.
+    pub(crate) next: Option<Stamp>,
+}
+
+impl Calendar {
+    /// Adds sorted times.
+    fn add(&mut self, sorted: &[(Stamp, u32)]) {
+        let zeros = sorted.partition_point(|t| t.0 < Stamp(0));
+        let (before, rest) = sorted.split_at(zeros);
+        let (zeros, after) = rest.split_at(rest.partition_point(|t| t.0 == Stamp(0)));
+        self.zeros += zeros.len() as u64;
+        let next = after.first().map(|t| t.0);
+        self.next = self.next.into_iter().chain(next).min();
+        for part in [before, after] {
+            for run in part.chunk_by(|a, b| a.0.0.div_euclid(DAY) == b.0.0.div_euclid(DAY)) {
+                *self.days.entry(run[0].0.0.div_euclid(DAY)).or_default() += run.len() as u64;
+            }
+        }
+    }
+}
 
 /// The number of a sequence of times, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -41,6 +69,8 @@ struct StampBlock {
 
 #[derive(Clone, Debug, Default)]
 struct OpenSeries {
+    /// The bag that its times are of.
+    bag: usize,
     open: Vec<(Stamp, u32)>,
     blocks: Vec<StampBlock>,
     count: u64,
@@ -69,8 +99,8 @@ pub(crate) struct Stamps {
     spool: Mutex<SpooledTempFile>,
     written: u64,
     open: usize,
-    /// Messages per day since 1970.
-    days: BTreeMap<i64, u64>,
+    /// The messages of each bag by day.
+    calendars: BTreeMap<usize, Calendar>,
     failed: Option<io::Error>,
 }
 
@@ -81,7 +111,7 @@ impl Default for Stamps {
             spool: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
             written: 0,
             open: 0,
-            days: BTreeMap::new(),
+            calendars: BTreeMap::new(),
             failed: None,
         }
     }
@@ -90,7 +120,15 @@ impl Default for Stamps {
 impl Stamps {
     /// A new, empty sequence.
     pub(crate) fn series(&mut self) -> SeriesId {
-        self.series.push(OpenSeries::default());
+        self.series_of(0)
+    }
+
+    /// A new, empty sequence of times of a bag.
+    pub(crate) fn series_of(&mut self, bag: usize) -> SeriesId {
+        self.series.push(OpenSeries {
+            bag,
+            ..OpenSeries::default()
+        });
         SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
     }
 
@@ -109,7 +147,7 @@ impl Stamps {
                 self.open = self.open.saturating_sub(BLOCK - 1);
                 let spool = self.spool.get_mut();
                 let spool = spool.unwrap_or_else(PoisonError::into_inner);
-                close(series, spool, &mut self.written, &mut self.days)
+                close(series, spool, &mut self.written, &mut self.calendars)
                     .unwrap_or_else(|e| self.failed = Some(e));
             } else {
                 self.open += 1;
@@ -126,19 +164,19 @@ impl Stamps {
         let spool = self.spool.get_mut();
         let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for series in &mut self.series {
-            close(series, spool, &mut self.written, &mut self.days)
+            close(series, spool, &mut self.written, &mut self.calendars)
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
         self.open = 0;
     }
 
-    /// The same sequences with the times from about `from` on, and the last of each; days keep their counts.
+    /// The same sequences with the times from about `from` on, and the last of each; calendars keep their counts.
     ///
     /// # Errors
     /// If the unnamed file cannot be read or written.
     pub(crate) fn since(&self, from: Stamp) -> io::Result<Self> {
         let mut new = Self {
-            days: self.days.clone(),
+            calendars: self.calendars.clone(),
             ..Self::default()
         };
         for old in &self.series {
@@ -147,6 +185,7 @@ impl Stamps {
             let last = old.bounds.map(|(_, last)| last).max(open_last);
             let from = last.map_or(from, |last| from.min(last));
             let mut series = OpenSeries {
+                bag: old.bag,
                 open: open().filter(|(time, _)| *time >= from).collect(),
                 size_unknown: old.size_unknown,
                 ..OpenSeries::default()
@@ -210,9 +249,9 @@ impl Stamps {
         self.get(id).is_some_and(|s| !s.size_unknown)
     }
 
-    /// Messages per day since 1970, as far as they are in blocks.
-    pub(crate) fn days(&self) -> &BTreeMap<i64, u64> {
-        &self.days
+    /// The messages of each bag by day, as they were added and as far as they are in blocks.
+    pub(crate) fn calendars(&self) -> &BTreeMap<usize, Calendar> {
+        &self.calendars
     }
 
     /// All times of one sequence, sorted.
@@ -230,29 +269,55 @@ impl Stamps {
     /// # Errors
     /// If the unnamed file cannot be read or written.
     pub(crate) fn split(&mut self, id: SeriesId, at: Stamp) -> io::Result<SeriesId> {
-        let (mut early, mut late) = (Vec::new(), Vec::new());
-        self.merge(&[id], |timed| {
-            let part = if timed.time < at {
-                &mut early
-            } else {
-                &mut late
-            };
-            part.push((timed.time, timed.size));
-        })?;
+        let mut early = Vec::new();
+        self.merge(&[id], |timed| early.push((timed.time, timed.size)))?;
+        let late = early.split_off(early.partition_point(|(time, _)| *time < at));
         let sized = self.sized(id);
-        // They were counted when they were added.
-        let days = self.days.clone();
-        if let Some(series) = self.series.get_mut(id.0 as usize) {
-            *series = OpenSeries::default();
-        }
-        let rest = self.series();
-        for (id, part) in [(id, early), (rest, late)] {
-            let (stamps, bytes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
-            self.add(id, &stamps, sized.then_some(&bytes[..]));
-        }
-        self.finish()?;
-        self.days = days;
+        let rest = self.series_of(self.get(id).map_or(0, |series| series.bag));
+        self.fill(id, &early, sized)?;
+        self.fill(rest, &late, sized)?;
         Ok(rest)
+    }
+
+    /// Removes the times of a sequence outside of an interval; returns their number.
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read or written.
+    pub(crate) fn clip(&mut self, id: SeriesId, span: Span) -> io::Result<u64> {
+        let is_inside = |(first, last)| span.contains(first) && span.contains(last);
+        if self.bounds(id).is_none_or(is_inside) {
+            return Ok(0);
+        }
+        let mut kept = Vec::new();
+        self.merge(&[id], |timed| {
+            if span.contains(timed.time) {
+                kept.push((timed.time, timed.size));
+            }
+        })?;
+        let removed = self.count(id) - kept.len() as u64;
+        self.fill(id, &kept, self.sized(id))?;
+        Ok(removed)
+    }
+
+    /// Replaces the times of a sequence by these, sorted, which its calendar contains already.
+    fn fill(&mut self, id: SeriesId, times: &[(Stamp, u32)], sized: bool) -> io::Result<()> {
+        let Some(series) = self.series.get_mut(id.0 as usize) else {
+            return Ok(());
+        };
+        *series = OpenSeries {
+            bag: series.bag,
+            count: times.len() as u64,
+            size_unknown: !sized,
+            ..OpenSeries::default()
+        };
+        let spool = self.spool.get_mut();
+        let spool = spool.unwrap_or_else(PoisonError::into_inner);
+        for block in times.chunks(BLOCK) {
+            series.open = block.to_vec();
+            close(series, spool, &mut self.written, &mut BTreeMap::new())?;
+        }
+        series.open = Vec::new();
+        Ok(())
     }
 
     fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
@@ -282,7 +347,7 @@ fn close(
     series: &mut OpenSeries,
     spool: &mut SpooledTempFile,
     written: &mut u64,
-    days: &mut BTreeMap<i64, u64>,
+    calendars: &mut BTreeMap<usize, Calendar>,
 ) -> io::Result<()> {
     let mut open = std::mem::take(&mut series.open);
     if !open.is_sorted() {
@@ -292,9 +357,7 @@ fn close(
         return Ok(());
     };
     let (first, last) = (first.0, last.0);
-    for run in open.chunk_by(|a, b| a.0.0.div_euclid(DAY) == b.0.0.div_euclid(DAY)) {
-        *days.entry(run[0].0.0.div_euclid(DAY)).or_default() += run.len() as u64;
-    }
+    calendars.entry(series.bag).or_default().add(&open);
     let bytes = block::encode(&open);
     series.hold(StampBlock {
         first,
@@ -358,7 +421,22 @@ mod tests {
         assert_eq!(all.times(rest).unwrap(), stamps([3, 5, DAY]));
         assert!(all.sized(id) && all.sized(rest));
         assert_eq!((all.count(id), all.count(rest)), (1, 3));
-        assert_eq!(all.days().values().sum::<u64>(), 4);
+        assert_eq!(all.calendars()[&0].days.values().sum::<u64>(), 4);
+    }
+
+    #[test]
+    fn times_outside_of_an_interval_are_removed() {
+        let mut all = Stamps::default();
+        let id = all.series_of(7);
+        all.add(id, &stamps([5, 0, 3, 0]), Some(&[50, 10, 30, 7]));
+        all.finish().unwrap();
+        let calendar = &all.calendars()[&7];
+        assert_eq!((calendar.zeros, calendar.next), (2, Some(Stamp(3))));
+        let span = Span::new(Stamp(1), Stamp(5));
+        assert_eq!((all.clip(id, span).unwrap(), all.count(id)), (3, 1));
+        assert_eq!(all.clip(id, span).unwrap(), 0);
+        assert_eq!(all.bounds(id), Some((Stamp(3), Stamp(3))));
+        assert!(all.sized(id));
     }
 
     #[test]

@@ -143,7 +143,7 @@ pub enum Detail {
         /// The senders after.
         to: Vec<NodeId>,
     },
-    /// A number of messages.
+    /// A number of messages that were lost, or of times that an element appears.
     Count(u64),
     /// A value before and after; empty for none.
     Values {

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
-use crate::bag::straight::{self, Straightened, Watched};
+use crate::bag::straight::{self, ClockFall, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::collector::{self, Collector, Recorded};
-use crate::evidence::offsets::{ClockOffset, offsets};
 use crate::graph::window;
 
 /// The bags of a mission, read.
@@ -73,11 +72,14 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded.mark_outside(range.start <= known.start);
     }
     recorded.notices.extend(twice);
-    recorded.notices.extend(apart(&recorded, &inputs)?);
-    recorded.falls = seams
+    let clocks = other_clocks(&recorded, &inputs).chain(apart(&recorded, &inputs));
+    let clocks: Vec<Notice> = clocks.collect();
+    recorded.notices.extend(clocks);
+    let falls = seams
         .iter()
-        .flat_map(|seams| straight::falls(seams, !is_pipe))
-        .collect();
+        .flat_map(|seams| straight::falls(seams, !is_pipe));
+    let is_kept = |fall: &ClockFall| recorded.span.is_some_and(|span| span.contains(fall.time));
+    recorded.falls = falls.filter(is_kept).collect();
     recorded.falls.sort_unstable();
     recorded.overlaps = is_pipe && !is_straight;
     for fall in &recorded.falls {
@@ -105,9 +107,11 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
 }
 
 /// Notices about recorders whose clocks differ, by the messages that two of them recorded.
-fn apart(recorded: &Recorded, inputs: &[Input]) -> Result<Vec<Notice>> {
-    let offsets = offsets(recorded).map_err(collector::spool_error)?;
-    let notice = |offset: ClockOffset| {
+fn apart(recorded: &Recorded, inputs: &[Input]) -> impl Iterator<Item = Notice> {
+    let is_other = |bag| recorded.others.iter().any(|clock| clock.bag == bag);
+    let offsets = recorded.offsets.iter();
+    let offsets = offsets.filter(move |of| !is_other(of.bag) && !is_other(of.other));
+    offsets.map(|offset| {
         let [own, other] = [offset.bag, offset.other].map(|at| inputs[at].name());
         let seconds = offset.ahead as f64 / 1e9;
         let length = words::duration(offset.ahead.abs());
@@ -122,8 +126,29 @@ fn apart(recorded: &Recorded, inputs: &[Input]) -> Result<Vec<Notice>> {
             -seconds
         );
         Notice::new(NoticeKind::Note, text)
-    };
-    Ok(offsets.into_iter().map(notice).collect())
+    })
+}
+
+/// Notices about bags whose messages were set aside, since their clocks are far from those of the others: the offset by
+/// the messages that another bag recorded too, or else so that they begin with the mission.
+fn other_clocks(recorded: &Recorded, inputs: &[Input]) -> impl Iterator<Item = Notice> {
+    let start = recorded.span.map_or(Stamp(0), |span| span.start);
+    recorded.others.iter().map(move |clock| {
+        let mut offsets = recorded.offsets.iter();
+        let common = offsets.find_map(|offset| match clock.bag {
+            bag if bag == offset.bag => Some(offset.ahead.saturating_neg()),
+            bag if bag == offset.other => Some(offset.ahead),
+            _ => None,
+        });
+        let by = common.unwrap_or_else(|| start.since(clock.first));
+        let own = inputs[clock.bag].name();
+        let text = format!(
+            "the times of `{own}`, from {} on, are of another clock than the mission's, from {start} on, and its messages were set aside: `--offset {own}={:+.3}s` moves them to the mission",
+            clock.first,
+            by as f64 / 1e9
+        );
+        Notice::counted(NoticeKind::ImpossibleTime, clock.messages, text)
+    })
 }
 
 /// The beginning of the notice about a clock that was set back.

@@ -1,5 +1,6 @@
 //! Reads every bag below a folder one by one, for a survey.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::collect::NOTHING_RECORDED;
@@ -48,12 +49,19 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             ..reading.clone()
         };
         let shown = recording.name_in(folder);
-        let row = surveyed(shown, size(&one.inputs), read(&one, watch));
+        let read = alone(&shown, || read(&one, watch));
+        let row = surveyed(shown, size(&one.inputs), read);
         skipped |= !row.is_complete;
         row
     };
     let rows = bags.into_iter().map(row).collect();
     Ok(Survey { rows, skipped })
+}
+
+/// The result of reading one bag; if bagreel fails at it, the error of this bag alone. The panic was printed.
+fn alone<T>(bag: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
+    let failed = |_| Err(Error::unsupported(bag, "a fault of bagreel: report it", ""));
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(failed)
 }
 
 /// Every recording below a folder.
@@ -101,5 +109,21 @@ pub(super) fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -
             error: Some(error.to_string()),
             ..row
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_at_one_bag_is_its_error() {
+        let error = alone("run/a.bag", || -> Result<()> { panic!("expected") }).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("run/a.bag") && text.contains("fault"),
+            "{text}"
+        );
+        assert!(alone("b.bag", || Ok(())).is_ok());
     }
 }

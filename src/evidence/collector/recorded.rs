@@ -1,14 +1,14 @@
 //! What the bags of a mission contain about its graph, once they are read.
 
 use std::collections::BTreeMap;
-use std::io;
 
 use crate::bag::straight::ClockFall;
-use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::inference::Stream;
 use crate::evidence::numbers::Numbers;
 use crate::evidence::observation::Observations;
+use crate::evidence::offsets::ClockOffset;
 use crate::evidence::times::Stamps;
 
 /// Everything that the bags of a mission contain about its graph.
@@ -27,19 +27,16 @@ pub struct Recorded {
     pub(crate) falls: Vec<ClockFall>,
     /// Whether runs overlap in time, since they could not be shifted.
     pub(crate) overlaps: bool,
-    /// The credible times; `None` if all of them are.
-    pub(crate) believed: Option<Span>,
+    /// The differences between the clocks of several recorders.
+    pub(crate) offsets: Vec<ClockOffset>,
+    /// The bags whose messages were set aside, since their clocks are far from those of the others.
+    pub(crate) others: Vec<OtherClock>,
     /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
     /// no message.
     pub span: Option<Span>,
 }
 
 impl Recorded {
-    /// Whether a time is credible.
-    pub(crate) fn believes(&self, time: Stamp) -> bool {
-        self.believed.is_none_or(|span| span.contains(time))
-    }
-
     /// Marks the streams without a message in the part of the recording that was read. In a part from the
     /// beginning on, they have no latched message yet.
     pub(crate) fn mark_outside(&mut self, is_first: bool) {
@@ -49,39 +46,38 @@ impl Recorded {
         }
     }
 
-    /// Finds the span of all messages at credible times, and counts the others.
-    pub(super) fn measure(&mut self) -> io::Result<Option<Span>> {
-        let mut span: Option<Span> = None;
-        let mut aside = 0;
-        for at in 0..self.streams.len() {
-            let id = self.streams[at].times;
-            let Some(bounds) = self.messages.bounds(id) else {
-                continue;
-            };
-            if self.believes(bounds.0) && self.believes(bounds.1) {
-                widen(&mut span, bounds);
-                continue;
-            }
-            let believed = self.believed;
-            self.messages.merge(&[id], |t| {
-                if believed.is_none_or(|span| span.contains(t.time)) {
-                    widen(&mut span, (t.time, t.time));
-                } else {
-                    aside += 1;
-                }
-            })?;
-        }
-        if aside > 0 {
-            let text = "message at an impossible time, set aside";
-            self.notices
-                .add(Notice::counted(NoticeKind::ImpossibleTime, aside, text));
-        }
-        Ok(span)
+    /// The span of all messages.
+    pub(super) fn measure(&self) -> Option<Span> {
+        let bounds = self.streams.iter();
+        let bounds = bounds.filter_map(|stream| self.messages.bounds(stream.times));
+        let (first, last) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        Some(Span::new(first, last.plus(1)))
     }
 }
 
-fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
-    let all = span.get_or_insert(Span::new(first, last.plus(1)));
-    all.start = all.start.min(first);
-    all.end = all.end.max(last.plus(1));
+/// A bag whose messages were set aside, since its clock is far from those of the others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OtherClock {
+    /// The index of the bag among the inputs.
+    pub(crate) bag: usize,
+    /// The time of its first message.
+    pub(crate) first: Stamp,
+    /// The number of its messages.
+    pub(crate) messages: u64,
+}
+
+impl OtherClock {
+    pub(super) fn new(bag: usize) -> Self {
+        Self {
+            bag,
+            first: Stamp::MAX,
+            messages: 0,
+        }
+    }
+
+    /// Adds the messages of a stream that were removed, and the times of the first and the last before.
+    pub(super) fn add(&mut self, bounds: Option<(Stamp, Stamp)>, removed: u64) {
+        self.first = bounds.map_or(self.first, |(first, _)| self.first.min(first));
+        self.messages += removed;
+    }
 }

@@ -39,7 +39,7 @@ impl Sink for BagSink<'_> {
             latched: is_held(connection),
             trust: Reliability::Whole,
             is_outside: false,
-            times: all.messages.series(),
+            times: all.messages.series_of(self.bag),
         };
         let schema = all.schema(connection);
         let (mut readers, foreign) = source::readers(&stream, &schema);

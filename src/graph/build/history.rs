@@ -418,7 +418,7 @@ fn seen(track: &Liveness) -> Existence {
 }
 
 fn spans(track: &Liveness) -> Vec<Span> {
-    let span = |life: &Lifetime| Span::new(life.from, life.to.plus(1));
+    let span = |life: &Lifetime| Span::new(life.from(), life.to().plus(1));
     track.lives.iter().map(span).collect()
 }
 

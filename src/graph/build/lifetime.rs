@@ -4,11 +4,11 @@ use crate::base::rhythm::{ADVERTISED_NS, DISCOVERY_NS, FOUND_NS, REGISTRATION_NS
 use crate::base::time::Stamp;
 use crate::graph::history::Bound;
 
-/// A period of existence, both ends included.
+/// A period of existence, both ends included; it never ends before it begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lifetime {
-    pub(crate) from: Stamp,
-    pub(crate) to: Stamp,
+    from: Stamp,
+    to: Stamp,
     /// The first sign of it.
     pub(crate) sign: Stamp,
     pub(crate) began: Option<Bound>,
@@ -25,6 +25,24 @@ impl Lifetime {
             began: None,
             ended: None,
         }
+    }
+
+    pub(crate) fn from(&self) -> Stamp {
+        self.from
+    }
+
+    pub(crate) fn to(&self) -> Stamp {
+        self.to
+    }
+
+    /// Sets the beginning, which is not after the end.
+    pub(super) fn begin_at(&mut self, from: Stamp, began: Option<Bound>) {
+        (self.from, self.began) = (from.min(self.to), began);
+    }
+
+    /// Sets the end, which is not before the beginning.
+    pub(super) fn end_at(&mut self, to: Stamp, ended: Option<Bound>) {
+        (self.to, self.ended) = (to.max(self.from), ended);
     }
 
     fn at(sign: Stamp) -> Self {
@@ -56,13 +74,13 @@ impl Lifetime {
 
     /// Ends the lifetime because of evidence.
     pub(super) fn close(&mut self, end: Stamp) {
-        let last = self.to;
-        self.to = end.max(last);
-        self.ended = Some(Bound {
-            time: self.to,
+        let (last, end) = (self.to, end.max(self.to));
+        let ended = Bound {
+            time: end,
             earliest: last,
-            latest: self.to,
-        });
+            latest: end,
+        };
+        self.end_at(end, Some(ended));
     }
 
     /// Sets the beginning of a first lifetime: with a rhythm it began shortly before its first sign, and in any case after
@@ -77,7 +95,7 @@ impl Lifetime {
     ) {
         let late = period.unwrap_or(0);
         if !is_proved || self.from.since(recording) <= FOUND_NS.saturating_add(late) {
-            (self.from, self.began) = (mission, None);
+            self.begin_at(mission, None);
         } else if let Some(began) = &mut self.began {
             let sooner = DISCOVERY_NS.saturating_add(late);
             let possible = period.map_or(mission, |_| self.from.plus(-sooner));
@@ -105,7 +123,7 @@ impl Lifetime {
                 }
             }
             None if stated || is_due || self.from.since(around.sign) <= ADVERTISED_NS => {
-                (self.from, self.began) = (around.from, around.began);
+                self.begin_at(around.from, around.began);
             }
             None => {
                 if let Some(began) = &mut self.began {
@@ -131,7 +149,7 @@ pub(super) fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
             (open, gone) = (false, end);
         }
         match lives.last_mut() {
-            Some(life) if open => life.to = *sign,
+            Some(life) if open => life.end_at(*sign, None),
             _ => {
                 let mut life = Lifetime::at(*sign);
                 life.began = life.began.map(|b| Bound {

@@ -232,12 +232,12 @@ impl Liveness {
         let (start, recorded) = recording.unwrap_or(mission);
         let end = self.end(recorded.min(mission.1), is_node);
         if let Some(life) = lives.last_mut().filter(|life| life.ended.is_none()) {
-            life.ended = end.filter(|end| end.time >= life.from);
-            life.to = life.ended.map_or(mission.1, |end| end.time);
+            let ended = end.filter(|end| end.time >= life.from());
+            life.end_at(ended.map_or(mission.1, |end| end.time), ended);
         }
         if let Some(life) = lives.first_mut() {
             let pulses = self.pulses().iter();
-            let rhythm = pulses.filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
+            let rhythm = pulses.filter(|p| p.first.since(life.from()) <= DISCOVERY_NS);
             let period = rhythm.map(|p| p.period).min();
             let is_absent = |began: Bound| began.earliest > Stamp::MIN;
             let is_near = |begin: &Stamp| begin.since(life.sign).abs() <= ADVERTISED_NS;
@@ -247,7 +247,10 @@ impl Liveness {
                 || self.begins.iter().any(is_near);
             life.begin(mission.0, start.max(mission.0), period, is_proved);
         }
-        self.lives = Rc::new(lives);
+        // The user's files may state times outside of the mission.
+        let whole = Lifetime::whole(mission);
+        let inside = lives.iter().filter_map(|life| life.within(&whole));
+        self.lives = Rc::new(inside.collect());
     }
 
     /// Sets the possible times of a restart: the node still existed for a period after its last message, and again
@@ -282,13 +285,13 @@ impl Liveness {
         let mut all = std::mem::take(Rc::make_mut(&mut self.lives));
         let joined = Rc::make_mut(&mut self.lives);
         all.extend(edges);
-        all.sort_by_key(|life| (life.from, life.to));
+        all.sort_by_key(|life| (life.from(), life.to()));
         for life in all {
             match joined.last_mut() {
-                Some(last) if life.from <= last.to.plus(1) => {
-                    if life.to > last.to {
-                        (last.to, last.ended) = (life.to, life.ended);
-                    } else if life.to == last.to && life.ended.is_none() {
+                Some(last) if life.from() <= last.to().plus(1) => {
+                    if life.to() > last.to() {
+                        last.end_at(life.to(), life.ended);
+                    } else if life.to() == last.to() && life.ended.is_none() {
                         last.ended = None;
                     }
                 }
@@ -341,23 +344,23 @@ impl Liveness {
         }
         let mut own = Vec::new();
         for around in node.iter() {
-            let from = self.signs.partition_point(|s| *s < around.from);
-            let to = self.signs.partition_point(|s| *s <= around.to);
+            let from = self.signs.partition_point(|s| *s < around.from());
+            let to = self.signs.partition_point(|s| *s <= around.to());
             let mut inside = lives(&self.signs[from..to], &self.ends);
             if let Some(first) = inside.first_mut() {
-                let next = self.ends.partition_point(|end| *end < first.from);
+                let next = self.ends.partition_point(|end| *end < first.from());
                 let absent = next.checked_sub(1).map(|at| self.ends[at].plus(1));
-                let absent = absent.filter(|at| *at > around.from);
-                let stated = self.stated.binary_search(&first.from).is_ok();
-                let dated = absent.is_some() && self.counted.contains(&first.from);
+                let absent = absent.filter(|at| *at > around.from());
+                let stated = self.stated.binary_search(&first.from()).is_ok();
+                let dated = absent.is_some() && self.counted.contains(&first.from());
                 let due = self.messages.as_ref().and_then(|m| m.due);
-                let is_due = around.began.is_none() && due.is_some_and(|due| first.from <= due);
+                let is_due = around.began.is_none() && due.is_some_and(|due| first.from() <= due);
                 first.begin_within(around, absent, stated && !dated, is_due);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
-                let end = self.end(around.to, false).filter(|_| !self.lasts);
-                last.to = end.map_or(around.to, |end| end.time.max(last.to));
-                last.ended = end.or(around.ended);
+                let end = self.end(around.to(), false).filter(|_| !self.lasts);
+                let to = end.map_or(around.to(), |end| end.time.max(last.to()));
+                last.end_at(to, end.or(around.ended));
             }
             if own.is_empty() {
                 own = inside;
@@ -381,17 +384,17 @@ impl Liveness {
         let mut is_earlier = false;
         let mut until = Stamp::MIN;
         for life in Rc::make_mut(&mut self.lives) {
-            let around = |o: &&Lifetime| o.from < life.from && life.from <= o.to;
-            if let Some(other) = others.iter().find(around).filter(|o| until < o.from)
+            let around = |o: &&Lifetime| o.from() < life.from() && life.from() <= o.to();
+            if let Some(other) = others.iter().find(around).filter(|o| until < o.from())
                 && !self
                     .ends
                     .iter()
-                    .any(|end| other.from <= *end && *end < life.from)
+                    .any(|end| other.from() <= *end && *end < life.from())
             {
-                (life.from, life.began) = (other.from, other.began);
+                life.begin_at(other.from(), other.began);
                 is_earlier = true;
             }
-            until = life.to;
+            until = life.to();
         }
         is_earlier
     }
@@ -449,7 +452,7 @@ mod tests {
             edge.sign_all(&[stamp(30), stamp(60)], &[stamp(10)]);
             edge.counted = counted;
             edge.live_within(&vec![Lifetime::whole((stamp(0), stamp(90)))].into());
-            edge.lives[0].from
+            edge.lives[0].from()
         };
         assert_eq!(began(Vec::new()), stamp(10).plus(1));
         assert_eq!(began(vec![stamp(30)]), stamp(30));

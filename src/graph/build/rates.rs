@@ -88,9 +88,6 @@ pub(crate) fn rates(
     let mut open: VecDeque<OpenWindow> = VecDeque::new();
     let mut next = 0;
     recorded.messages.merge(&ids, |timed| {
-        if !recorded.believes(timed.time) {
-            return;
-        }
         while open
             .front()
             .is_some_and(|o| windows.end(o.window) <= timed.time)

@@ -12,13 +12,13 @@ use crate::evidence::inference::{Reliability, Stream};
 use crate::evidence::observation::Name;
 use crate::graph::history::Stretch;
 
-/// The first and the last moment of the recording that each bag is a part of, by bag. A bag is a part of
+/// The first and the last moment of the recording that each bag is a part of, by bag; `None` without messages. A bag is a part of
 /// another's recording if it precedes or follows it and has most topics in common with it.
 #[expect(
     clippy::type_complexity,
     reason = "a short-lived list of each bag's time span and names"
 )]
-pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp, Stamp)> {
+pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<Option<(Stamp, Stamp)>> {
     let mut bags: Vec<(Option<(Stamp, Stamp)>, BTreeSet<Name>)> = Vec::new();
     for stream in streams {
         if bags.len() <= stream.bag {
@@ -58,10 +58,7 @@ pub(crate) fn recordings(recorded: &Recorded, streams: &[Stream]) -> Vec<(Stamp,
             *all = (all.0.min(from), all.1.max(to));
         }
     }
-    let unknown = (Stamp::MIN, Stamp::MAX);
-    of.iter()
-        .map(|one| whole.get(one).copied().unwrap_or(unknown))
-        .collect()
+    of.iter().map(|one| whole.get(one).copied()).collect()
 }
 
 /// The nodes that several recordings contain at the same time as publishers of one topic: of several robots,

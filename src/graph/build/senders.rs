@@ -76,7 +76,7 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> Result<Traffi
 fn senders(
     recorded: &Recorded,
     findings: &Findings,
-    recordings: &[(Stamp, Stamp)],
+    recordings: &[Option<(Stamp, Stamp)>],
     streams: Vec<usize>,
 ) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
@@ -85,9 +85,6 @@ fn senders(
     let (of, mut received) = places(&of_topic, recordings);
     let mut pauses = LongestPauses::default();
     recorded.messages.merge(&ids, |timed| {
-        if !recorded.believes(timed.time) {
-            return;
-        }
         let trace = &mut traces[timed.series];
         *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
         pauses.add(timed.time);
@@ -162,13 +159,18 @@ impl SenderTimes {
 }
 
 /// The index of each stream's sender, and the senders without times yet.
-fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Vec<SenderTimes>) {
-    let mut latched: BTreeMap<Option<Name>, (bool, (Stamp, Stamp))> = BTreeMap::new();
+fn places(
+    streams: &[&Stream],
+    recordings: &[Option<(Stamp, Stamp)>],
+) -> (Vec<usize>, Vec<SenderTimes>) {
+    let mut latched: BTreeMap<Option<Name>, (bool, Option<(Stamp, Stamp)>)> = BTreeMap::new();
     for stream in streams {
-        let own = recordings[stream.bag];
-        let (is_latched, all) = latched.entry(sender(stream)).or_insert((true, own));
+        let (is_latched, all) = latched.entry(sender(stream)).or_insert((true, None));
         *is_latched &= stream.latched;
-        *all = (all.0.min(own.0), all.1.max(own.1));
+        if let Some(own) = recordings[stream.bag] {
+            let all = all.get_or_insert(own);
+            *all = (all.0.min(own.0), all.1.max(own.1));
+        }
     }
     let places: BTreeMap<Option<Name>, usize> = latched.keys().copied().zip(0..).collect();
     let places = streams
@@ -180,7 +182,7 @@ fn places(streams: &[&Stream], recordings: &[(Stamp, Stamp)]) -> (Vec<usize>, Ve
         .map(|(node, (latched, recording))| SenderTimes {
             node: *node,
             latched: *latched,
-            recording: *recording,
+            recording: recording.unwrap_or((Stamp::MIN, Stamp::MAX)),
             times: Vec::new(),
             every: 1,
             passed: 0,

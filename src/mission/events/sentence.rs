@@ -55,14 +55,19 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
             };
             format!("handed over: {} → {}{by}", names(from), names(to))
         }
-        (Detail::Count(many), Kind::Appeared) => {
+        (Detail::Count(many), kind) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
-            format!("appears and vanishes {many} times{over}")
-        }
-        (Detail::Count(many), _) => {
-            let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
-            let lost = words::count(usize::try_from(*many).unwrap_or(usize::MAX), "message");
-            format!("{lost} lost by the recorder{over}")
+            let many = usize::try_from(*many).unwrap_or(usize::MAX);
+            match kind {
+                Kind::Lost => format!(
+                    "{} lost by the recorder{over}",
+                    words::count(many, "message")
+                ),
+                Kind::Vanished => {
+                    format!("vanishes and appears {}{over}", words::count(many, "time"))
+                }
+                _ => format!("appears and vanishes {}{over}", words::count(many, "time")),
+            }
         }
         (Detail::Values { to, .. }, Kind::Starved) => starved(event.what, to),
         (Detail::None, Kind::Duplicate) => "is the name of two nodes".to_owned(),
