@@ -16,7 +16,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 pub use crate::base::ids::{ById, Id};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 use crate::evidence::Confidence;
 
@@ -226,6 +226,13 @@ const SHORTEST_NS: i64 = 1_000_000;
 pub(crate) fn per_second(count: u64, window: Span) -> Option<f64> {
     let nanos = window.nanos();
     (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
+}
+
+/// The rate of `count` messages from the first of them to the last, in messages per second; `None` for fewer than two, and
+/// below 1 ms.
+pub(crate) fn mean_rate(count: u64, (first, last): (Stamp, Stamp)) -> Option<f64> {
+    let intervals = count.checked_sub(1).filter(|n| *n > 0)?;
+    per_second(intervals, Span::new(first, last))
 }
 
 #[cfg(test)]

@@ -67,6 +67,26 @@ fn a_flapping_connection_is_one_line() {
 }
 
 #[test]
+fn nodes_silent_together_beside_others_are_no_pause_of_the_recording() {
+    let names: Vec<(String, String)> = (0..8)
+        .map(|n| (format!("/n{n}"), format!("/t{n}")))
+        .collect();
+    let of = |(from, to)| {
+        names
+            .iter()
+            .map(move |(node, topic)| (&node[..], &topic[..], from, to))
+    };
+    let senders: Vec<_> = of((0, 20)).chain(of((35, 60))).collect();
+    let bag = minute(&senders);
+    let text = shown(&bag);
+    assert!(!text.contains("nothing was recorded"), "{text}");
+    assert!(
+        text.contains("silent for 15 s; 8 of 9 nodes silent together"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_client_refused_at_one_moment_did_not_restart() {
     let mut bag = minute(&[("/view", "/state", 0, 60)]);
     let log = bag.publisher("/base", "/rosout", "rosgraph_msgs/Log");

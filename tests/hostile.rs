@@ -315,6 +315,24 @@ fn damaged_recordings_terminate_and_report_all_losses() {
 }
 
 #[test]
+fn a_survey_reads_connections_that_are_described_after_time_went_back() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, messages) in [
+        ("p1_duplicate_record.mcap", 53),
+        ("p1_late_channel.mcap", 74),
+        ("p1_swapped_chunks.bag", 48),
+    ] {
+        let (code, found) = counted(&crafted(name));
+        assert!(matches!(code, Some(0 | 3)), "{name}: {code:?}");
+        assert_eq!(found, Some(messages), "{name}");
+        fs::copy(crafted(name), folder.path().join(name)).unwrap();
+    }
+    let output = bagreel(Path::new("."), &["info", &folder.path().to_string_lossy()]);
+    let rows = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(rows.lines().count(), 4, "{rows}");
+}
+
+#[test]
 fn a_recording_cut_after_a_chunk_head_terminates() {
     let whole = fs::read(concat!(
         env!("CARGO_MANIFEST_DIR"),

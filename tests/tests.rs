@@ -9,6 +9,7 @@
 )]
 
 mod architecture;
+mod aside;
 mod boxes;
 mod causes;
 mod ci;

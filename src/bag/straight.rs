@@ -338,6 +338,15 @@ mod tests {
     }
 
     #[test]
+    fn a_connection_described_after_a_step_has_no_messages_before_it() {
+        let parts: Parts<'_> = &[&[(0, (0..60).chain(40..90).collect()), (7, vec![70, 50, 71])]];
+        let mut kept = Kept::default();
+        feed(parts, &mut Straightened::new(&seams(parts), &mut kept));
+        assert_eq!(kept.0[0].len(), 110);
+        assert_eq!(kept.0[7].len(), 3);
+    }
+
+    #[test]
     fn a_rare_message_just_before_a_step_does_not_hide_it() {
         let parts: Parts<'_> = &[
             &[

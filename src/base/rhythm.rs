@@ -55,6 +55,10 @@ pub(crate) const RUN_FEWEST: u64 = 10;
 /// have a common cause on the robot.
 pub(crate) const PAUSE_SHARE: u64 = 80;
 pub(crate) const PAUSE_FEWEST: u64 = 3;
+/// The most messages of a recording during a pause of it, and as a share of those that were due: true pauses have 0 to
+/// 5 at their edges. With more, others were recorded while these senders were silent.
+pub(crate) const PAUSE_MOST: f64 = 5.0;
+pub(crate) const PAUSE_MOST_SHARE: f64 = 0.01;
 
 // ---- Starts and restarts.
 

@@ -64,6 +64,17 @@ impl Stretch {
         let period = if self.is_even { median } else { mean };
         1e9 / period.max(1.0)
     }
+
+    /// The number of messages in an interval, without those at its ends if it cuts the stretch: in proportion.
+    pub(crate) fn count_in(&self, span: Span) -> f64 {
+        let all = self.last.since(self.first);
+        let shared = self.last.min(span.end).since(self.first.max(span.start));
+        match (shared, all) {
+            (..0, _) => 0.0,
+            (_, 0) => self.count as f64,
+            _ => self.count as f64 * shared as f64 / all as f64,
+        }
+    }
 }
 
 /// All messages of one sender on one topic.
@@ -83,16 +94,8 @@ pub struct Sender {
 impl Sender {
     /// The number of messages in an interval, in proportion where it cuts a stretch.
     pub(crate) fn count_in(&self, span: Span) -> f64 {
-        let inside = |s: &Stretch| {
-            let all = s.last.since(s.first);
-            let shared = s.last.min(span.end.plus(-1)).since(s.first.max(span.start));
-            match (shared, all) {
-                (..0, _) => 0.0,
-                (_, 0) => s.count as f64,
-                _ => s.count as f64 * shared as f64 / all as f64,
-            }
-        };
-        self.stretches.iter().map(inside).sum()
+        let moments = Span::new(span.start, span.end.plus(-1));
+        self.stretches.iter().map(|s| s.count_in(moments)).sum()
     }
 }
 
@@ -113,6 +116,13 @@ impl Sending {
         let from = self.senders.partition_point(|s| s.topic < topic);
         let to = self.senders.partition_point(|s| s.topic <= topic);
         &self.senders[from..to]
+    }
+
+    /// The time of the first message of some senders, and that of the last.
+    pub(crate) fn bounds<'a>(senders: impl Iterator<Item = &'a Sender>) -> Option<(Stamp, Stamp)> {
+        let stretches = senders.flat_map(|sender| &sender.stretches);
+        let bounds = stretches.map(|s| (s.first, s.last));
+        bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
     /// The messages of a publication, if they can be distinguished from those of others.

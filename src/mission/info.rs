@@ -20,9 +20,11 @@ pub use text::text;
 pub use why::why;
 
 use crate::base::name::is_recorder;
+use crate::base::time::Stamp;
 use crate::base::words::visible_json;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::{ById, Edge, EdgeId, Element, NodeId, TopicId};
+use crate::graph::history::Sending;
+use crate::graph::{ById, Edge, EdgeId, Element, NodeId, TopicId, mean_rate};
 use crate::mission::Mission;
 
 /// The output of `bagreel info` for one mission. Written as JSON with these names.
@@ -176,8 +178,12 @@ pub struct NodeInfo {
     pub subscribes: usize,
     /// The number of messages that it sent, if publishers are known.
     pub sent: Option<u64>,
+    /// The messages that it sent per second from the first to the last; `None` for fewer than two.
+    pub sent_hz: Option<f64>,
     /// The number of messages on topics that it is known to subscribe to; `None` if there are none.
     pub received: Option<u64>,
+    /// These messages per second from the first to the last; `None` for fewer than two.
+    pub received_hz: Option<f64>,
 }
 
 /// The summary of a mission; its windows become the parts of each topic's activity.
@@ -205,7 +211,9 @@ pub fn info(mission: &Mission) -> Info {
             publishes: own.publishes,
             subscribes: own.subscribes,
             sent: own.sent,
+            sent_hz: own.sent.and_then(|n| mean_rate(n, own.sending?)),
             received: own.received,
+            received_hz: own.received.and_then(|n| mean_rate(n, own.receiving?)),
         }
     });
     let mut info = Info {
@@ -295,10 +303,21 @@ fn lacking(topics: &ById<TopicId, TopicInfo>, edges: &mut dyn Iterator<Item = &E
 struct NodeTraffic {
     publishes: usize,
     subscribes: usize,
-    /// The number of messages sent; `None` where not known.
+    /// The number of messages sent, with the times of the first and the last; `None` where not known.
     sent: Option<u64>,
-    /// The number of messages received; `None` for a node without subscriptions.
+    sending: Option<(Stamp, Stamp)>,
+    /// The number of messages received, with the times of the first and the last; `None` for a node without
+    /// subscriptions.
     received: Option<u64>,
+    receiving: Option<(Stamp, Stamp)>,
+}
+
+/// Extends the time from a first message to a last one.
+fn widen(all: &mut Option<(Stamp, Stamp)>, other: Option<(Stamp, Stamp)>) {
+    if let Some((first, last)) = other {
+        let all = all.get_or_insert((first, last));
+        *all = (all.0.min(first), all.1.max(last));
+    }
 }
 
 /// The traffic of every node, computed in one pass over the edges.
@@ -312,6 +331,16 @@ fn traffic(mission: &Mission, topics: &ById<TopicId, TopicInfo>) -> ById<NodeId,
         let own = &mut traffic[edge.node];
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic].count;
+        let of = mission.sending.of_topic(edge.topic);
+        widen(&mut own.receiving, Sending::bounds(of.iter()));
+    }
+    for sender in &mission.sending.senders {
+        if let Some(node) = sender.node {
+            widen(
+                &mut traffic[node].sending,
+                Sending::bounds([sender].into_iter()),
+            );
+        }
     }
     for (id, edge) in elements.publishes.with_ids() {
         let rows = mission.graphs.rows(Element::Publish(id));
@@ -351,10 +380,8 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
                 .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
             topic.activity[window] = count;
         }
-        let seen = elements.seen(Element::Topic(id));
-        let span = seen.first.zip(seen.last);
-        let span = span.map(|(first, last)| last.since(first));
-        topic.hz = span.and_then(|nanos| mean_rate(topic.count, nanos));
+        let bounds = Sending::bounds(mission.sending.of_topic(id).iter());
+        topic.hz = bounds.and_then(|bounds| mean_rate(topic.count, bounds));
     }
     let name = |node: NodeId| elements.nodes[node].name.to_string();
     let named = elements.publishes.iter();
@@ -365,11 +392,6 @@ fn topics(mission: &Mission) -> ById<TopicId, TopicInfo> {
         topics[edge.topic].subscribers.push(name(edge.node));
     }
     topics
-}
-
-/// Messages per second when `count` of them span `nanos`; `None` with fewer than two.
-fn mean_rate(count: u64, nanos: i64) -> Option<f64> {
-    (count > 1 && nanos > 0).then(|| (count - 1) as f64 / (nanos as f64 / 1e9))
 }
 
 fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {

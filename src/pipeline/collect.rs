@@ -143,11 +143,12 @@ fn other_clocks(recorded: &Recorded, inputs: &[Input]) -> impl Iterator<Item = N
         let by = common.unwrap_or_else(|| start.since(clock.first));
         let own = inputs[clock.bag].name();
         let text = format!(
-            "the times of `{own}`, from {} on, are of another clock than the mission's, from {start} on, and its messages were set aside: `--offset {own}={:+.3}s` moves them to the mission",
+            "the times of `{own}`, from {} on, are of another clock than the mission's, from {start} on, so its messages ({}) were set aside: `--offset {own}={:+.3}s` moves them to the mission",
             clock.first,
+            clock.messages,
             by as f64 / 1e9
         );
-        Notice::counted(NoticeKind::ImpossibleTime, clock.messages, text)
+        Notice::new(NoticeKind::ImpossibleTime, text)
     })
 }
 

@@ -38,6 +38,8 @@ struct PresentLife {
     look: Option<(State, Confidence)>,
     /// Messages and nanoseconds since its rate last changed.
     sent: (f64, f64),
+    /// Nanoseconds since the last window with messages.
+    idle: f64,
     is_measured: bool,
     /// The rate that is written, with its number of messages.
     held: Option<(f64, Option<u64>)>,
@@ -105,7 +107,7 @@ impl PresentLife {
     fn forward(&mut self, run: &mut LookRun<'_>, lengths: &Lengths) {
         let shown = run.shown;
         if is_rate(shown) {
-            (self.sent, self.is_measured) = ((0.0, 0.0), false);
+            (self.sent, self.idle, self.is_measured) = ((0.0, 0.0), 0.0, false);
         }
         if !shown.is_paused {
             let old = self.look.unwrap_or(run.look);
@@ -114,8 +116,14 @@ impl PresentLife {
         // The rate of a ghost is not shown.
         let is_own = !shown.is_paused && !is_ghost(shown);
         if let Some(hz) = shown.hz.filter(|hz| hz.is_finite() && is_own) {
+            // Its rate is that from the first message to the last.
             let length = lengths.of(run.from, run.to);
-            self.sent = (self.sent.0 + hz * length, self.sent.1 + length);
+            if hz > 0.0 {
+                let time = self.sent.1 + self.idle + length;
+                (self.sent, self.idle) = ((self.sent.0 + hz * length, time), 0.0);
+            } else if self.sent.0 > 0.0 {
+                self.idle += length;
+            }
             self.is_measured = true;
         }
         let (sent, time) = self.sent;
@@ -240,6 +248,19 @@ mod tests {
         let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
         let rate = |at| looks.at(at)?.written_rate();
         (0..counts.len()).filter_map(rate).map(|r| r.0).collect()
+    }
+
+    #[test]
+    fn an_average_rate_is_that_from_the_first_message_to_the_last() {
+        let shown = [0, 100, 0, 50, 0].map(|count| Shown {
+            hz: Some(f64::from(count) / 10.0),
+            ..Shown::plain(0, State::Active, Confidence::Measured)
+        });
+        let window = Span::new(Stamp(0), Stamp(10_000_000_000));
+        let lengths = Lengths::new(shown.iter().map(|_| window));
+        let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
+        let steady = (0..5).map(|at| looks.at(at).unwrap().steady_hz);
+        assert_eq!(steady.collect::<Vec<_>>(), [Some(5.0); 5]);
     }
 
     #[test]

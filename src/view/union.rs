@@ -4,7 +4,7 @@ use crate::view::stable::Lengths;
 use crate::view::{Looks, SeenWindow, Shown, TopicRow, View, sum as added};
 
 /// The whole sequence as one window without marks: everything that ever existed, in its most active state,
-/// with rates averaged over the whole time and messages summed. `None` for a view without windows.
+/// with messages summed, and rates averaged over the windows from the first message to the last. `None` for a view without windows.
 pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     view.frames.first()?;
     let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
@@ -21,10 +21,14 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 /// The look of one item or arrow in all windows together.
 fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
     let mut slot = None;
+    let (mut first, mut last) = (None, 0);
     for (from, to, _, shown) in looks.spans(lengths.windows()) {
         gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
+        if shown.hz.is_some_and(|hz| hz > 0.0) {
+            (first, last) = (first.or(Some(from)), to);
+        }
     }
-    let time = lengths.of(0, lengths.windows());
+    let time = first.map_or(0.0, |first| lengths.of(first, last));
     let average = |sum: f64| if time > 0.0 { sum / time } else { 0.0 };
     let sum: Shown = slot?;
     let hz = sum.hz.map(average);
@@ -94,16 +98,16 @@ mod tests {
     use crate::view::{ViewOptions, view};
 
     #[test]
-    fn rates_are_averaged_over_the_whole_time() {
+    fn rates_are_averaged_from_the_first_message_to_the_last() {
         let (view, _) = view(
-            &mission(&["/a>/t@4", "/a", "/a>/t@2 /b", "/a"]),
+            &mission(&["/a>/t", "/a>/t@4", "/a", "/a>/t@5 /b", "/a"]),
             &ViewOptions::default(),
         );
         let all = union(&view).unwrap();
         assert_eq!((all.items.len(), all.arrows.len()), (3, 1));
         assert_eq!(
             (all.arrows[0].hz, all.arrows[0].count),
-            (Some(1.5), Some(6))
+            (Some(3.0), Some(9))
         );
         assert!(all.items.iter().all(|s| s.mark.is_none()));
         assert!(union(&View::default()).is_none());

@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::restarts::Restarts;
 use super::senders::{Sender, Traffic};
-use crate::base::rhythm::{FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_SHARE};
+use crate::base::name::HEARTBEAT;
+use crate::base::rhythm::{
+    FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_MOST, PAUSE_MOST_SHARE, PAUSE_SHARE,
+};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::clock::{DAY, FAR_DAYS};
 use crate::evidence::collector::Recorded;
@@ -107,10 +110,20 @@ fn overlap(mut all: Vec<(Stamp, Stamp, usize)>) -> bool {
 struct SendingNode<'a> {
     node: Option<Name>,
     stretches: &'a [Stretch],
+    /// Whether it has a rhythm, so that its silence may show a pause.
+    is_regular: bool,
     bags: BTreeSet<usize>,
 }
 
 impl SendingNode<'_> {
+    /// The number of messages inside an interval, without those at its ends.
+    fn count_in(&self, span: Span) -> f64 {
+        let from = self.stretches.partition_point(|s| s.last <= span.start);
+        let inside = self.stretches[from..].iter();
+        let inside = inside.take_while(|s| s.first < span.end);
+        inside.map(|s| s.count_in(span)).sum()
+    }
+
     /// The messages around a moment, if the next one is due long before `length` is over.
     fn sending(&self, at: Stamp, length: i64) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|s| s.first <= at);
@@ -148,14 +161,12 @@ pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream])
     let mut senders = Vec::new();
     for of_topic in traffic.values() {
         for (place, sender) in of_topic.list.iter().enumerate() {
-            if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
-                continue;
-            }
             let own = of_topic.streams.iter().zip(&of_topic.of);
             let own = own.filter(|(_, of)| **of == place);
             senders.push(SendingNode {
                 node: sender.node,
                 stretches: &sender.stretches,
+                is_regular: !sender.latched && sender.stretches.iter().any(|s| s.count >= FEWEST),
                 bags: own.map(|(at, _)| streams[*at].bag).collect(),
             });
         }
@@ -206,7 +217,7 @@ fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
 fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
     let steady = senders
         .iter()
-        .filter(|sender| sender.stretches.len() <= MOST_GAPS);
+        .filter(|sender| sender.is_regular && sender.stretches.len() <= MOST_GAPS);
     let pairs = steady.flat_map(|sender| sender.stretches.windows(2));
     let apart = pairs.filter(|pair| !pair[1].is_joined);
     let mut gaps: Vec<Span> = apart
@@ -216,17 +227,19 @@ fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
     gaps
 }
 
-/// The pause of the recording around a gap of one sender, if nearly all others that should have sent have that gap too.
+/// The pause of the recording around a gap of one sender, if nearly all others that should have sent have that gap too,
+/// and next to nothing was recorded in it.
 fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
-    let (mut should, mut silent) = (0, 0);
+    let (mut should, mut silent, mut due) = (0, 0, 0.0);
     let mut nodes: BTreeSet<Option<Name>> = BTreeSet::new();
     let mut found = Span::new(Stamp::MIN, Stamp::MAX);
-    for sender in senders {
+    for sender in senders.iter().filter(|sender| sender.is_regular) {
         let Some(stretch) = sender.sending(gap.start, gap.nanos()) else {
             should += u64::from(sender.begins_in(gap));
             continue;
         };
         should += 1;
+        due += gap.nanos() as f64 / stretch.period.max(1) as f64;
         // The last messages of two senders lie at most a period of either apart.
         let near = stretch.period.saturating_mul(2).max(GAP_NS / 2);
         let Some((last, next)) = sender.gap(gap.start, near) else {
@@ -246,7 +259,11 @@ fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option
     }
     let is_most = silent >= PAUSE_FEWEST && silent * 100 >= should * PAUSE_SHARE;
     let is_one_node = nodes.len() == 1 && !nodes.contains(&None);
-    (is_most && !is_one_node && found.nanos() >= GAP_NS).then_some(found)
+    if !is_most || is_one_node || found.nanos() < GAP_NS {
+        return None;
+    }
+    let recorded: f64 = senders.iter().map(|sender| sender.count_in(found)).sum();
+    (recorded <= PAUSE_MOST.max(due * PAUSE_MOST_SHARE)).then_some(found)
 }
 
 impl Sender {
@@ -309,6 +326,7 @@ mod tests {
             .map(|(node, stretches)| SendingNode {
                 node: Some(Name(*node)),
                 stretches,
+                is_regular: true,
                 bags: BTreeSet::new(),
             })
             .collect();
@@ -330,6 +348,21 @@ mod tests {
         let seldom = [stretch(0, 30_000, 4_000)];
         let all: &[(u32, &[Stretch])] = &[(1, &fast), (2, &slow), (3, &fast), (4, &seldom)];
         assert_eq!(reported(all), [(9_990, 15_005)]);
+    }
+
+    #[test]
+    fn nodes_that_fall_silent_together_beside_others_are_no_recorder_pause() {
+        let off = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
+        let on = [stretch(0, 30_000, 500)];
+        let all = |others: &[(u32, &[Stretch])]| {
+            let silent: &[(u32, &[Stretch])] = &[(1, &off), (2, &off), (3, &off), (4, &off)];
+            reported(&[silent, others].concat())
+        };
+        assert_eq!(all(&[]), [(9_990, 15_005)]);
+        // A fifth of the senders, but 100 messages in 30 s: 17 in these 5 s.
+        assert_eq!(all(&[(5, &on)]), []);
+        let few = Stretch { count: 20, ..on[0] };
+        assert_eq!(all(&[(5, &[few])]), [(9_990, 15_005)]);
     }
 
     #[test]

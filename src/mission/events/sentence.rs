@@ -93,7 +93,8 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
         },
         (Detail::None, Kind::Silent) => {
             let lasted = lasted.map_or_else(|| "to the end".to_owned(), |t| format!("for {t}"));
-            format!("silent {lasted}{}", too(mission, parts, event))
+            let together = together(mission, parts, event);
+            format!("silent {lasted}{together}{}", too(mission, parts, event))
         }
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
             let word = mission.log.word(kind);
@@ -171,6 +172,28 @@ fn too(mission: &Mission, parts: &[EventId], event: &Event) -> String {
         names.map_or_else(String::new, |names| format!("; {lead} {names}"))
     };
     listed("also", alike) + &listed("silent since then:", silent)
+}
+
+/// The number of nodes of an event that are silent, of those that send: `; 8 of 10 nodes silent together`. Empty for one or
+/// two, which the event names.
+fn together(mission: &Mission, parts: &[EventId], event: &Event) -> String {
+    let parts = parts.iter().filter_map(|id| mission.log.events.get(*id));
+    let silent = parts.chain([event]).filter(|e| e.kind == Kind::Silent);
+    let silent: BTreeSet<NodeId> = silent
+        .filter(|e| e.what.is_node())
+        .filter_map(|e| mission.elements.ends(e.what).0)
+        .collect();
+    let is_there = |node: &NodeId| {
+        let mut lives = mission.elements.nodes[*node].seen.lives.iter();
+        lives.any(|life| life.contains(event.time))
+    };
+    let senders = mission.sending.senders.iter();
+    let senders = senders.filter_map(|sender| sender.node).filter(is_there);
+    let all: BTreeSet<NodeId> = senders.chain(silent.iter().copied()).collect();
+    match silent.len() {
+        0..=2 => String::new(),
+        many => format!("; {many} of {} nodes silent together", all.len()),
+    }
 }
 
 /// The subscriber that receives nothing over an edge, and the incompatible policy.

@@ -193,7 +193,7 @@ fn topics(topics: &[TopicInfo], width: Option<usize>) -> String {
 
 fn nodes(info: &Info, width: Option<usize>) -> String {
     let row = |node: &NodeInfo| {
-        let (sends, receives) = load(node, info.duration_s);
+        let (sends, receives) = load(node);
         vec![
             Cell::Text(visible(node.name.as_str()).into_owned()),
             Cell::Text(node.confidence.to_owned()),
@@ -218,16 +218,20 @@ fn alive(node: &NodeInfo, start_ns: i64) -> String {
     }
 }
 
-/// The messages that a node sends and receives per second of the mission, and the topics: `0.26/s on 4`.
-fn load(node: &NodeInfo, duration_s: f64) -> (String, String) {
-    let rate = |count: u64| words::number(count as f64 / duration_s.max(1e-3));
+/// The messages that a node sends and receives per second, and the topics: `0.26/s on 4`; the number of messages if they
+/// have no rate.
+fn load(node: &NodeInfo) -> (String, String) {
+    let rate = |count: u64, hz: Option<f64>| match hz {
+        None if count > 0 => format!("{count} msg"),
+        hz => words::number(hz.unwrap_or(0.0)) + "/s",
+    };
     let sends = match node.sent {
         _ if node.publishes == 0 => String::new(),
-        Some(n) => format!("{}/s on {}", rate(n), node.publishes),
+        Some(n) => format!("{} on {}", rate(n, node.sent_hz), node.publishes),
         None => words::count(node.publishes, "topic"),
     };
     let receives = node.received.map_or_else(String::new, |n| {
-        format!("≤ {}/s on {}", rate(n), node.subscribes)
+        format!("≤ {} on {}", rate(n, node.received_hz), node.subscribes)
     });
     (sends, receives)
 }
