@@ -81,7 +81,7 @@ fn nodes_silent_together_beside_others_are_no_pause_of_the_recording() {
     let text = shown(&bag);
     assert!(!text.contains("nothing was recorded"), "{text}");
     assert!(
-        text.contains("silent for 15 s; 8 of 9 nodes silent together"),
+        text.contains("; 8 of 9 nodes silent together; also /n1"),
         "{text}"
     );
 }

@@ -68,10 +68,10 @@ pub(crate) fn believed(bags: &BTreeMap<usize, Calendar>) -> Belief {
     belief
 }
 
-/// Whether the clock of a bag begins at 0 and goes on from there. Otherwise messages at exactly 0, however many, are from
-/// before a simulation's clock was known.
+/// Whether the clock of a bag begins at 0: with a single message, or it goes on from there. Otherwise messages at exactly
+/// 0, however many, are from before a simulation's clock was known.
 fn begins_at_0(bag: &Calendar) -> bool {
-    bag.zeros > 0 && bag.next.is_none_or(|next| next.0 <= GAP_NS)
+    bag.zeros == 1 || bag.zeros > 0 && bag.next.is_none_or(|next| next.0 <= GAP_NS)
 }
 
 /// The credible days of a bag, and a sentence about clock jumps between them; `None` for a bag without messages.
@@ -196,6 +196,7 @@ mod tests {
             Stamp(1)
         );
         assert_eq!(all(&[at_0(2, GAP_NS / 10)]), Belief::default());
+        assert_eq!(all(&[at_0(1, 2 * GAP_NS)]), Belief::default());
         assert_eq!(all(&[late, at_0(2, 1)]), Belief::default());
         let only = Calendar {
             zeros: 3,

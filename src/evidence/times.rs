@@ -239,6 +239,23 @@ impl Stamps {
         self.get(id).map_or(0, |s| s.count)
     }
 
+    /// The number of times of a sequence in an interval.
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read.
+    pub(crate) fn count_in(&self, id: SeriesId, span: Span) -> io::Result<u64> {
+        let blocks = self.get(id).into_iter().flat_map(|series| &series.blocks);
+        let mut many = 0;
+        for block in blocks.filter(|block| block.first < span.end && span.start <= block.last) {
+            let is_inside = |(time, _): &&(Stamp, u32)| span.contains(*time);
+            many += match span.contains(block.first) && span.contains(block.last) {
+                true => u64::from(block.count),
+                false => self.load(block)?.iter().filter(is_inside).count() as u64,
+            };
+        }
+        Ok(many)
+    }
+
     /// The first and last time of a sequence, as far as they are in blocks.
     pub(crate) fn bounds(&self, id: SeriesId) -> Option<(Stamp, Stamp)> {
         self.get(id).and_then(|s| s.bounds)
@@ -395,6 +412,11 @@ mod tests {
         assert_eq!(all.times(id).unwrap(), stamps(expected));
         assert_eq!(all.count(id), 9500);
         assert_eq!(all.bounds(id), Some((Stamp(0), Stamp(8999))));
+        let count = |from, to| all.count_in(id, Span::new(Stamp(from), Stamp(to))).unwrap();
+        assert_eq!(
+            [count(0, 9000), count(10, 2600), count(9000, 9999)],
+            [9500, 2690, 0]
+        );
     }
 
     #[test]

@@ -64,17 +64,6 @@ impl Stretch {
         let period = if self.is_even { median } else { mean };
         1e9 / period.max(1.0)
     }
-
-    /// The number of messages in an interval, without those at its ends if it cuts the stretch: in proportion.
-    pub(crate) fn count_in(&self, span: Span) -> f64 {
-        let all = self.last.since(self.first);
-        let shared = self.last.min(span.end).since(self.first.max(span.start));
-        match (shared, all) {
-            (..0, _) => 0.0,
-            (_, 0) => self.count as f64,
-            _ => self.count as f64 * shared as f64 / all as f64,
-        }
-    }
 }
 
 /// All messages of one sender on one topic.
@@ -94,8 +83,16 @@ pub struct Sender {
 impl Sender {
     /// The number of messages in an interval, in proportion where it cuts a stretch.
     pub(crate) fn count_in(&self, span: Span) -> f64 {
-        let moments = Span::new(span.start, span.end.plus(-1));
-        self.stretches.iter().map(|s| s.count_in(moments)).sum()
+        let inside = |s: &Stretch| {
+            let all = s.last.since(s.first);
+            let shared = s.last.min(span.end.plus(-1)).since(s.first.max(span.start));
+            match (shared, all) {
+                (..0, _) => 0.0,
+                (_, 0) => s.count as f64,
+                _ => s.count as f64 * shared as f64 / all as f64,
+            }
+        };
+        self.stretches.iter().map(inside).sum()
     }
 }
 

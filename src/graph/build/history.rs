@@ -144,7 +144,7 @@ fn of_elements(
 ) -> io::Result<History> {
     let doubled = doubled(recorded, &findings.streams);
     let restarts = restarts(recorded, findings, traffic, &doubled)?;
-    let pauses = pauses(traffic, &restarts, &findings.streams);
+    let pauses = pauses(recorded, traffic, &restarts, &findings.streams)?;
     let (mut tracks, likes) = tracks(recorded, findings, traffic, (&restarts, &pauses))?;
     fall_silent(&mut tracks, traffic, findings, &pauses);
     compute_lifetimes(&mut tracks, &likes, &restarts, findings.mission);

@@ -110,20 +110,10 @@ fn overlap(mut all: Vec<(Stamp, Stamp, usize)>) -> bool {
 struct SendingNode<'a> {
     node: Option<Name>,
     stretches: &'a [Stretch],
-    /// Whether it has a rhythm, so that its silence may show a pause.
-    is_regular: bool,
     bags: BTreeSet<usize>,
 }
 
 impl SendingNode<'_> {
-    /// The number of messages inside an interval, without those at its ends.
-    fn count_in(&self, span: Span) -> f64 {
-        let from = self.stretches.partition_point(|s| s.last <= span.start);
-        let inside = self.stretches[from..].iter();
-        let inside = inside.take_while(|s| s.first < span.end);
-        inside.map(|s| s.count_in(span)).sum()
-    }
-
     /// The messages around a moment, if the next one is due long before `length` is over.
     fn sending(&self, at: Stamp, length: i64) -> Option<&Stretch> {
         let next = self.stretches.partition_point(|s| s.first <= at);
@@ -156,17 +146,24 @@ impl SendingNode<'_> {
 const MOST_GAPS: usize = 64;
 
 /// The times at which nothing was recorded, sorted: nearly all senders of a recording pause together, and
-/// resume together without having restarted.
-pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream]) -> Vec<Span> {
+/// resume together without having restarted, and next to nothing else was recorded.
+pub(crate) fn pauses(
+    recorded: &Recorded,
+    traffic: &Traffic,
+    restarts: &Restarts,
+    streams: &[Stream],
+) -> io::Result<Vec<Span>> {
     let mut senders = Vec::new();
     for of_topic in traffic.values() {
         for (place, sender) in of_topic.list.iter().enumerate() {
+            if sender.latched || sender.stretches.iter().all(|s| s.count < FEWEST) {
+                continue;
+            }
             let own = of_topic.streams.iter().zip(&of_topic.of);
             let own = own.filter(|(_, of)| **of == place);
             senders.push(SendingNode {
                 node: sender.node,
                 stretches: &sender.stretches,
-                is_regular: !sender.latched && sender.stretches.iter().any(|s| s.count >= FEWEST),
                 bags: own.map(|(at, _)| streams[*at].bag).collect(),
             });
         }
@@ -180,16 +177,29 @@ pub(crate) fn pauses(traffic: &Traffic, restarts: &Restarts, streams: &[Stream])
     for bag in bags {
         let of_bag: Vec<&SendingNode<'_>> =
             senders.iter().filter(|v| v.bags.contains(&bag)).collect();
+        // Most gaps are of one pause.
+        let mut seen = BTreeSet::new();
         for gap in gaps(&of_bag) {
-            if !found.iter().any(|pause| pause.shared(gap) > 0) {
-                found.extend(pause(&of_bag, restarts, gap));
+            if found.iter().any(|pause| pause.shared(gap) > 0) {
+                continue;
+            }
+            if let Some((pause, due)) = pause(&of_bag, restarts, gap)
+                && seen.insert((pause.start, pause.end))
+            {
+                let inside = Span::new(pause.start.plus(1), pause.end);
+                let mut many = 0;
+                for stream in streams.iter().filter(|stream| stream.bag == bag) {
+                    many += recorded.messages.count_in(stream.times, inside)?;
+                }
+                let is_nothing = many as f64 <= PAUSE_MOST.max(due * PAUSE_MOST_SHARE);
+                found.extend(is_nothing.then_some(pause));
             }
         }
     }
     found.extend(clock_jumps(traffic));
     found.sort_unstable_by_key(|pause| pause.start);
     found.dedup_by(|one, before| one.shared(*before) > 0);
-    found
+    Ok(found)
 }
 
 /// The times without any message that are too long for a mission: the clock was set in between.
@@ -217,7 +227,7 @@ fn clock_jumps(traffic: &Traffic) -> Vec<Span> {
 fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
     let steady = senders
         .iter()
-        .filter(|sender| sender.is_regular && sender.stretches.len() <= MOST_GAPS);
+        .filter(|sender| sender.stretches.len() <= MOST_GAPS);
     let pairs = steady.flat_map(|sender| sender.stretches.windows(2));
     let apart = pairs.filter(|pair| !pair[1].is_joined);
     let mut gaps: Vec<Span> = apart
@@ -227,13 +237,13 @@ fn gaps(senders: &[&SendingNode<'_>]) -> Vec<Span> {
     gaps
 }
 
-/// The pause of the recording around a gap of one sender, if nearly all others that should have sent have that gap too,
-/// and next to nothing was recorded in it.
-fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option<Span> {
+/// The possible pause of the recording around a gap of one sender, if nearly all others that should have sent have that
+/// gap too, with the number of messages that were due.
+fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option<(Span, f64)> {
     let (mut should, mut silent, mut due) = (0, 0, 0.0);
     let mut nodes: BTreeSet<Option<Name>> = BTreeSet::new();
     let mut found = Span::new(Stamp::MIN, Stamp::MAX);
-    for sender in senders.iter().filter(|sender| sender.is_regular) {
+    for sender in senders {
         let Some(stretch) = sender.sending(gap.start, gap.nanos()) else {
             should += u64::from(sender.begins_in(gap));
             continue;
@@ -259,11 +269,7 @@ fn pause(senders: &[&SendingNode<'_>], restarts: &Restarts, gap: Span) -> Option
     }
     let is_most = silent >= PAUSE_FEWEST && silent * 100 >= should * PAUSE_SHARE;
     let is_one_node = nodes.len() == 1 && !nodes.contains(&None);
-    if !is_most || is_one_node || found.nanos() < GAP_NS {
-        return None;
-    }
-    let recorded: f64 = senders.iter().map(|sender| sender.count_in(found)).sum();
-    (recorded <= PAUSE_MOST.max(due * PAUSE_MOST_SHARE)).then_some(found)
+    (is_most && !is_one_node && found.nanos() >= GAP_NS).then_some((found, due))
 }
 
 impl Sender {
@@ -326,7 +332,6 @@ mod tests {
             .map(|(node, stretches)| SendingNode {
                 node: Some(Name(*node)),
                 stretches,
-                is_regular: true,
                 bags: BTreeSet::new(),
             })
             .collect();
@@ -334,7 +339,7 @@ mod tests {
         let found = gaps(&senders).into_iter();
         let mut found: Vec<_> = found
             .filter_map(|gap| pause(&senders, &Restarts::new(), gap))
-            .map(|pause| (pause.start.0 / MILLI, pause.end.0 / MILLI))
+            .map(|(pause, _)| (pause.start.0 / MILLI, pause.end.0 / MILLI))
             .collect();
         found.dedup();
         found
@@ -348,21 +353,6 @@ mod tests {
         let seldom = [stretch(0, 30_000, 4_000)];
         let all: &[(u32, &[Stretch])] = &[(1, &fast), (2, &slow), (3, &fast), (4, &seldom)];
         assert_eq!(reported(all), [(9_990, 15_005)]);
-    }
-
-    #[test]
-    fn nodes_that_fall_silent_together_beside_others_are_no_recorder_pause() {
-        let off = [stretch(0, 9_990, 10), stretch(15_005, 30_000, 10)];
-        let on = [stretch(0, 30_000, 500)];
-        let all = |others: &[(u32, &[Stretch])]| {
-            let silent: &[(u32, &[Stretch])] = &[(1, &off), (2, &off), (3, &off), (4, &off)];
-            reported(&[silent, others].concat())
-        };
-        assert_eq!(all(&[]), [(9_990, 15_005)]);
-        // A fifth of the senders, but 100 messages in 30 s: 17 in these 5 s.
-        assert_eq!(all(&[(5, &on)]), []);
-        let few = Stretch { count: 20, ..on[0] };
-        assert_eq!(all(&[(5, &[few])]), [(9_990, 15_005)]);
     }
 
     #[test]
