@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::clock::{Belief, believed};
-use super::offsets::offsets;
+use super::offsets::{ClockOffset, offsets};
 
 use crate::bag::{Connection, Message, Want};
 use crate::base::error::{Error, Result};
@@ -23,7 +23,6 @@ use crate::evidence::source::equal_stamps::FirstHeader;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
 
-use recorded::OtherClock;
 pub use recorded::Recorded;
 pub use sink::BagSink;
 
@@ -351,18 +350,14 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
-        let Belief {
-            span,
-            jumps,
-            others,
-        } = believed(self.messages.calendars());
-        let jumps = jumps.into_iter();
+        let belief = believed(self.messages.calendars());
+        // What is set aside may show by how much clocks differ.
+        let mut offsets = offsets(&self.streams, &self.facts).map_err(spool_error)?;
+        let others = self.set_aside(&belief).map_err(spool_error)?;
+        offsets.extend(others);
+        let jumps = belief.jumps.into_iter();
         self.notices
             .extend(jumps.map(|text| Notice::new(NoticeKind::Note, text)));
-        // What is set aside may show how to set a clock.
-        let offsets = offsets(&self.streams, &self.facts).map_err(spool_error)?;
-        let aside = span.map(|span| self.set_aside(span, &others));
-        let others = aside.transpose().map_err(spool_error)?;
         source::rosout::interpret_lists(&mut self.facts);
         let (streams, facts) = (&mut self.streams, &mut self.facts);
         let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers);
@@ -387,37 +382,54 @@ impl Collector {
             falls: Vec::new(),
             overlaps: false,
             offsets,
-            others: others.unwrap_or_default(),
             span: None,
         };
         all.span = all.measure();
         Ok(all)
     }
 
-    /// Removes the messages at other times than these, and everything that they state: they prove nothing. Returns those
-    /// of other clocks.
-    fn set_aside(&mut self, span: Span, others: &[usize]) -> io::Result<Vec<OtherClock>> {
-        let mut clocks: Vec<OtherClock> = others.iter().map(|bag| OtherClock::new(*bag)).collect();
+    /// Removes the messages at incredible times, and everything that they state: they prove nothing. Returns the offsets of
+    /// other clocks so that their first messages are together.
+    fn set_aside(&mut self, belief: &Belief) -> io::Result<Vec<ClockOffset>> {
+        let Some(span) = belief.span else {
+            return Ok(Vec::new());
+        };
+        let before = self.firsts();
         let mut aside = 0;
         for stream in &self.streams {
-            let bounds = self.messages.bounds(stream.times);
-            let removed = self.messages.clip(stream.times, span)?;
-            match clocks.iter_mut().find(|clock| clock.bag == stream.bag) {
-                Some(clock) => clock.add(bounds, removed),
-                None => aside += removed,
-            }
+            aside += self.messages.clip(stream.times, span)?;
         }
         self.facts.clip(span)?;
         let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
         self.facts.headers.retain(|at, _| has_messages(at));
         self.numbers.values_mut().for_each(|own| own.clip(span));
         self.texts.retain(|(time, _)| span.contains(*time));
-        if aside > 0 {
-            let text = "message at an impossible time, set aside";
-            let kind = NoticeKind::ImpossibleTime;
-            self.notices.add(Notice::counted(kind, aside, text));
+        let text = "message at an impossible time, set aside";
+        let notice = Notice::counted(NoticeKind::ImpossibleTime, aside, text);
+        self.notices.add(notice);
+        let kept = self.firsts().into_iter().min_by_key(|(_, first)| *first);
+        let offset = |bag: &usize| {
+            let ((other, start), first) = kept.zip(before.get(bag))?;
+            Some(ClockOffset {
+                bag: *bag,
+                other,
+                ahead: first.since(start),
+                messages: 0,
+            })
+        };
+        Ok(belief.others.iter().filter_map(offset).collect())
+    }
+
+    /// The time of the first message of each bag.
+    fn firsts(&self) -> BTreeMap<usize, Stamp> {
+        let mut firsts = BTreeMap::new();
+        for stream in &self.streams {
+            if let Some((first, _)) = self.messages.bounds(stream.times) {
+                let own = firsts.entry(stream.bag).or_insert(first);
+                *own = first.min(*own);
+            }
         }
-        Ok(clocks)
+        firsts
     }
 }
 

@@ -72,9 +72,9 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         recorded.mark_outside(range.start <= known.start);
     }
     recorded.notices.extend(twice);
-    let clocks = other_clocks(&recorded, &inputs).chain(apart(&recorded, &inputs));
-    let clocks: Vec<Notice> = clocks.collect();
-    recorded.notices.extend(clocks);
+    let offsets = recorded.offsets.iter();
+    let apart = offsets.map(|offset| apart(offset, &inputs));
+    recorded.notices.extend(apart);
     let falls = seams
         .iter()
         .flat_map(|seams| straight::falls(seams, !is_pipe));
@@ -106,50 +106,28 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     })
 }
 
-/// Notices about recorders whose clocks differ, by the messages that two of them recorded.
-fn apart(recorded: &Recorded, inputs: &[Input]) -> impl Iterator<Item = Notice> {
-    let is_other = |bag| recorded.others.iter().any(|clock| clock.bag == bag);
-    let offsets = recorded.offsets.iter();
-    let offsets = offsets.filter(move |of| !is_other(of.bag) && !is_other(of.other));
-    offsets.map(|offset| {
-        let [own, other] = [offset.bag, offset.other].map(|at| inputs[at].name());
-        let seconds = offset.ahead as f64 / 1e9;
-        let length = words::duration(offset.ahead.abs());
-        let side = if offset.ahead > 0 {
-            "ahead of"
-        } else {
-            "behind"
-        };
-        let count = words::count(offset.messages, "message");
-        let text = format!(
-            "the clock of `{own}` is {length} {side} that of `{other}` by {count} that both recorded: `--offset {own}={:+.3}s` corrects it",
-            -seconds
-        );
-        Notice::new(NoticeKind::Note, text)
-    })
-}
-
-/// Notices about bags whose messages were set aside, since their clocks are far from those of the others: the offset by
-/// the messages that another bag recorded too, or else so that they begin with the mission.
-fn other_clocks(recorded: &Recorded, inputs: &[Input]) -> impl Iterator<Item = Notice> {
-    let start = recorded.span.map_or(Stamp(0), |span| span.start);
-    recorded.others.iter().map(move |clock| {
-        let mut offsets = recorded.offsets.iter();
-        let common = offsets.find_map(|offset| match clock.bag {
-            bag if bag == offset.bag => Some(offset.ahead.saturating_neg()),
-            bag if bag == offset.other => Some(offset.ahead),
-            _ => None,
-        });
-        let by = common.unwrap_or_else(|| start.since(clock.first));
-        let own = inputs[clock.bag].name();
-        let text = format!(
-            "the times of `{own}`, from {} on, are of another clock than the mission's, from {start} on, so its messages ({}) were set aside: `--offset {own}={:+.3}s` moves them to the mission",
-            clock.first,
-            clock.messages,
-            by as f64 / 1e9
-        );
-        Notice::new(NoticeKind::ImpossibleTime, text)
-    })
+/// The notice about recorders whose clocks differ: by the messages that two of them recorded, or by all of them.
+fn apart(offset: &ClockOffset, inputs: &[Input]) -> Notice {
+    let [own, other] = [offset.bag, offset.other].map(|at| inputs[at].name());
+    let seconds = offset.ahead as f64 / 1e9;
+    let length = words::duration(offset.ahead.saturating_abs());
+    let side = if offset.ahead > 0 {
+        "ahead of"
+    } else {
+        "behind"
+    };
+    let (why, then) = match offset.messages {
+        0 => ("their first messages".to_owned(), "puts these together"),
+        many => (
+            words::count(many, "message") + " that both recorded",
+            "corrects it",
+        ),
+    };
+    let text = format!(
+        "the clock of `{own}` is {length} {side} that of `{other}` by {why}: `--offset {own}={:+.3}s` {then}",
+        -seconds
+    );
+    Notice::new(NoticeKind::Note, text)
 }
 
 /// The beginning of the notice about a clock that was set back.

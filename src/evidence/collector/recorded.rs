@@ -29,8 +29,6 @@ pub struct Recorded {
     pub(crate) overlaps: bool,
     /// The differences between the clocks of several recorders.
     pub(crate) offsets: Vec<ClockOffset>,
-    /// The bags whose messages were set aside, since their clocks are far from those of the others.
-    pub(crate) others: Vec<OtherClock>,
     /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
     /// no message.
     pub span: Option<Span>,
@@ -52,32 +50,5 @@ impl Recorded {
         let bounds = bounds.filter_map(|stream| self.messages.bounds(stream.times));
         let (first, last) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
         Some(Span::new(first, last.plus(1)))
-    }
-}
-
-/// A bag whose messages were set aside, since its clock is far from those of the others.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct OtherClock {
-    /// The index of the bag among the inputs.
-    pub(crate) bag: usize,
-    /// The time of its first message.
-    pub(crate) first: Stamp,
-    /// The number of its messages.
-    pub(crate) messages: u64,
-}
-
-impl OtherClock {
-    pub(super) fn new(bag: usize) -> Self {
-        Self {
-            bag,
-            first: Stamp::MAX,
-            messages: 0,
-        }
-    }
-
-    /// Adds the messages of a stream that were removed, and the times of the first and the last before.
-    pub(super) fn add(&mut self, bounds: Option<(Stamp, Stamp)>, removed: u64) {
-        self.first = bounds.map_or(self.first, |(first, _)| self.first.min(first));
-        self.messages += removed;
     }
 }

@@ -1,10 +1,10 @@
 //! The recordings of a mission: the time that each covers, and the times at which none of its messages was recorded.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use super::restarts::Restarts;
 use super::senders::{Sender, Traffic};
-use crate::base::name::HEARTBEAT;
 use crate::base::rhythm::{
     FEWEST, GAP, GAP_NS, OUT_OF_ORDER_NS, PAUSE_FEWEST, PAUSE_MOST, PAUSE_MOST_SHARE, PAUSE_SHARE,
 };
