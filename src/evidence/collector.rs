@@ -11,7 +11,7 @@ use crate::bag::{Connection, Message, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::is_log;
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::inference::Stream;
 use crate::evidence::message::cursor::PayloadCursor;

@@ -8,9 +8,10 @@ use crate::bag::straight::{self, ClockFall, Straightened, Watched};
 use crate::bag::{self, Input, OpenOptions, Report, known_span};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::collector::{self, Collector, Recorded};
+use crate::evidence::offsets::ClockOffset;
 use crate::graph::window;
 
 /// The bags of a mission, read.
