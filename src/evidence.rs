@@ -132,16 +132,13 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "links",
         about: "log records of roscpp about its connections",
-        reads: &[(definition::ROS1_LOGS, Payload(links::read))],
+        reads: &[(definition::ROS1_LOGS, Log(links::read))],
         ..NOTHING
     },
     Source {
         word: "diagnostics",
         about: "statuses are named after their nodes; the publisher of `/diagnostics_agg` subscribes to `/diagnostics`",
-        reads: &[(
-            &[diagnostics::SHAPE, diagnostics::SHAPE2],
-            Payload(diagnostics::read),
-        )],
+        reads: &[(&[diagnostics::SHAPE], Payload(diagnostics::read))],
         conclude: &[diagnostics::conclude],
         ..NOTHING
     },
@@ -149,8 +146,8 @@ pub const SOURCES: &[Source] = &[
         word: "rosout",
         about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
         reads: &[
-            (definition::ROS1_LOGS, Payload(rosout::read)),
-            (&[definition::LOG2], Payload(rosout_ros2::read)),
+            (definition::ROS1_LOGS, Log(rosout::read)),
+            (&[definition::LOG2], Log(rosout_ros2::read)),
         ],
         conclude: &[rosout::conclude, rosout_ros2::conclude],
         own: true,

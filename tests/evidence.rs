@@ -3,12 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
+use bagreel::bag::{
+    self, Connection, ConnectionId, Encoding, Input, Message, OpenOptions, Sink, Want,
+};
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
 use bagreel::internals::evidence::collector::{CollectOptions, Collector};
 use bagreel::internals::evidence::conclude;
 use bagreel::internals::graph::{self, Built};
+
+use crate::support::cdr::Cdr;
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -468,4 +472,98 @@ fn replayed(tape: &Tape, wanted: impl Fn(&Connection) -> bool) -> (Built, Vec<Sp
         sink.stamps(ids[id], &[*time], size.as_ref().map(std::slice::from_ref));
     }
     built(collector)
+}
+
+impl Tape {
+    /// Keeps the messages that `keep` accepts, by connection, time and payload.
+    fn retain(&mut self, keep: impl Fn(&Connection, Stamp, &[u8]) -> bool) {
+        let connections = &self.connections;
+        let of = |id: &ConnectionId| &connections[id.0 as usize];
+        let mut dropped = BTreeSet::new();
+        self.messages.retain(|(id, time, data)| {
+            let kept = keep(of(id), *time, data);
+            if !kept {
+                dropped.insert((*id, *time));
+            }
+            kept
+        });
+        self.stamps
+            .retain(|(id, time, _)| !dropped.contains(&(*id, *time)) && keep(of(id), *time, &[]));
+        let used: BTreeSet<ConnectionId> = self.stamps.iter().map(|(id, ..)| *id).collect();
+        self.connections
+            .iter_mut()
+            .filter(|connection| !used.contains(&connection.id))
+            .for_each(|connection| connection.topic = "".into());
+    }
+}
+
+/// The record in a payload of `rosgraph_msgs/Log`, in the encoding of ROS 2: without the number in the header.
+fn converted(payload: &[u8]) -> Vec<u8> {
+    let mut rest = &payload[12..];
+    let number = |rest: &mut &[u8]| {
+        let (first, others) = rest.split_at(4);
+        *rest = others;
+        u32::from_le_bytes(first.try_into().unwrap())
+    };
+    let text = |rest: &mut &[u8]| {
+        let (first, others) = {
+            let length = number(rest) as usize;
+            rest.split_at(length)
+        };
+        *rest = others;
+        String::from_utf8(first.to_vec()).unwrap()
+    };
+    let mut cdr = Cdr::default()
+        .raw(&payload[4..12])
+        .text(&text(&mut rest))
+        .u8(rest[0]);
+    rest = &rest[1..];
+    for _ in 0..4 {
+        cdr = cdr.text(&text(&mut rest));
+    }
+    let (line, topics) = (number(&mut rest), number(&mut rest));
+    cdr = cdr.u32(line).u32(topics);
+    for _ in 0..topics {
+        cdr = cdr.text(&text(&mut rest));
+    }
+    cdr.done()
+}
+
+#[test]
+fn a_recording_converted_to_ros2_keeps_the_evidence_of_its_log() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    let mut tape = taped(&path);
+    let log = tape
+        .connections
+        .iter()
+        .filter(|c| c.topic.as_str() == "/rosout");
+    let log: BTreeSet<ConnectionId> = log.map(|c| c.id).collect();
+    for connection in &mut tape.connections {
+        connection.publisher = None;
+    }
+    // The log of a bag whose headers name nobody.
+    tape.retain(|connection, _, _| log.contains(&connection.id));
+    let ever = |tape: &Tape| {
+        let (built, windows) = replayed(tape, |c| !c.topic.as_str().is_empty());
+        let mut all = [Names::new(), Names::new(), Names::new()];
+        for window in 0..windows.len() {
+            let names = names(&built, window);
+            all.iter_mut()
+                .zip(names)
+                .for_each(|(all, names)| all.extend(names));
+        }
+        all
+    };
+    let [nodes, publishes, subscribes] = ever(&tape);
+    assert!(nodes.len() > 25 && publishes.len() > 50 && !subscribes.is_empty());
+    for (_, _, data) in &mut tape.messages {
+        *data = converted(data);
+    }
+    for connection in tape.connections.iter_mut() {
+        connection.encoding = Encoding::Cdr;
+        connection.type_name = connection.type_name.replace("s/", "s/msg/").into();
+        connection.definition = None;
+        connection.type_hash = None;
+    }
+    assert_eq!(ever(&tape), [nodes, publishes, subscribes]);
 }

@@ -106,6 +106,8 @@ const PAYLOAD_ENTRY: u64 = 64;
 struct StreamLayout {
     /// The sources that read them.
     readers: Vec<(SourceId, Read)>,
+    /// Whether their headers begin with a number.
+    is_numbered: bool,
     /// Their first header, whose stamp is their age.
     header: Option<FirstHeader>,
     /// The schema for parsing them, if they contain words or numbers that are compared.
@@ -263,7 +265,8 @@ impl Collector {
         self.compare(place, message);
         self.keep_text(place, message);
         let stream = &self.streams[place];
-        for (source, read) in &self.layouts[place].readers {
+        let layout = &self.layouts[place];
+        for (source, read) in &layout.readers {
             let mut context = SourceContext {
                 facts: &mut self.facts,
                 space: &self.space,
@@ -273,6 +276,7 @@ impl Collector {
                 time: Some(message.time),
             };
             let done = PayloadCursor::new(&stream.connection.encoding, message.data)
+                .map(|payload| payload.numbered(layout.is_numbered))
                 .and_then(|mut payload| read.read(&mut context, &mut payload));
             if done.is_err() {
                 self.notices

@@ -8,10 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
-use crate::bag::Connection;
+use crate::bag::{Connection, Encoding};
 use crate::base::name::{is_log, plain_type};
 use crate::base::time::Stamp;
 use crate::evidence::inference::closed::Closed;
+use crate::evidence::message::log::is_ros1_log;
 use crate::evidence::observation::{
     Confidence, EvidenceLine, Name, Observation, ObservationRecord, Observations, SourceId,
 };
@@ -302,6 +303,16 @@ impl<'a> Conclusions<'a> {
         answer
     }
 
+    /// Whether a recording is of ROS 1, perhaps converted: by its log, otherwise by its encoding.
+    pub(crate) fn is_ros1(&self) -> bool {
+        let connections = || self.streams.iter().map(|stream| &stream.connection);
+        let is_ros2 =
+            |kind: &str| ["rcl_interfaces/Log", "rcl_interfaces/ParameterEvent"].contains(&kind);
+        connections().any(|c| is_ros1_log(&c.type_name))
+            || connections().any(|c| c.encoding == Encoding::Ros1)
+                && self.topics_of(is_ros2).is_empty()
+    }
+
     /// Whether a bag has a connection of this topic, even without messages.
     pub(crate) fn is_recorded(&self, topic: Name) -> bool {
         self.recorded.contains_key(&topic)
@@ -373,12 +384,12 @@ impl<'a> Conclusions<'a> {
         &self.nodes
     }
 
-    /// The recorded topics whose type `fits` accepts, in the order of their names.
+    /// The recorded topics whose type, without `/msg`, `fits` accepts, in the order of their names.
     pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
         let fitting = self
             .streams
             .iter()
-            .filter(|s| fits(&s.connection.type_name));
+            .filter(|s| fits(&plain_type(&s.connection.type_name)));
         let mut topics: Vec<_> = fitting
             .map(|s| (s.connection.topic.clone(), s.topic))
             .collect();

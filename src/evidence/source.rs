@@ -43,7 +43,7 @@ use crate::evidence::inference::{Conclusions, Stream};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::{LayoutFit, MessageLayout};
 use crate::evidence::message::dynamic::MessageSchema;
-use crate::evidence::message::log::LogRecord;
+use crate::evidence::message::log::{LogRecord, is_ros1_log};
 use crate::evidence::message::parameters::ParameterEvent;
 use crate::evidence::observation::{
     Confidence, Measurement, Name, Observation, Observations, SourceId, Statement,
@@ -167,7 +167,10 @@ impl Read {
     ) -> PayloadResult<()> {
         match self {
             Self::Payload(read) => read(context, payload)?,
-            Self::Log(read) => read(context, &LogRecord::read(payload)?),
+            Self::Log(read) => {
+                let is_ros1 = is_ros1_log(&context.stream.connection.type_name);
+                read(context, &LogRecord::read(payload, is_ros1)?);
+            }
             Self::Parameters(read) => read(context, &ParameterEvent::read(payload)?),
         }
         Ok(())

@@ -53,6 +53,12 @@ impl Cdr {
         cdr
     }
 
+    /// Bytes as they are.
+    pub fn raw(mut self, bytes: &[u8]) -> Self {
+        self.0.extend(bytes);
+        self
+    }
+
     /// `builtin_interfaces/Time`.
     pub fn time(self, nanos: i64) -> Self {
         let seconds = u32::try_from(nanos / 1_000_000_000).unwrap();

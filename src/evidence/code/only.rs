@@ -11,7 +11,6 @@ use super::Code;
 use super::declaration::Role;
 use super::matching::{Match, RecordedTopics, matches, resolved};
 use super::workspace::{FileDeclaration, Instance};
-use crate::bag::Encoding;
 use crate::base::name::last_part;
 use crate::base::words::{count, worded};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
@@ -332,9 +331,7 @@ fn is_of_other_ros(instance: &Instance, known: &Conclusions<'_>) -> bool {
     };
     let is_ros2 = texts().any(|text| text.starts_with("create_"));
     let is_ros1 = !is_ros2 && texts().any(|text| ROS1.iter().any(|call| text.starts_with(call)));
-    let mut streams = known.streams.iter();
-    let of_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
-    if of_ros1 { is_ros2 } else { is_ros1 }
+    if known.is_ros1() { is_ros2 } else { is_ros1 }
 }
 
 /// Adds the node, with a question mark, and its edge, which exists as long as its topic.

@@ -79,6 +79,7 @@ impl Sink for BagSink<'_> {
         all.streams.push(stream);
         all.layouts.push(StreamLayout {
             readers,
+            is_numbered: schema.numbers_headers(&connection.encoding),
             header,
             schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
             is_text,

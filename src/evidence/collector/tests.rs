@@ -25,6 +25,11 @@ impl Payload {
         }
     }
 
+    /// An empty payload in each encoding.
+    pub(super) fn both() -> [Self; 2] {
+        [Self::ros1(), Self::cdr()]
+    }
+
     pub(super) fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
         while self.cdr && !(self.bytes.len() - 4).is_multiple_of(N) {
             self.bytes.push(0);
@@ -67,8 +72,12 @@ impl Payload {
     }
 
     pub(super) fn log(name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
-        let record = Self::ros1()
-            .header(7)
+        Self::ros1().header(7).logged(name, message, file, topics)
+    }
+
+    /// The rest of a log record after its header.
+    fn logged(self, name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
+        let record = self
             .byte(2)
             .text(name)
             .text(message)
@@ -89,10 +98,12 @@ pub(super) fn receive(
     publisher: Option<&str>,
     payload: &Payload,
 ) -> (Collector, Want) {
-    let mut collector = Collector::new(CollectOptions::default());
-    let mut progress = |_, _| ();
-    let mut bag = collector.bag(&mut progress);
-    let want = bag.connection(&Connection {
+    receive_defined(&connection(topic, kind, publisher), payload)
+}
+
+/// A connection without a definition.
+fn connection(topic: &str, kind: &str, publisher: Option<&str>) -> Connection {
+    Connection {
         id: ConnectionId(0),
         topic: topic.into(),
         type_name: kind.into(),
@@ -102,11 +113,22 @@ pub(super) fn receive(
         publisher: publisher.map(Into::into),
         latching: false,
         qos: None,
+        encoding: Encoding::Ros1,
+    }
+}
+
+/// As [`receive`], for a connection in the payload's encoding.
+fn receive_defined(connection: &Connection, payload: &Payload) -> (Collector, Want) {
+    let mut collector = Collector::new(CollectOptions::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    let want = bag.connection(&Connection {
         encoding: if payload.cdr {
             Encoding::Cdr
         } else {
             Encoding::Ros1
         },
+        ..connection.clone()
     });
     bag.message(Message {
         connection: ConnectionId(0),
@@ -124,8 +146,13 @@ pub(super) fn observations(
     publisher: Option<&str>,
     payload: &Payload,
 ) -> Vec<String> {
-    let (mut collector, want) = receive(topic, kind, publisher, payload);
+    let (collector, want) = receive(topic, kind, publisher, payload);
     assert_eq!(want, Want::Payload);
+    lines(collector)
+}
+
+/// All observations, a line each, sorted.
+fn lines(mut collector: Collector) -> Vec<String> {
     source::rosout::interpret_lists(&mut collector.facts);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
     let facts = &collector.facts;
@@ -146,17 +173,48 @@ pub(super) fn observations(
 
 #[test]
 fn roscpp_names_what_it_publishes() {
-    let record = Payload::log("/a", "hello", "src/a.cpp", &["/scan"]);
-    assert_eq!(
-        observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
-        [
-            "LogsFrom /a a.cpp",
-            "Node /a",
-            "Publish /a /rosout",
-            "Publish /a /scan",
-            "Snapshot topics of /a"
-        ]
-    );
+    for empty in Payload::both() {
+        let record = empty
+            .header(7)
+            .logged("/a", "hello", "src/a.cpp", &["/scan"]);
+        assert_eq!(
+            observations("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
+            [
+                "LogsFrom /a a.cpp",
+                "Node /a",
+                "Publish /a /rosout",
+                "Publish /a /scan",
+                "Snapshot topics of /a"
+            ]
+        );
+    }
+}
+
+#[test]
+fn headers_in_converted_recordings_may_have_a_number() {
+    let fields = "std_msgs/Header header\nbyte level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n\
+                  string[] topics\n===\nMSG: std_msgs/Header\n";
+    let time = "===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+    let stamp = "builtin_interfaces/Time stamp\nstring frame_id\n";
+    let of = |header: String, payload: Payload| {
+        let definition = format!("{fields}{header}{time}");
+        let connection = Connection {
+            definition: Some(definition.into()),
+            type_hash: Some("RIHS01_56c2".into()),
+            ..connection("/rosout", "rosgraph_msgs/msg/Log", None)
+        };
+        let record = payload
+            .time()
+            .text("")
+            .logged("/a", "up", "a.py", &["/scan"]);
+        lines(receive_defined(&connection, &record).0)
+    };
+    let plain = of(stamp.to_owned(), Payload::cdr());
+    assert!(plain.contains(&"Lists /a /scan".to_owned()), "{plain:?}");
+    let mut numbered = of(format!("uint32 seq\n{stamp}"), Payload::cdr().u32(1));
+    // The number is the first record's.
+    numbered.retain(|line| line != "Begins /a");
+    assert_eq!(numbered, plain);
 }
 
 #[test]
@@ -217,64 +275,53 @@ fn the_recorder_dates_a_topic() {
 
 #[test]
 fn statistics_name_both_ends() {
-    let message = Payload::ros1()
-        .text("/scan")
-        .text("/lidar")
-        .text("/slam")
-        .time()
-        .time();
-    let message = message.u32(10).u32(0).u32(999).raw(&[0; 48]);
-    assert_eq!(
-        observations(
-            "/statistics",
-            "rosgraph_msgs/TopicStatistics",
-            Some("/slam"),
-            &message
-        ),
-        ["Publish /lidar /scan", "Subscribe /slam /scan"]
-    );
+    for empty in Payload::both() {
+        let ends = empty.text("/scan").text("/lidar").text("/slam");
+        let message = ends.time().time().u32(10).u32(0).u32(999).raw(&[0; 48]);
+        assert_eq!(
+            observations(
+                "/statistics",
+                "rosgraph_msgs/TopicStatistics",
+                Some("/slam"),
+                &message
+            ),
+            ["Publish /lidar /scan", "Subscribe /slam /scan"]
+        );
+    }
 }
 
 #[test]
 fn diagnostics_name_their_node() {
-    let message = Payload::ros1()
-        .header(1)
-        .u32(1)
-        .byte(0)
-        .text("r1/lidar: Rate")
-        .text("")
-        .text("")
-        .u32(1);
-    let message = message.text("k").text("v");
-    assert_eq!(
-        observations(
-            "/diagnostics",
-            "diagnostic_msgs/DiagnosticArray",
-            None,
-            &message
-        ),
-        ["Reports /r1/lidar /diagnostics"]
-    );
+    for empty in Payload::both() {
+        let status = empty.header(1).u32(1).byte(0).text("r1/lidar: Rate");
+        let message = status.text("").text("").u32(1).text("k").text("v");
+        assert_eq!(
+            observations(
+                "/diagnostics",
+                "diagnostic_msgs/DiagnosticArray",
+                None,
+                &message
+            ),
+            ["Reports /r1/lidar /diagnostics"]
+        );
+    }
 }
 
 #[test]
 fn the_status_of_a_goal_names_its_client() {
-    let message = Payload::ros1()
-        .header(1)
-        .u32(1)
-        .time()
-        .text("/boss-1-1795170744.123")
-        .byte(1)
-        .text("");
-    assert_eq!(
-        observations(
-            "/move/status",
-            "actionlib_msgs/GoalStatusArray",
-            None,
-            &message
-        ),
-        ["Publish /boss /move/goal"]
-    );
+    for empty in Payload::both() {
+        let goal = empty.header(1).u32(1).time().text("/boss-1-1795170744.123");
+        let message = goal.byte(1).text("");
+        assert_eq!(
+            observations(
+                "/move/status",
+                "actionlib_msgs/GoalStatusArray",
+                None,
+                &message
+            ),
+            ["Publish /boss /move/goal"]
+        );
+    }
 }
 
 #[test]

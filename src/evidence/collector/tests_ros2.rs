@@ -4,18 +4,14 @@ use super::tests::{Payload, observations};
 
 #[test]
 fn a_log_record_of_ros2_names_its_logger() {
-    let record = Payload::cdr()
-        .time()
-        .byte(20)
-        .text("r1.nav")
-        .text("hi")
-        .text("f")
-        .text("g")
-        .u32(1);
-    assert_eq!(
-        observations("/rosout", "rcl_interfaces/msg/Log", None, &record),
-        ["Logger /r1/nav /rosout", "LogsFrom /r1/nav f"]
-    );
+    for empty in Payload::both() {
+        let record = empty.time().byte(20).text("r1.nav").text("hi");
+        let record = record.text("f").text("g").u32(1);
+        assert_eq!(
+            observations("/rosout", "rcl_interfaces/msg/Log", None, &record),
+            ["Logger /r1/nav /rosout", "LogsFrom /r1/nav f"]
+        );
+    }
 }
 
 #[test]

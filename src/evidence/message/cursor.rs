@@ -44,6 +44,16 @@ pub(crate) struct PayloadCursor<'a> {
     /// The origin of alignment; `None` if nothing is aligned (ROS 1).
     origin: Option<usize>,
     big_endian: bool,
+    /// Whether headers begin with a sequence number.
+    is_numbered: bool,
+}
+
+/// The content of a `std_msgs/Header`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    /// The sequence number, which ROS 2 has left out.
+    pub(crate) number: Option<u32>,
+    pub(crate) stamp: Stamp,
 }
 
 impl<'a> PayloadCursor<'a> {
@@ -69,6 +79,7 @@ impl<'a> PayloadCursor<'a> {
             at: 0,
             origin: None,
             big_endian: false,
+            is_numbered: true,
         }
     }
 
@@ -83,11 +94,21 @@ impl<'a> PayloadCursor<'a> {
                 at: 4,
                 origin: Some(4),
                 big_endian: *kind == 0,
+                is_numbered: false,
             }),
             _ => Err(Malformed {
                 at: 0,
                 expected: "a plain CDR header",
             }),
+        }
+    }
+
+    /// The same cursor, over a message whose headers begin with a sequence number or not, if that is not as usual in its
+    /// encoding.
+    pub(crate) fn numbered(self, is_numbered: bool) -> Self {
+        Self {
+            is_numbered,
+            ..self
         }
     }
 
@@ -242,19 +263,18 @@ impl<'a> PayloadCursor<'a> {
         Ok(count)
     }
 
-    /// Skips a `std_msgs/Header`, which begins with a sequence number in ROS 1.
-    pub(crate) fn header(&mut self) -> PayloadResult<()> {
-        self.stamp().map(|_| ())
+    /// The next header.
+    pub(crate) fn header(&mut self) -> PayloadResult<Header> {
+        let header = self.header_start()?;
+        self.skip_string()?;
+        Ok(header)
     }
 
-    /// The stamp of a header, which is skipped.
-    pub(crate) fn stamp(&mut self) -> PayloadResult<Stamp> {
-        if !self.is_cdr() {
-            self.u32()?;
-        }
+    /// The next header up to its stamp.
+    pub(crate) fn header_start(&mut self) -> PayloadResult<Header> {
+        let number = self.is_numbered.then(|| self.u32()).transpose()?;
         let stamp = self.time()?;
-        self.skip_string()?;
-        Ok(stamp)
+        Ok(Header { number, stamp })
     }
 }
 

@@ -9,10 +9,8 @@ pub(crate) struct MessageLayout {
     pub(crate) type_name: &'static str,
     /// The type's md5 sum in ROS 1, used if the definition is missing; empty in ROS 2.
     pub(crate) md5: &'static str,
-    /// The encoding that it is for.
-    pub(crate) encoding: Encoding,
-    /// The fields of the message and of all messages inside it, as [`outline`] writes them; empty if the reader looks
-    /// at the definition itself.
+    /// The fields of the message and of all messages inside it but [`STANDARD`], as [`outline`] writes them, with `time`
+    /// and `duration` as in ROS 1; empty if the reader looks at the definition itself.
     pub(crate) fields: &'static [(&'static str, &'static str)],
 }
 
@@ -27,25 +25,23 @@ pub(crate) enum LayoutFit {
     Same,
 }
 
-/// `std_msgs/Header` of ROS 1.
-pub(crate) const HEADER: (&str, &str) = ("Header", "uint32 seq;time stamp;string frame_id");
-/// `std_msgs/msg/Header` of ROS 2.
-pub(crate) const HEADER2: (&str, &str) = ("Header", "Time stamp;string frame_id");
-/// `builtin_interfaces/msg/Time`.
-pub(crate) const TIME2: (&str, &str) = ("Time", "int32 sec;uint32 nanosec");
+/// Messages that cursors read in all their forms, so that a layout is the same in recordings converted from one version of
+/// ROS to the other.
+const STANDARD: [(&str, &str); 4] = [
+    ("Header", "uint32 seq;time stamp;string frame_id"),
+    ("Header", "time stamp;string frame_id"),
+    ("Time", "int32 sec;uint32 nanosec"),
+    ("Duration", "int32 sec;uint32 nanosec"),
+];
 
 /// `rosgraph_msgs/Log`.
 pub(crate) const LOG: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/Log",
     md5: "acffd30cd6b6de30f120938c17c593fb",
-    encoding: Encoding::Ros1,
-    fields: &[
-        (
-            "",
-            "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
-        ),
-        HEADER,
-    ],
+    fields: &[(
+        "",
+        "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
+    )],
 };
 
 /// `rosgraph_msgs/Log` before 2011.
@@ -57,13 +53,10 @@ pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
 /// `rcl_interfaces/msg/Log`.
 pub(crate) const LOG2: MessageLayout = MessageLayout::ros2(
     "rcl_interfaces/Log",
-    &[
-        (
-            "",
-            "Time stamp;byte level;string name;string msg;string file;string function;uint32 line",
-        ),
-        TIME2,
-    ],
+    &[(
+        "",
+        "time stamp;byte level;string name;string msg;string file;string function;uint32 line",
+    )],
 );
 
 /// Log records of ROS 1.
@@ -81,13 +74,12 @@ impl MessageLayout {
         Self {
             type_name,
             md5: "",
-            encoding: Encoding::Cdr,
             fields,
         }
     }
 
-    /// Whether the messages of a connection, whose type is this one without `/msg`, can be read; `outline` is that of its
-    /// definition.
+    /// Whether the messages of a connection, whose type is this one without `/msg`, can be read, in either encoding;
+    /// `outline` is that of its definition.
     pub(crate) fn fit(
         &self,
         connection: &Connection,
@@ -98,7 +90,7 @@ impl MessageLayout {
             Some(end) => type_name.ends_with(end),
             None => type_name == self.type_name,
         };
-        if !named || connection.encoding != self.encoding {
+        if !named || matches!(connection.encoding, Encoding::Other(_)) {
             return LayoutFit::OtherType;
         }
         if self.fields.is_empty() {
@@ -108,7 +100,8 @@ impl MessageLayout {
         let hash = connection.type_hash.as_deref().unwrap_or_default();
         let same = if definition.trim().is_empty() {
             // There is nothing to compare; a payload that is not consumed exactly is still refused.
-            self.md5.is_empty() || ["", "*", self.md5].contains(&hash)
+            let has_md5 = connection.encoding == Encoding::Ros1 && !self.md5.is_empty();
+            !has_md5 || ["", "*", self.md5].contains(&hash)
         } else {
             self.matches(outline)
         };
@@ -123,10 +116,12 @@ impl MessageLayout {
     fn matches(&self, outline: &[(String, String)]) -> bool {
         outline.iter().enumerate().all(|(at, (name, fields))| {
             let name = if at == 0 { "" } else { name.as_str() };
-            match self.fields.iter().find(|(known, _)| *known == name) {
-                Some((_, known)) => fields == known,
-                None => at != 0,
-            }
+            let fields = fields.replace("Time ", "time ");
+            let fields = fields.replace("Duration ", "duration ");
+            let all = self.fields.iter().chain(&STANDARD);
+            let mut known = all.filter(|(known, _)| *known == name).peekable();
+            let is_nested = at != 0;
+            is_nested && known.peek().is_none() || known.any(|(_, known)| *known == fields)
         })
     }
 }

@@ -1,6 +1,6 @@
 //! A message as data, decoded by its own definition: for messages whose layout has changed over the years.
 
-use crate::bag::Connection;
+use crate::bag::{Connection, Encoding};
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::outline;
 use crate::evidence::message::fields::Form;
@@ -96,6 +96,15 @@ impl MessageSchema {
     /// Whether the message begins with a header.
     pub(crate) fn has_header(&self) -> bool {
         self.own().starts_with("Header ")
+    }
+
+    /// Whether headers in messages of this encoding begin with a number: by their definition, otherwise as usual.
+    pub(crate) fn numbers_headers(&self, encoding: &Encoding) -> bool {
+        let mut nested = self.0.iter().skip(1);
+        let header = nested.find(|(name, _)| name == "Header");
+        header.map_or(*encoding == Encoding::Ros1, |(_, fields)| {
+            fields.starts_with("uint32 seq;")
+        })
     }
 
     /// Whether the message itself contains strings or integers.

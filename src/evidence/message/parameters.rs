@@ -1,7 +1,7 @@
 //! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): parameters of a node that were declared or set.
 
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
-use crate::evidence::message::definition::{MessageLayout, TIME2};
+use crate::evidence::message::definition::MessageLayout;
 
 /// `rcl_interfaces/msg/ParameterEvent`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
@@ -9,7 +9,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
     &[
         (
             "",
-            "Time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
+            "time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
         ),
         ("Parameter", "string name;ParameterValue value"),
         (
@@ -17,7 +17,6 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
             "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;byte[] byte_array_value;\
              byte[] bool_array_value;int64[] integer_array_value;float64[] double_array_value;string[] string_array_value",
         ),
-        TIME2,
     ],
 );
 

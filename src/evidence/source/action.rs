@@ -2,10 +2,9 @@
 //! goals is a client and subscribes to the rest. Goal ids name clients of ROS 1 (`/client-N-time`).
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::evidence::inference::{Conclusions, ElementKey};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::{HEADER, MessageLayout};
+use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::{Confidence, Name, Observation, SourceId};
 use std::collections::BTreeMap;
 
@@ -13,10 +12,8 @@ use std::collections::BTreeMap;
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "actionlib_msgs/GoalStatusArray",
     md5: "8b2b82f13216d0a8ea88bd3af735e619",
-    encoding: Encoding::Ros1,
     fields: &[
         ("", "Header header;GoalStatus[] status_list"),
-        HEADER,
         ("GoalStatus", "GoalID goal_id;byte status;string text"),
         ("GoalID", "time stamp;string id"),
     ],
@@ -32,7 +29,7 @@ pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let now = payload.stamp()?;
+    let now = payload.header()?.stamp;
     let mut ids = Vec::new();
     for _ in 0..payload.length(17)? {
         let sent = payload.time()?;
@@ -151,8 +148,8 @@ fn ros1_actions(known: &mut Conclusions<'_>) -> Actions {
 /// Actions of ROS 2: a status or feedback topic below `_action`.
 fn ros2_actions(known: &mut Conclusions<'_>) -> Actions {
     let mut actions = Actions::new();
-    for topic in known
-        .topics_of(|kind| kind.contains("/action/") || kind == "action_msgs/msg/GoalStatusArray")
+    for topic in
+        known.topics_of(|kind| kind.contains("/action/") || kind == "action_msgs/GoalStatusArray")
     {
         if let Some((action, part)) = known.text(topic).rsplit_once("/_action/")
             && let Some(part) = SENDS.iter().find(|p| **p == part)

@@ -11,7 +11,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::csv;
 use crate::base::name::{last_part, namespace};
 use crate::evidence::inference::{Conclusions, ElementKey};
@@ -172,9 +171,7 @@ pub(crate) struct Owners(Vec<Contract>);
 impl Owners {
     /// Reads the table.
     pub(crate) fn new(known: &Conclusions<'_>) -> Self {
-        let mut streams = known.streams.iter();
-        let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
-        Self::of(if is_ros1 { "2" } else { "1" })
+        Self::of(if known.is_ros1() { "2" } else { "1" })
     }
 
     /// The rows that are not for this version of ROS alone.

@@ -2,10 +2,9 @@
 //! subscribes to `/diagnostics`.
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::{HEADER, HEADER2, MessageLayout};
+use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 use std::collections::BTreeSet;
 
@@ -13,33 +12,15 @@ use std::collections::BTreeSet;
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "diagnostic_msgs/DiagnosticArray",
     md5: "60810da900de1dd6ddd437c3503511da",
-    encoding: Encoding::Ros1,
     fields: &[
         ("", "Header header;DiagnosticStatus[] status"),
-        HEADER,
-        STATUS,
-        VALUE,
+        (
+            "DiagnosticStatus",
+            "byte level;string name;string message;string hardware_id;KeyValue[] values",
+        ),
+        ("KeyValue", "string key;string value"),
     ],
 };
-
-/// `diagnostic_msgs/msg/DiagnosticArray` of ROS 2.
-pub(crate) const SHAPE2: MessageLayout = MessageLayout {
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
-        ("", "Header header;DiagnosticStatus[] status"),
-        HEADER2,
-        STATUS,
-        VALUE,
-    ],
-    ..SHAPE
-};
-
-const STATUS: (&str, &str) = (
-    "DiagnosticStatus",
-    "byte level;string name;string message;string hardware_id;KeyValue[] values",
-);
-const VALUE: (&str, &str) = ("KeyValue", "string key;string value");
 
 pub(crate) fn read(
     context: &mut SourceContext<'_>,

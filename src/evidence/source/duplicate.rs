@@ -65,7 +65,7 @@ mod tests {
             doubled(&LogRecord {
                 logger: logger.to_owned(),
                 text,
-                file: "",
+                ..LogRecord::default()
             })
         };
         let old = "Publisher already registered for provided node name. If this is due to";

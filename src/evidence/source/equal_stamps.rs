@@ -21,7 +21,7 @@ use crate::evidence::times::Timed;
 
 /// The number of bytes from a payload's start to the end of its first header's stamp, in either encoding, possibly
 /// behind the length of a list.
-pub(crate) const HEAD: usize = 16;
+pub(crate) const HEAD: usize = 20;
 
 /// The fewest equal stamps that are significant.
 const FEWEST: u64 = 10;
@@ -44,13 +44,13 @@ const LISTS: [&str; 3] = [
     "visualization_msgs/MarkerArray",
 ];
 
-/// The place of the first header in a message.
+/// The first header in a message, which begins with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FirstHeader {
-    /// The message begins with it.
-    Own,
-    /// The first element of the list at the beginning of the message begins with it.
-    OfList,
+pub(crate) struct FirstHeader {
+    /// Whether the message begins with a list, whose first element begins with the header.
+    is_listed: bool,
+    /// Whether it begins with a number.
+    is_numbered: bool,
 }
 
 /// Where the messages of a connection have their first header, as far as known; `None` if they do not begin with one.
@@ -59,9 +59,13 @@ pub(crate) fn first_header(connection: &Connection, schema: &MessageSchema) -> O
     if LOGS.contains(&connection.topic.as_str()) {
         return None;
     }
+    let header = |is_listed| FirstHeader {
+        is_listed,
+        is_numbered: schema.numbers_headers(&connection.encoding),
+    };
     let type_name = &*connection.type_name;
     if LISTS.contains(&&*plain_type(type_name)) {
-        return Some(FirstHeader::OfList);
+        return Some(header(true));
     }
     let definition = connection.definition.as_deref().unwrap_or_default();
     let has_header = if definition.trim().is_empty() {
@@ -69,19 +73,17 @@ pub(crate) fn first_header(connection: &Connection, schema: &MessageSchema) -> O
     } else {
         schema.has_header()
     };
-    has_header.then_some(FirstHeader::Own)
+    has_header.then(|| header(false))
 }
 
 /// The stamp at the beginning of a message; `None` for an empty list and for 0.
 fn stamp(encoding: &Encoding, header: FirstHeader, first_bytes: &[u8]) -> Option<Stamp> {
-    let stamp = PayloadCursor::new(encoding, first_bytes).and_then(|mut payload| {
-        if header == FirstHeader::OfList && payload.u32()? == 0 {
+    let stamp = PayloadCursor::new(encoding, first_bytes).and_then(|payload| {
+        let mut payload = payload.numbered(header.is_numbered);
+        if header.is_listed && payload.u32()? == 0 {
             return Ok(Stamp(0));
         }
-        if *encoding == Encoding::Ros1 {
-            payload.u32()?;
-        }
-        payload.time()
+        Ok(payload.header_start()?.stamp)
     });
     stamp.ok().filter(|stamp| *stamp != Stamp(0))
 }

@@ -3,18 +3,11 @@
 //! appeared.
 
 use super::SourceContext;
-use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::Observation;
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    payload.header()?;
-    payload.u8()?;
-    let name = payload.string()?;
-    let text = payload.string()?;
-    let file = payload.string()?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    let (name, text, file) = (record.name, record.text, record.file);
     if file.ends_with("recorder.cpp")
         && let Some(topic) = text.strip_prefix("Subscribing to ")
     {
@@ -38,7 +31,6 @@ pub(crate) fn read(
         };
         context.states(observation, words);
     }
-    Ok(())
 }
 
 /// A subscription in a log text.

@@ -6,7 +6,7 @@ use crate::base::cast;
 use crate::base::time::Span;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::{MessageLayout, TIME2};
+use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::{Measurement, Observation, SourceId};
 
 /// `statistics_msgs/msg/MetricsMessage`.
@@ -15,11 +15,10 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
     &[
         (
             "",
-            "string measurement_source_name;string metrics_source;string unit;Time window_start;Time window_stop;\
+            "string measurement_source_name;string metrics_source;string unit;time window_start;time window_stop;\
              StatisticDataPoint[] statistics",
         ),
         ("StatisticDataPoint", "byte data_type;float64 data"),
-        TIME2,
     ],
 );
 

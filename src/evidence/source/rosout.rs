@@ -11,37 +11,21 @@ use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
-use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    let number = payload.u32()?;
-    payload.time()?;
-    payload.skip_string()?;
-    payload.u8()?;
-    let name = payload.string()?;
-    let message = payload.string()?;
-    let file = payload.string()?;
-    payload.skip_string()?;
-    payload.u32()?;
-    let count = payload.length(4)?;
-    let topics = (0..count)
-        .map(|_| payload.string())
-        .collect::<cursor::PayloadResult<Vec<_>>>()?;
-    payload.finish()?;
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    let (name, text) = (record.name, record.text);
     if name.is_empty() {
-        return Ok(());
+        return;
     }
     let node = context.name(name);
-    let logs = || format!("{name} logs: {message}");
+    let logs = || format!("{name} logs: {text}");
     context.states(Observation::Node(node), logs);
     let log = context.stream.topic;
     if is_log(context.stream.connection.topic.as_str()) {
-        if number <= FIRST_RECORD {
-            let begins = || format!("{name} logs its first record: {message}");
+        if record.number.is_some_and(|number| number <= FIRST_RECORD) {
+            let begins = || format!("{name} logs its first record: {text}");
             context.states(Observation::Begins(node), begins);
         }
         context.states(Observation::Publish(node, log), logs);
@@ -49,11 +33,10 @@ pub(crate) fn read(
             context.states(Observation::Carries(publisher, node), String::new);
         }
     }
-    if is_rospy(file) {
+    if is_rospy(record.file) {
         context.facts.rospy.insert(node);
     }
-    list(context, (name, message), &topics);
-    Ok(())
+    list(context, record);
 }
 
 /// Interprets the lists of roscpp nodes as lists of publications.
@@ -78,14 +61,15 @@ fn is_rospy(file: &str) -> bool {
     }
 }
 
-/// Takes the list of topics in a log record of a node, with its text. The list is complete: topics in an
+/// Takes the list of topics in a log record of a node. The list is complete: topics in an
 /// earlier list and not in this one no longer belong to the node.
-fn list(context: &mut SourceContext<'_>, (name, message): (&str, &str), topics: &[&str]) {
+fn list(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    let (name, text) = (record.name, record.text);
     let node = context.name(name);
     let list = format!("topics of {}", context.facts.text(node));
     let list = context.name(&list);
-    for topic in topics {
-        let words = || format!("{name} logs with {topic} in its list of topics: {message}");
+    for topic in &record.topics {
+        let words = || format!("{name} logs with {topic} in its list of topics: {text}");
         let topic = context.name(topic);
         context.states_in(list, Observation::Lists(node, topic), words);
     }

@@ -6,31 +6,18 @@ use std::sync::Arc;
 
 use super::SourceContext;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
-use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Observation, SourceId};
 
-pub(crate) fn read(
-    context: &mut SourceContext<'_>,
-    payload: &mut PayloadCursor<'_>,
-) -> cursor::PayloadResult<()> {
-    payload.time()?;
-    payload.u8()?;
-    let name = payload.string()?;
-    let message = payload.string()?;
-    payload.skip_string()?;
-    payload.skip_string()?;
-    payload.u32()?;
-    payload.finish()?;
-    if name.is_empty() {
-        return Ok(());
+pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
+    if record.name.is_empty() {
+        return;
     }
-    let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
-    let node = context.name(&text);
+    let logger = context.name(&record.logger);
     let topic = context.stream.topic;
-    context.states(Observation::Logger(node, topic), || {
-        format!("logger {name}: {message}")
+    context.states(Observation::Logger(logger, topic), || {
+        format!("logger {}: {}", record.name, record.text)
     });
-    Ok(())
 }
 
 /// Parts of ROS 2 itself that log below the name of their node.

@@ -1,17 +1,12 @@
 //! Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes to it and
 //! publishes `/rosout_agg`.
 
-use crate::bag::Encoding;
 use crate::base::name::{LOGS, in_space};
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Validity};
 use crate::evidence::observation::{Confidence, Name, SourceId};
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let ros1 = known
-        .streams
-        .iter()
-        .any(|s| s.connection.encoding == Encoding::Ros1);
-    if !ros1 || known.nodes().is_empty() {
+    if !known.is_ros1() || known.nodes().is_empty() {
         return;
     }
     // Each recording in a namespace has its own master.

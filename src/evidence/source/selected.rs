@@ -1,6 +1,5 @@
 //! The choice that a mux reports on `<mux>/selected`: it subscribes to that topic and forwards it from then on.
 
-use crate::base::name::plain_type;
 use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, IncidentKind};
 use crate::evidence::observation::{Name, SourceId};
@@ -10,7 +9,7 @@ const SELECTED: &str = "/selected";
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let is_report = |topic: &Name| known.text(*topic).ends_with(SELECTED);
-    let reports = known.topics_of(|kind| plain_type(kind) == "std_msgs/String");
+    let reports = known.topics_of(|kind| kind == "std_msgs/String");
     let reports: Vec<Name> = reports.into_iter().filter(is_report).collect();
     if reports.is_empty() {
         return;

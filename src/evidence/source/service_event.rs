@@ -15,14 +15,14 @@ pub(crate) fn read(
     context: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
 ) -> cursor::PayloadResult<()> {
-    let kind = payload.u8()?;
-    payload.time()?;
-    let client = payload.bytes(16)?;
-    payload.i64()?;
     let topic = context.stream.connection.topic.shared();
     let Some(service) = topic.strip_suffix("/_service_event") else {
         return Ok(());
     };
+    let kind = payload.u8()?;
+    payload.time()?;
+    let client = payload.bytes(16)?;
+    payload.i64()?;
     let word = match kind {
         0 => "request sent",
         1 => "request received",

@@ -1,7 +1,6 @@
 //! `/statistics` of ROS 1: the publisher and the subscriber of a topic, counted by the middleware itself.
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::base::time::Span;
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
@@ -11,7 +10,6 @@ use crate::evidence::observation::{Confidence, Measurement, Observation};
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/TopicStatistics",
     md5: "10152ed868c5097a5e2e4a89d7daa710",
-    encoding: Encoding::Ros1,
     fields: &[(
         "",
         "string topic;string node_pub;string node_sub;time window_start;time window_stop;int32 delivered_msgs;\

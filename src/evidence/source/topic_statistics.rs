@@ -6,21 +6,19 @@ use std::collections::BTreeMap;
 use super::SourceContext;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::message::cursor::{self, PayloadCursor};
-use crate::evidence::message::definition::{MessageLayout, TIME2};
+use crate::evidence::message::definition::MessageLayout;
 use crate::evidence::observation::{Confidence, Measurement, Name, Observation};
 
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
 pub(crate) const SHAPE: MessageLayout = MessageLayout::ros2(
     "rosgraph_monitor_msgs/TopicStatistics",
     &[
-        ("", "Time timestamp;TopicStatistic[] statistics"),
+        ("", "time timestamp;TopicStatistic[] statistics"),
         (
             "TopicStatistic",
-            "byte statistic_type;string node_name;string topic_name;int32 window_count;Duration mean;Duration min;\
-             Duration max",
+            "byte statistic_type;string node_name;string topic_name;int32 window_count;duration mean;duration min;\
+             duration max",
         ),
-        ("Duration", "int32 sec;uint32 nanosec"),
-        TIME2,
     ],
 );
 
