@@ -9,7 +9,7 @@ use bagreel::bag::{
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
 use bagreel::internals::evidence::collector::{CollectOptions, Collector};
-use bagreel::internals::evidence::conclude;
+use bagreel::internals::evidence::{Confidence, conclude};
 use bagreel::internals::graph::{self, Built};
 
 use crate::support::cdr::Cdr;
@@ -495,6 +495,123 @@ impl Tape {
             .filter(|connection| !used.contains(&connection.id))
             .for_each(|connection| connection.topic = "".into());
     }
+
+    /// Leaves out topics as `rosbag record -a -x` does: its log does not name them either.
+    fn exclude(&mut self, is_out: impl Fn(&str) -> bool) {
+        self.retain(|connection, _, data| {
+            let logged = data.windows(TAKES.len()).position(|part| part == TAKES);
+            let named = logged.map(|at| {
+                let rest = &data[at + TAKES.len()..];
+                let length = data[at - 4..at].try_into().map(u32::from_le_bytes).unwrap() as usize;
+                String::from_utf8_lossy(&rest[..length - TAKES.len()]).into_owned()
+            });
+            !is_out(connection.topic.as_str()) && !named.is_some_and(|topic| is_out(topic.trim()))
+        });
+    }
+}
+
+/// What the recorder logs of each topic.
+const TAKES: &[u8] = b"Subscribing to ";
+
+/// Every subscription in a window, with whether it is stated; except those of recorders and players.
+fn subscriptions(built: &Built) -> BTreeMap<Vec<String>, bool> {
+    let all = &built.elements;
+    let mut found: BTreeMap<Vec<String>, bool> = BTreeMap::new();
+    for (id, state) in built.graphs.iter().flat_map(|graph| graph.subscribes()) {
+        let edge = &all.subscribes[id];
+        let [node, topic] = [
+            all.nodes[edge.node].name.as_str(),
+            all.topics[edge.topic].name.as_str(),
+        ];
+        if !node.starts_with("/record_") && !node.starts_with("/play_") {
+            let is_stated = state.confidence == Confidence::Stated;
+            *found
+                .entry(vec![topic.to_owned(), node.to_owned()])
+                .or_default() |= is_stated;
+        }
+    }
+    found
+}
+
+#[test]
+fn lists_of_topics_are_read_with_care_unless_everything_was_recorded() {
+    let (Some(bag), Some(truth)) = (
+        shared("warehouse/warehouse.bag"),
+        shared("warehouse/truth_windows.json"),
+    ) else {
+        return;
+    };
+    let truth: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
+    let windows = truth["periods"]["10"].as_array().unwrap().iter();
+    let real = windows.flat_map(|window| window["subscribes"].as_array().unwrap());
+    let real: BTreeSet<Vec<String>> = real
+        .map(|edge| serde_json::from_value(edge.clone()).unwrap())
+        .collect();
+    let start = taped(&bag)
+        .stamps
+        .iter()
+        .map(|(_, time, _)| *time)
+        .min()
+        .unwrap();
+    let after = |tape: &mut Tape, seconds: i64| {
+        tape.retain(|_, time, _| time.since(start) >= seconds * SECOND);
+    };
+    let played = |tape: &mut Tape| {
+        for connection in &mut tape.connections {
+            connection.publisher = Some("/play_1795170682045".into());
+        }
+    };
+    // How the recording was changed, and the fewest subscriptions that are still found.
+    let cases: [(&str, &dyn Fn(&mut Tape), usize); 9] = [
+        ("whole", &|_| (), 69),
+        ("begun after 100 s", &|tape| after(tape, 100), 60),
+        ("begun after 200 s", &|tape| after(tape, 200), 35),
+        (
+            "without transforms",
+            &|tape| tape.exclude(|topic| topic.starts_with("/tf")),
+            55,
+        ),
+        (
+            "without parameters",
+            &|tape| tape.exclude(|topic| topic.contains("/parameter_")),
+            65,
+        ),
+        (
+            "without diagnostics",
+            &|tape| tape.exclude(|topic| topic.starts_with("/diagnostics")),
+            60,
+        ),
+        (
+            "without commands",
+            &|tape| tape.exclude(|topic| topic.ends_with("/cmd_vel")),
+            60,
+        ),
+        (
+            "few topics",
+            &|tape| tape.exclude(|topic| !["/rosout", "/robot1/odom", "/map"].contains(&topic)),
+            3,
+        ),
+        ("played", &played, 10),
+    ];
+    for (how, change, fewest) in cases {
+        let mut tape = taped(&bag);
+        change(&mut tape);
+        let (built, _) = replayed(&tape, |c| !c.topic.as_str().is_empty());
+        let found = subscriptions(&built);
+        let wrong: Vec<_> = found
+            .iter()
+            .filter(|(edge, _)| !real.contains(*edge))
+            .collect();
+        let right = found.len() - wrong.len();
+        assert!(right >= fewest, "{how}: {right}");
+        assert!(wrong.len() * 20 <= found.len(), "{how}: {wrong:?}");
+        // What only follows from the absence of a publisher is not stated.
+        assert!(
+            wrong.iter().all(|(_, is_stated)| !**is_stated),
+            "{how}: {wrong:?}"
+        );
+    }
 }
 
 /// The record in a payload of `rosgraph_msgs/Log`, in the encoding of ROS 2: without the number in the header.
@@ -555,7 +672,10 @@ fn a_recording_converted_to_ros2_keeps_the_evidence_of_its_log() {
         all
     };
     let [nodes, publishes, subscribes] = ever(&tape);
-    assert!(nodes.len() > 25 && publishes.len() > 50 && !subscribes.is_empty());
+    assert!(
+        nodes.len() > 20 && publishes.len() > 25,
+        "{nodes:?} {publishes:?}"
+    );
     for (_, _, data) in &mut tape.messages {
         *data = converted(data);
     }

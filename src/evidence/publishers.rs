@@ -51,8 +51,9 @@ pub(crate) fn judge(
             let by_player = stream
                 .publisher
                 .is_some_and(|node| is_player(&facts.text(node)));
-            if by_player && !is_log(stream.connection.topic.as_str()) {
-                played = true;
+            if by_player {
+                // A player also has a log of its own.
+                played |= !is_log(stream.connection.topic.as_str());
                 stream.trust = Reliability::Player;
             }
         }

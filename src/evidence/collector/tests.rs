@@ -218,6 +218,23 @@ fn headers_in_converted_recordings_may_have_a_number() {
 }
 
 #[test]
+fn a_player_shows_nothing_about_the_nodes_in_its_log() {
+    let record = Payload::ros1().header(1).logged("/b", "up", "a.py", &[]);
+    let by = |node| observations("/rosout", "rosgraph_msgs/Log", Some(node), &record);
+    assert!(by("/a").contains(&"Carries /a /b".to_owned()));
+    assert_eq!(
+        by("/play_1795170682045"),
+        [
+            "Begins /b",
+            "LogsFrom /b a.py",
+            "Node /b",
+            "Publish /b /rosout",
+            "Snapshot topics of /b"
+        ]
+    );
+}
+
+#[test]
 fn rospy_names_what_it_publishes_and_subscribes() {
     let record = Payload::log("/a", "hello", "a.py", &["/scan"]);
     assert_eq!(

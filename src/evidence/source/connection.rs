@@ -1,5 +1,6 @@
 //! ROS 1 connection headers and MCAP channel metadata: the publisher of each message (`callerid`).
 
+use crate::base::name::is_log;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::observation::{Confidence, SourceId};
 
@@ -17,7 +18,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         let edge = ElementKey::Publish(node, stream.topic);
         match stream.trust {
-            Reliability::Player if known.named_by_others(stream.topic, node) => {}
+            Reliability::Player
+                if known.named_by_others(stream.topic, node)
+                    && !is_log(stream.connection.topic.as_str()) => {}
             Reliability::Whole | Reliability::Player => {
                 known.add(inference(edge, Validity::Messages(at)));
             }

@@ -3,13 +3,12 @@
 //! roscpp lists the topics that the node publishes, rospy also those it subscribes to; a node uses rospy if
 //! any of its records comes from a Python file.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
-use crate::base::name::is_log;
+use crate::base::name::{LOGS, in_space, is_log, is_player};
 use crate::base::rhythm::FIRST_RECORD;
 use crate::base::role::role;
-use crate::base::time::Stamp;
 use crate::evidence::inference::{Conclusions, ElementKey, Inference, Reliability, Validity};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::observation::{Confidence, Name, Observation, Observations, SourceId};
@@ -29,8 +28,9 @@ pub(crate) fn read(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
             context.states(Observation::Begins(node), begins);
         }
         context.states(Observation::Publish(node, log), logs);
-        if let Some(publisher) = context.stream.publisher.filter(|p| *p != node) {
-            context.states(Observation::Carries(publisher, node), String::new);
+        let is_host = |host: &Name| *host != node && !is_player(&context.facts.text(*host));
+        if let Some(host) = context.stream.publisher.filter(is_host) {
+            context.states(Observation::Carries(host, node), String::new);
         }
     }
     if is_rospy(record.file) {
@@ -76,31 +76,26 @@ fn list(context: &mut SourceContext<'_>, record: &LogRecord<'_>) {
     context.states(Observation::Snapshot(list), String::new);
 }
 
-/// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
-/// subscription. If no publisher is known, a recorder of all topics shows whether there is one.
+/// A topic in a rospy node's list that it is known to publish is a publication; one that others publish, or that nobody
+/// advertises, is a subscription.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let advertised = advertised(known);
+    let unadvertised = unadvertised(known);
     for (fact, signs, ends) in known.observations(source) {
         let Observation::Lists(node, topic) = fact.observation else {
             continue;
         };
         let own = known.publishers(topic).any(|p| p == node) || has_twin(known, node, topic);
-        // A player's messages were published by other nodes.
-        let mut streams = known.streams.iter().filter(|s| s.topic == topic);
-        let is_played = streams.any(|s| s.trust == Reliability::Player);
-        let others = is_played || known.publishers(topic).any(|p| p != node);
-        if !own && is_broadcaster(known, node, topic) {
+        let others = known.publishers(topic).any(|p| p != node);
+        if !own && (is_of_all(known, topic) || is_broadcaster(known, node, topic)) {
             continue;
         }
-        let stated = is_reported(known, topic);
-        let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
-        let what = match (own, others || silent) {
+        let what = match (own, others || unadvertised.contains(&topic)) {
             (true, _) => ElementKey::Publish(node, topic),
             (false, true) => ElementKey::Subscribe(topic, node),
             (false, false) => continue,
         };
         // If headers do not name all publishers, a node that names a topic may be one of them.
-        let confidence = if stated {
+        let confidence = if is_reported(known, topic) {
             Confidence::Stated
         } else {
             Confidence::Inferred
@@ -110,10 +105,21 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
+/// Whether every node of ROS 1 may publish a topic, to which only tools subscribe.
+fn is_of_all(known: &Conclusions<'_>, topic: Name) -> bool {
+    let text = known.text(topic);
+    let is_in = |space: &String| OF_ALL.iter().any(|name| in_space(space, name) == *text);
+    known.facts.spaces.iter().any(is_in)
+}
+
+/// The topics that every node of ROS 1 may publish.
+const OF_ALL: [&str; 2] = ["/rosout", "/statistics"];
+
 /// Whether headers name all publishers of a topic.
 fn is_reported(known: &Conclusions<'_>, topic: Name) -> bool {
     let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
-    of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
+    known.is_recorded(topic)
+        && of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
 }
 
 /// Whether a node that differs only in an anonymous suffix publishes a topic whose headers do not name all publishers.
@@ -128,7 +134,7 @@ fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
 
 /// Whether a node that names `/tf` as its own publishes it rather than subscribes to it: a tf2 listener also
 /// names `/tf_static`. Used only if headers do not name all publishers.
-fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool {
+fn is_broadcaster(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let stated = is_reported(known, topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
@@ -146,26 +152,46 @@ fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool 
     !stated && !twin.is_some_and(names)
 }
 
-/// Every topic that a recorder of all topics has seen advertised; `None` without such a recorder. It
-/// continues to subscribe long after its start, unlike one that was given topic names.
-fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
-    let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
-    let mut seen: Option<(Stamp, Stamp)> = None;
-    for fact in known.facts.list.clone() {
-        if let Observation::Appears(topic) = fact.observation {
-            topics.insert(topic);
-            for time in known.times(&fact) {
-                let (first, last) = seen.unwrap_or((time, time));
-                seen = Some((first.min(time), last.max(time)));
+/// The topics in rospy's lists that nobody advertised; none if the recorder may have left out topics, began after the
+/// nodes, or recorded a playback, so that others could have advertised them.
+fn unadvertised(known: &Conclusions<'_>) -> BTreeSet<Name> {
+    let (mut named, mut published) = (BTreeSet::new(), BTreeSet::new());
+    let mut listed: BTreeMap<Name, BTreeSet<String>> = BTreeMap::new();
+    for fact in &known.facts.list {
+        match fact.observation {
+            Observation::Appears(topic) => named.insert(topic),
+            Observation::Publish(_, topic) if fact.snapshot.is_some() => published.insert(topic),
+            Observation::Lists(node, topic) => {
+                let runs = listed.entry(topic).or_default();
+                runs.insert(role(&known.text(node)).to_owned())
             }
-        }
+            _ => false,
+        };
     }
-    let all = seen.is_some_and(|(first, last)| last.since(first) > LATE_NS);
-    all.then_some(topics)
+    let is_advertised = |topic: &Name| known.is_recorded(*topic) || named.contains(topic);
+    let silent = listed.iter().filter(|(topic, _)| !is_advertised(topic));
+    let few = silent.clone().count() * 100 <= listed.len() * MOST_SILENT;
+    if !few || !names_all(known, &named) || !published.iter().all(is_advertised) {
+        return BTreeSet::new();
+    }
+    // If several nodes name a topic, one of them may publish it.
+    let silent = silent.filter(|(_, nodes)| nodes.len() == 1);
+    silent.map(|(topic, _)| *topic).collect()
 }
 
-/// The time within which a recorder subscribes to the topics given by name, in nanoseconds.
-const LATE_NS: i64 = 5_000_000_000;
+/// The largest share, in per cent, of the topics in rospy's lists that nobody advertises: 0 to 4 in whole recordings, over
+/// 10 in most of those without some topics.
+const MOST_SILENT: usize = 10;
+
+/// Whether the recorder's log is whole, because it names all recorded topics, and the messages are not played back. The
+/// recorder receives no records of its own from before it subscribes to the log, and may lose one more.
+fn names_all(known: &Conclusions<'_>, named: &BTreeSet<Name>) -> bool {
+    let is_log = |topic: Name| LOGS.iter().any(|log| known.text(topic).ends_with(log));
+    let unnamed = |topic: &Name| !named.contains(topic) && !is_log(*topic);
+    let recorded: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
+    let is_played = known.streams.iter().any(|s| s.trust == Reliability::Player);
+    !named.is_empty() && !is_played && recorded.into_iter().filter(unnamed).count() <= 1
+}
 
 #[cfg(test)]
 mod tests {
