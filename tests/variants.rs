@@ -110,6 +110,8 @@ struct Writer<'a> {
     later: &'a [u8],
     /// Whether checksums are stated.
     summed: bool,
+    /// The number of messages that follow the chunk.
+    outside: usize,
     /// Wrong first and last times, if any.
     stated: Option<[u64; 2]>,
     file: Vec<u8>,
@@ -179,10 +181,16 @@ impl Writer<'_> {
         }
     }
 
-    /// The messages, and the entries of their index.
-    fn messages(&self, from: usize) -> (Vec<u8>, Vec<u8>) {
+    /// The times of the messages in the chunk, and of those after it.
+    fn times(&self) -> (&'static [u64], &'static [u64]) {
+        let times = self.content.times;
+        times.split_at(times.len() - self.outside)
+    }
+
+    /// The messages with these times, and the entries of their index.
+    fn messages(&self, times: &[u64], from: usize) -> (Vec<u8>, Vec<u8>) {
         let (mut records, mut entries) = (Vec::new(), Vec::new());
-        for (sequence, time) in (0u32..).zip(self.content.times) {
+        for (sequence, time) in (0u32..).zip(times) {
             entries.extend(
                 [*time, (from + records.len()) as u64]
                     .map(u64::to_le_bytes)
@@ -200,9 +208,9 @@ impl Writer<'_> {
         (records, entries)
     }
 
-    fn ends(&self) -> [u8; 16] {
-        let first = self.content.times.iter().min().copied().unwrap_or(0);
-        let last = self.content.times.iter().max().copied().unwrap_or(0);
+    fn ends(&self, times: &[u64]) -> [u8; 16] {
+        let first = times.iter().min().copied().unwrap_or(0);
+        let last = times.iter().max().copied().unwrap_or(0);
         let ends = self.stated.unwrap_or([first, last]);
         let ends = ends.map(u64::to_le_bytes).concat();
         ends.try_into().unwrap()
@@ -227,18 +235,21 @@ impl Writer<'_> {
             self.put(op::METADATA, &[&text("name"), &bytes(&pairs)]);
         }
         let described = [self.schema(), self.channel()].concat();
-        let (messages, entries) = self.messages(described.len());
+        let (times, others) = self.times();
+        let (messages, entries) = self.messages(times, described.len());
         let records = [described, messages].concat();
         if !self.has(Part::Chunk) {
             return self.file.extend(records);
         }
         let len = (records.len() as u64).to_le_bytes();
         let crc = self.crc(&records);
-        let ends = self.ends();
+        let ends = self.ends(times);
         self.put(op::CHUNK, &[&ends, &len, &crc, &text(""), &len, &records]);
         if self.has(Part::MessageIndex) {
             self.put(op::MESSAGE_INDEX, &[&1u16.to_le_bytes(), &bytes(&entries)]);
         }
+        let (outside, _) = self.messages(others, 0);
+        self.file.extend(outside);
     }
 
     /// The groups of the summary's records.
@@ -262,7 +273,7 @@ impl Writer<'_> {
                 &u32::from(self.content.attachment).to_le_bytes(),
                 &u32::from(self.content.metadata).to_le_bytes(),
                 &u32::from(self.has(Part::Chunk)).to_le_bytes(),
-                &self.ends(),
+                &self.ends(self.content.times),
                 &bytes(&counts),
             ];
             groups.push((op::STATISTICS, self.record(op::STATISTICS, &fields)));
@@ -301,9 +312,10 @@ impl Writer<'_> {
         let offsets = index.map_or_else(Vec::new, |(at, _)| {
             [&1u16.to_le_bytes()[..], &at.to_le_bytes()].concat()
         });
-        let size = self.schema().len() + self.channel().len() + self.messages(0).0.len();
+        let size =
+            self.schema().len() + self.channel().len() + self.messages(self.times().0, 0).0.len();
         let fields = [
-            &self.ends()[..],
+            &self.ends(self.times().0)[..],
             &at.to_le_bytes(),
             &len.to_le_bytes(),
             &bytes(&offsets),
@@ -391,17 +403,21 @@ const WAYS: [(&[u8], bool); 3] = [
     (&[0; 1000], true),
 ];
 
-fn written(content: Content, parts: &[Part], (later, summed): (&[u8], bool)) -> Vec<u8> {
-    let writer = Writer {
+fn writer<'a>(
+    content: Content,
+    parts: &'a [Part],
+    (later, summed): (&'a [u8], bool),
+) -> Writer<'a> {
+    Writer {
         content,
         parts,
         later,
         summed,
+        outside: 0,
         stated: None,
         file: Vec::new(),
         placed: BTreeMap::new(),
-    };
-    writer.write()
+    }
 }
 
 /// Checks that nothing was missed, added, or called a loss.
@@ -450,7 +466,7 @@ fn every_combination_of_optional_parts_is_read_in_full() {
     {
         let path = dir.path().join(name);
         let at = format!("{name} {content:?} {parts:?} {way:?}");
-        fs::write(&path, written(*content, parts, way)).unwrap();
+        fs::write(&path, writer(*content, parts, way).write()).unwrap();
         let (report, kept) = read(&path, Want::Payload).unwrap();
         assert!(report.complete, "{at}: {:?}", kept.notices);
         assert_whole(&kept, *content, &at);
@@ -475,7 +491,11 @@ fn a_survey_of_all_combinations_skips_nothing() {
         .iter()
         .filter(|(_, content, _)| !content.times.is_empty())
     {
-        fs::write(dir.path().join(name), written(*content, parts, WAYS[0])).unwrap();
+        fs::write(
+            dir.path().join(name),
+            writer(*content, parts, WAYS[0]).write(),
+        )
+        .unwrap();
         expected += 1;
     }
     let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
@@ -494,6 +514,38 @@ fn a_survey_of_all_combinations_skips_nothing() {
     println!("{}", text.lines().take(5).collect::<Vec<_>>().join("\n"));
 }
 
+/// All parts that fit a content with messages, as the present version writes them.
+fn all_parts(content: Content) -> Vec<Part> {
+    let present = PARTS.into_iter().filter(|part| *part != Part::LaterFields);
+    present
+        .filter(|part| fits(content, &[Part::Chunk, Part::Statistics, *part]))
+        .collect()
+}
+
+#[test]
+fn messages_outside_chunks_are_read_too() {
+    let content = CONTENTS[5];
+    for outside in [1, 9] {
+        for without in PARTS {
+            let mut parts = all_parts(content);
+            parts.retain(|part| *part != without || without == Part::Chunk);
+            for way in WAYS {
+                let dir = tempfile::tempdir().unwrap();
+                let path = dir.path().join("mixed.mcap");
+                let writer = Writer {
+                    outside,
+                    ..writer(content, &parts, way)
+                };
+                fs::write(&path, writer.write()).unwrap();
+                let (report, kept) = read(&path, Want::Payload).unwrap();
+                let at = format!("{outside} without {without:?}");
+                assert!(report.complete, "{at}: {:?}", kept.notices);
+                assert_whole(&kept, content, &at);
+            }
+        }
+    }
+}
+
 #[test]
 fn a_range_finds_a_message_at_zero_that_the_stated_times_ignore() {
     const SECOND: u64 = 1_000_000_000;
@@ -503,14 +555,7 @@ fn a_range_finds_a_message_at_zero_that_the_stated_times_ignore() {
         attachment: false,
         metadata: false,
     };
-    let parts: Vec<Part> = PARTS
-        .into_iter()
-        .filter(|part| *part != Part::LaterFields)
-        .collect();
-    let parts: Vec<Part> = parts
-        .into_iter()
-        .filter(|part| fits(content, &[Part::Chunk, *part]))
-        .collect();
+    let parts = all_parts(content);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("zero.mcap");
     // As writers that take 0 for unknown state them, and as none should.
@@ -520,13 +565,8 @@ fn a_range_finds_a_message_at_zero_that_the_stated_times_ignore() {
         ([2 * SECOND, 0], false),
     ] {
         let writer = Writer {
-            content,
-            parts: &parts,
-            later: &[],
-            summed: true,
             stated: Some(stated),
-            file: Vec::new(),
-            placed: BTreeMap::new(),
+            ..writer(content, &parts, WAYS[0])
         };
         fs::write(&path, writer.write()).unwrap();
         let range = Span::new(Stamp(0), Stamp(500_000_000));

@@ -39,6 +39,8 @@ pub(crate) trait Grammar: Default + Send + 'static {
     const NAME: &'static str;
     /// Whether a bag ends in a special last record.
     const HAS_END: bool;
+    /// Whether messages may also be outside chunks.
+    const IS_LOOSE: bool;
     /// The bytes after that record.
     const CLOSING: &'static [u8];
     /// The head of a description record.

@@ -52,6 +52,7 @@ enum Described {
 impl Grammar for Mcap {
     const NAME: &'static str = FORMAT.name;
     const HAS_END: bool = true;
+    const IS_LOOSE: bool = true;
     const CLOSING: &'static [u8] = MAGIC;
     type Description = Described;
 

@@ -48,6 +48,7 @@ struct Described {
 impl Grammar for Rosbag1 {
     const NAME: &'static str = FORMAT.name;
     const HAS_END: bool = false;
+    const IS_LOOSE: bool = false;
     const CLOSING: &'static [u8] = b"";
     type Description = Described;
 

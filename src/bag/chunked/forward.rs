@@ -105,7 +105,7 @@ impl<G: Grammar> Forward<'_, G> {
         match record {
             RecordHead::Chunk(head) => self.chunk(stream, &head),
             RecordHead::Message { raw, time, size } => {
-                if self.is_chunked {
+                if self.is_chunked && !G::IS_LOOSE {
                     self.damage("messages are outside of chunks");
                 }
                 self.found.compression.insert(Compression::None);

@@ -182,6 +182,7 @@ impl Summary {
         }
         if all.messages != known {
             are_counted(source, chunks)?;
+            gaps(source, &self.plan)?;
             return Unindexed::wrong("its index and its statistics disagree");
         }
         let undescribed = self.used.are_in(&self.plan.connections);
@@ -224,18 +225,19 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
             return Unindexed::wrong("its index lists chunks at impossible positions");
         }
         let mut stream = ByteStream::of_file(source, free, start, NEAR);
-        let mut hidden = false;
+        let (mut hidden, mut loose) = (false, false);
         // Bytes that are not a record contain no readable message.
         walk(&mut stream, start, |stream| {
             let record = Mcap::next(stream)?;
-            hidden |= matches!(
-                record,
-                RecordHead::Chunk(_) | RecordHead::Message { .. } | RecordHead::Index { .. }
-            );
+            hidden |= matches!(record, RecordHead::Chunk(_) | RecordHead::Index { .. });
+            loose |= matches!(record, RecordHead::Message { .. });
             pass(stream, record.len())
         });
         if hidden {
             return Unindexed::wrong("its summary does not list all of its messages");
+        }
+        if loose {
+            return Unindexed::missing("some of its messages are outside chunks");
         }
         free = end;
     }
