@@ -6,7 +6,7 @@ use std::process::Command;
 
 use bagreel::bag::Want;
 
-use crate::support::{Recording, mcap, read, rosbag1, shared, small, sqlite3, tiny};
+use crate::support::{Kept, Recording, mcap, read, rosbag1, shared, small, sqlite3, tiny};
 
 /// A command with `F` for its input, and every byte that it prints: exit code, standard error, standard output.
 fn printed(folder: &Path, line: &str, what: &str) -> String {
@@ -100,7 +100,7 @@ fn with_two_definitions() -> Recording {
         ("/b", "int32 right\nint32 left\n", 50),
     ] {
         let id = bag.publisher(node, "/wheels", "my_msgs/msg/Wheels");
-        bag.publishers[id].definition = definition.to_owned();
+        definition.clone_into(&mut bag.publishers[id].definition);
         bag.send(
             id,
             (start, 8000),
@@ -109,6 +109,13 @@ fn with_two_definitions() -> Recording {
         );
     }
     bag
+}
+
+fn ros2() -> mcap::Options {
+    mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    }
 }
 
 /// Bags of every format and oddity that are at hand everywhere.
@@ -124,17 +131,14 @@ fn own_bags(folder: &Path) -> Vec<PathBuf> {
         .collect();
     with_two_rows(&folder.join("rows_0.db3"));
     all.push(folder.join("rows_0.db3"));
-    let options = mcap::Options {
-        profile: "ros2",
-        ..mcap::Options::default()
-    };
+    let ros2 = ros2();
     all.push(put(
         "definitions_0.mcap",
-        &mcap::write(&with_two_definitions(), &options),
+        &mcap::write(&with_two_definitions(), &ros2),
     ));
     let packed = zstd::encode_all(&fs::read(folder.join("rows_0.db3")).unwrap()[..], 1).unwrap();
     all.push(put("packed_0.db3.zstd", &packed));
-    let cut = mcap::write(&small(), &options);
+    let cut = mcap::write(&small(), &ros2);
     all.push(put("cut_0.mcap", &cut[..cut.len() / 2]));
     let project = Path::new(env!("CARGO_MANIFEST_DIR"));
     for below in ["examples", "tests/data/hostile"] {
@@ -186,24 +190,29 @@ fn a_folder_with_one_recorded_part_gives_what_the_part_gives() {
 }
 
 #[test]
-fn parts_stay_apart_by_what_describes_them_and_are_joined_across_parts() {
-    let dir = tempfile::tempdir().unwrap();
-    for part in ["run_0.db3", "run_1.db3"] {
-        with_two_rows(&dir.path().join(part));
-    }
-    let alone = read(&dir.path().join("run_0.db3"), Want::Stamps).unwrap().1;
-    let joined = read(dir.path(), Want::Stamps).unwrap().1;
-    let described = |connections: &[bagreel::bag::Connection]| {
-        let all = connections
-            .iter()
-            .map(|c| (c.topic.to_string(), c.definition.clone(), c.qos.clone()));
+fn connections_stay_apart_in_a_part_and_are_joined_across_parts() {
+    let described = |kept: &Kept| {
+        let all = kept.connections.iter();
+        let all = all.map(|c| (c.topic.to_string(), c.definition.clone(), c.qos.clone()));
         all.collect::<Vec<_>>()
     };
-    assert_eq!(
-        described(&joined.connections),
-        described(&alone.connections)
-    );
-    assert_eq!(joined.stamps.len(), 2 * alone.stamps.len());
+    let [rows, definitions] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    for part in ["run_0", "run_1"] {
+        with_two_rows(&rows.path().join(part).with_extension("db3"));
+        let bytes = mcap::write(&with_two_definitions(), &ros2());
+        fs::write(definitions.path().join(part).with_extension("mcap"), bytes).unwrap();
+    }
+    for (dir, part) in [(rows, "run_0.db3"), (definitions, "run_0.mcap")] {
+        let alone = read(&dir.path().join(part), Want::Stamps).unwrap().1;
+        let joined = read(dir.path(), Want::Stamps).unwrap().1;
+        assert_eq!(described(&joined), described(&alone), "{part}");
+        assert_eq!(joined.stamps.len(), 2 * alone.stamps.len(), "{part}");
+        let twice = alone
+            .count(|c| c.id)
+            .into_iter()
+            .map(|(id, count)| (id, 2 * count));
+        assert_eq!(joined.count(|c| c.id), twice.collect(), "{part}");
+    }
 }
 
 /// Messages of one topic from one tenth of a second up to another.

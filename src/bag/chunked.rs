@@ -173,6 +173,13 @@ impl<G: Grammar> Reader for Indexed<G> {
         !pairs.any(|pair| pair[0].last.since(pair[1].first) > OUT_OF_ORDER_NS)
     }
 
+    fn stated(&self) -> Option<Span> {
+        let chunks = self.plan.iter().flat_map(|plan| &plan.chunks);
+        let full = chunks.filter(|chunk| chunk.holds_messages());
+        full.filter_map(Chunk::stated)
+            .reduce(|all, span| all.hull(span))
+    }
+
     fn span(&mut self) -> Result<Option<Span>> {
         let Ok(plan) = &self.plan else {
             return Ok(None);

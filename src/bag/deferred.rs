@@ -38,12 +38,24 @@ pub(crate) fn open_each(
     })
 }
 
+impl Deferred {
+    /// What a reader that is open now says.
+    fn ask<T>(&self, ask: impl Fn(&dyn Reader) -> T) -> Option<T> {
+        match &self.open {
+            Some(reader) => Some(ask(reader.as_ref())),
+            // Errors are reported when the bag is read.
+            None => Some(ask(super::open(&self.input, &self.options).ok()?.as_ref())),
+        }
+    }
+}
+
 impl Reader for Deferred {
     fn is_straight(&self) -> bool {
-        match &self.open {
-            Some(reader) => reader.is_straight(),
-            None => super::open(&self.input, &self.options).map_or(true, |r| r.is_straight()),
-        }
+        self.ask(|reader| reader.is_straight()).unwrap_or(true)
+    }
+
+    fn stated(&self) -> Option<Span> {
+        self.ask(|reader| reader.stated()).flatten()
     }
 
     fn span(&mut self) -> Result<Option<Span>> {

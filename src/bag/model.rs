@@ -201,6 +201,11 @@ pub trait Reader: Send {
         true
     }
 
+    /// The time covered, as stated: not all of the index is read for it, and it may be wrong.
+    fn stated(&self) -> Option<Span> {
+        None
+    }
+
     /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index contains it.
     /// `None` if only reading the bag can determine it. A large bag with a wrong tail may contain stamps
     /// outside.

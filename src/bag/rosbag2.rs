@@ -189,7 +189,7 @@ impl BagFolder {
     /// Puts the parts in order of time, whatever their numbers and the metadata state; if they overlap by more than
     /// messages that are merely out of order, the recorder's clock was set back, and they stay in their order.
     fn sort(&mut self) {
-        let spans = self.parts.iter_mut().map(|part| part.span().ok().flatten());
+        let spans = self.parts.iter().map(|part| part.stated());
         let Some(spans) = spans.collect::<Option<Vec<Span>>>() else {
             return;
         };

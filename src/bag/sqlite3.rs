@@ -333,9 +333,13 @@ fn check(db: &Db, sink: &mut dyn Sink) {
 }
 
 impl Reader for Sqlite3Bag {
-    fn span(&mut self) -> Result<Option<Span>> {
+    fn stated(&self) -> Option<Span> {
         // An error that is ignored here recurs when the rows are read.
-        Ok(self.ends().unwrap_or(None))
+        self.ends().unwrap_or(None)
+    }
+
+    fn span(&mut self) -> Result<Option<Span>> {
+        Ok(self.stated())
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {

@@ -100,6 +100,10 @@ impl Reader for Unpacked {
         self.inner.is_straight()
     }
 
+    fn stated(&self) -> Option<Span> {
+        self.inner.stated()
+    }
+
     fn span(&mut self) -> Result<Option<Span>> {
         self.inner.span()
     }

@@ -29,12 +29,12 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
-    pub(crate) fn holds_messages(&self) -> bool {
+    pub(super) fn holds_messages(&self) -> bool {
         self.promised.is_some_and(|sum| sum.messages > 0)
     }
 
     /// The time that it covers, as stated.
-    fn stated(&self) -> Option<Span> {
+    pub(super) fn stated(&self) -> Option<Span> {
         (self.first <= self.last).then(|| Span::new(self.first, self.last.plus(1)))
     }
 
