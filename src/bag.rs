@@ -40,7 +40,6 @@ pub use model::{
     ChunkCounts, Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink,
     Tier, Want,
 };
-pub(crate) use split::parts as split_parts;
 use unknown::explain;
 
 /// Every format that can be read.

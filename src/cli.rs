@@ -11,7 +11,6 @@ mod reading;
 mod render;
 mod show;
 mod stop;
-#[cfg(feature = "parquet")]
 mod tables;
 pub(crate) mod terminal;
 
@@ -67,10 +66,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Figure(args) => render::figure(&args, &given, &mut terminal),
         Command::Info(args) => show::info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
-        #[cfg(feature = "parquet")]
         Command::Tables(args) => tables::tables(&args, &mut terminal),
-        #[cfg(feature = "pdf")]
-        Command::Paper(args) => show::paper(&args, &mut terminal),
         Command::Events(args) => show::events(&args, &given, &mut terminal),
         Command::Diff(args) => {
             failed = USAGE;

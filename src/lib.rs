@@ -168,19 +168,20 @@ pub mod values {
     };
 }
 
-#[cfg(feature = "render")]
-pub use pipeline::fleet;
+#[cfg(feature = "arrow")]
+pub use pipeline::arrow;
 
 pub mod commands {
-    //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the check
-    //! against an expectations file and the writing of one, the comparison of two missions.
+    //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the counts of
+    //! many bags, the check against an expectations file and the writing of one, the comparison of two missions.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
     #[cfg(feature = "render")]
     pub use crate::pipeline::{
-        Baseline, BaselineWritten, Check, Checked, Compared, Diff, Extract, Extracted, Report,
-        Survey, baseline, check, diff, extract, is_survey, survey, survey_file,
+        Baseline, BaselineWritten, Check, Checked, Compared, Counting, Diff, Extract, Extracted,
+        Report, Survey, Tabled, Tables, baseline, check, diff, extract, is_survey, survey,
+        survey_file, tables,
     };
 }
 

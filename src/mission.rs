@@ -4,11 +4,8 @@ pub mod event_log;
 pub mod events;
 pub mod info;
 pub mod phases;
-pub(crate) mod reconfiguration;
 
 mod json;
-pub(crate) use json::raw;
-pub(crate) use json::read::mission_of;
 pub use json::read::read_json;
 pub(crate) use json::write::Json;
 pub use json::write::{JsonForm, write_json};

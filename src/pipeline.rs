@@ -2,7 +2,6 @@
 
 use crate::base::words::worded;
 mod collect;
-mod contents;
 #[cfg(feature = "render")]
 mod draw;
 #[cfg(feature = "render")]
@@ -13,16 +12,11 @@ mod extract;
 mod figure;
 #[cfg(feature = "render")]
 mod fit;
-#[cfg(feature = "render")]
-pub mod fleet;
 #[cfg(feature = "cli")]
 pub mod follow;
 #[cfg(feature = "render")]
 mod gate;
 mod inputs;
-#[cfg(feature = "cli")]
-#[cfg(all(feature = "cli", feature = "pdf"))]
-pub(crate) mod paper;
 mod phases;
 mod probe;
 #[cfg(feature = "render")]
@@ -30,6 +24,8 @@ mod purpose;
 mod read;
 #[cfg(feature = "render")]
 mod survey;
+#[cfg(feature = "render")]
+mod tables;
 #[cfg(feature = "render")]
 mod unfolded;
 mod verify;
@@ -52,8 +48,12 @@ pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]
 pub use survey::{Survey, is_survey, survey, survey_file};
+#[cfg(feature = "arrow")]
+pub use tables::arrow;
+#[cfg(feature = "render")]
+pub use tables::{Counting, Tabled, Tables, tables};
 #[cfg(feature = "cli")]
-pub(crate) use {export::check as check_outputs, read::mission_file};
+pub(crate) use {export::check as check_outputs, read::mission_file, survey::each};
 
 worded! {
     /// A stage of the work, for progress.
@@ -64,7 +64,7 @@ worded! {
         Read = "reading",
         /// Bags are read a second time and compared; progress counts bytes.
         Verify = "verifying",
-        /// Bags of a fleet are counted; progress counts bags.
+        /// Messages of many bags are counted; progress counts bags.
         Count = "counting",
         /// Graphs are built; progress counts windows.
         Graphs = "graphs",

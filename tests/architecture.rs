@@ -38,7 +38,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["conclude", "given"],
     ]),
     ("graph", &[&["elements", "graphs", "history", "per_element"], &["build", "diff", "window"]]),
-    ("mission", &[&["event_log"], &["json", "phases", "reconfiguration"], &["events"], &["info"]]),
+    ("mission", &[&["event_log"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["audience", "cluster", "collapse", "counts", "filter", "home", "lives", "looks", "names", "replicas", "roles", "runs", "shown"],
         &["cards", "stable"],
@@ -71,13 +71,12 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["baseline", "difference", "report"],
     ]),
     ("pipeline", &[
-        &["contents"],
         &["inputs"],
         &["collect", "draw", "phases", "purpose"],
         &["figure", "fit", "probe", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["fleet", "follow", "gate", "paper"],
+        &["follow", "gate", "tables"],
     ]),
     ("cli", &[
         &["args", "stop"],
@@ -124,8 +123,6 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ),
     // Widths of texts, and the outlines and names of fonts in a PDF.
     ("skrifa", &["draw/text", "draw/paint/pdf"]),
-    // Filters names as in `rqt_graph`; extracts mission names from paths.
-    ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Parses and formats times.
     ("chrono", &["base"]),
     // Mathematical functions, like the standard library's.

@@ -1,5 +1,6 @@
 //! Tests of how each command treats a folder: as one recording, several, a copy, or none.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -86,7 +87,6 @@ const FOLDERS: &[Row] = &[
 const COMMANDS: &[&str] = &[
     "render F -o out.json",
     "figure F --kind lives --rows topics --width 181mm -o out.svg",
-    "events F",
     "extract F -o out.csv",
     "baseline F",
     "check F --expect expected.yaml",
@@ -218,33 +218,127 @@ fn a_missing_part_is_a_loss() {
 }
 
 #[test]
-fn info_and_tables_take_several_recordings_as_a_fleet() {
+fn info_events_and_tables_take_folders_of_recordings() {
     let all = made();
     for (name, _, is, rows) in FOLDERS {
-        let (code, said, text) = bagreel(all.path(), "info F --format csv", name);
         if name == &"empty" {
-            assert_eq!(code, 1, "{said}");
-            let (code, said, _) = bagreel(all.path(), "tables F -o fleet", name);
-            assert!(
-                code == 1 && said.contains("a folder without bags"),
-                "{said}"
-            );
+            for line in ["info F", "events F", "tables F -o counts"] {
+                let (code, said, _) = bagreel(all.path(), line, name);
+                let is_refused = said.contains("a folder without bags");
+                assert!(code == 1 && is_refused, "{line}: {said}");
+            }
             continue;
         }
-        assert_eq!(text.lines().count() - 1, (*rows).max(1), "{name}: {text}");
-        let (code, said, _) = bagreel(all.path(), "tables F -o fleet", name);
-        let bags = match (is, rows) {
-            (Is::One, _) if *name == "split bags" => "2 bags".to_owned(),
-            (Is::One, _) => "1 bag".to_owned(),
-            (_, 2) if *name == "split bags twice" => "3 bags".to_owned(),
-            (_, rows) => format!("{rows} bags"),
+        let (_, said, text) = bagreel(all.path(), "info F --format csv", name);
+        assert_eq!(text.lines().count() - 1, (*rows).max(1), "{name}: {said}");
+        let (code, said, text) = bagreel(all.path(), "events F --format csv", name);
+        let is_one = matches!(is, Is::One) || *rows == 0;
+        let head = if is_one {
+            "time_ns,kind,"
+        } else {
+            "bag,time_ns,kind,"
         };
-        assert!(
-            code == 0 && said.contains(&format!("{bags},")),
-            "{name}: {said}"
-        );
-        fs::remove_dir_all(all.path().join("fleet")).unwrap();
+        assert!(code == 0 && text.starts_with(head), "{name}: {said}");
+        let bags: BTreeSet<&str> = text
+            .lines()
+            .skip(1)
+            .filter_map(|row| row.split(',').next())
+            .collect();
+        assert!(is_one || bags.len() == *rows, "{name}: {bags:?}");
+        let (code, said, _) = bagreel(all.path(), "tables F -o counts", name);
+        let tables = if *rows < 2 {
+            "1 table of".to_owned()
+        } else {
+            format!("{rows} tables of")
+        };
+        assert!(code == 0 && said.contains(&tables), "{name}: {said}");
+        fs::remove_dir_all(all.path().join("counts")).unwrap();
     }
+}
+
+/// Which bag has a restart: the rows of the logs of all bags, each with its bag.
+#[test]
+fn the_log_of_a_folder_names_the_bag_of_every_event() {
+    let all = tempfile::tempdir().unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = all.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    put(
+        "bags/a, b/w.bag",
+        &fs::read(example.join("warehouse.bag")).unwrap(),
+    );
+    put(
+        "bags/c.mcap",
+        &fs::read(example.join("courier.mcap")).unwrap(),
+    );
+    put(
+        "bags/empty.bag",
+        &rosbag1::write(&Recording::default(), rosbag1::Pack::None, 50_000),
+    );
+    put("bags/foreign.bag", b"no bag");
+    let shown = |line: &str| {
+        let (code, said, text) = bagreel(all.path(), line, "bags");
+        assert_eq!(code, 3, "{line}: {said}");
+        assert!(
+            said.contains("warning: `bags/foreign.bag` is not a bag"),
+            "{said}"
+        );
+        assert!(
+            said.contains("note: `empty.bag` contains no messages"),
+            "{said}"
+        );
+        text
+    };
+    // Each row is that of the bag's own log, with the name in front.
+    let own = |bag: &str, options: &str, lead: &str| {
+        let (_, _, text) = bagreel(
+            all.path(),
+            format!("events F {options}").trim_end(),
+            &format!("bags/{bag}"),
+        );
+        let rows = text.lines().map(|row| format!("{lead}{row}\n"));
+        rows.collect::<Vec<_>>()
+    };
+    let csv = shown("events F --format csv --parts --phases");
+    let [w, c] = [("a, b/w.bag", "\"a, b/w.bag\","), ("c.mcap", "c.mcap,")]
+        .map(|(bag, lead)| own(bag, "--format csv --parts --phases", lead));
+    assert_eq!(
+        csv,
+        format!(
+            "bag,{}{}{}",
+            &c[0]["c.mcap,".len()..],
+            w[1..].concat(),
+            c[1..].concat()
+        )
+    );
+    let mut rows = csv::Reader::from_reader(csv.as_bytes());
+    let restarts = rows
+        .records()
+        .map(|row| row.unwrap())
+        .filter(|row| &row[2] == "restarted");
+    let restarted: BTreeSet<String> = restarts.map(|row| row[0].to_owned()).collect();
+    assert_eq!(restarted, BTreeSet::from(["a, b/w.bag".to_owned()]));
+    let ndjson = shown("events F --format ndjson");
+    let [w, c] = ["a, b/w.bag", "c.mcap"].map(|bag| own(bag, "--format ndjson", "").concat());
+    let named =
+        |bag: &str, rows: &str| rows.replace("{\"id\"", &format!("{{\"bag\":\"{bag}\",\"id\""));
+    assert_eq!(ndjson, named("a, b/w.bag", &w) + &named("c.mcap", &c));
+    let json: serde_json::Value = serde_json::from_str(&shown("events F --format json")).unwrap();
+    assert_eq!(
+        json["events"].as_array().unwrap().len(),
+        ndjson.lines().count()
+    );
+    let text = shown("events F");
+    let [w, c] = ["a, b/w.bag", "c.mcap"].map(|bag| own(bag, "", "").concat());
+    assert_eq!(text, format!("a, b/w.bag\n{w}c.mcap\n{c}"));
+    let markdown = shown("events F --format markdown");
+    assert!(
+        markdown.contains("\n### c.mcap\n\n| when | what |\n"),
+        "{markdown}"
+    );
 }
 
 #[test]

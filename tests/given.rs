@@ -8,7 +8,6 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::support::browser::drive;
 use crate::support::cdr::Cdr;
 use crate::support::{ORIGIN, Recording, mcap};
 
@@ -352,54 +351,6 @@ service_clients:
     assert!(why.contains("ns.ui.nodl.yaml"), "{why}");
 }
 
-/// The files of a folder.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let all = fs::read_dir(folder).unwrap().map(|file| file.unwrap());
-    let read = |file: fs::DirEntry| {
-        (
-            file.file_name().into_string().unwrap(),
-            fs::read(file.path()).unwrap(),
-        )
-    };
-    all.map(read).collect()
-}
-
-#[test]
-fn a_bundle_is_the_same_twice_and_its_numbers_follow_from_the_windows() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
-    fs::create_dir(folder.join("runs")).unwrap();
-    fs::copy(example, folder.join("runs/w.bag")).unwrap();
-    fs::write(folder.join("runs/broken.bag"), b"#ROSBAG V2.0\nbroken").unwrap();
-    for out in ["a", "b"] {
-        let (code, _, said) = bagreel(folder, &format!("paper runs -p 10 -o {out}"));
-        assert_eq!(code, Some(3), "{said}");
-    }
-    let (a, b) = (files(&folder.join("a")), files(&folder.join("b")));
-    assert!(a == b, "{:?} {:?}", a.keys(), b.keys());
-    for name in [
-        "SHA256SUMS",
-        "commands.sh",
-        "survey.csv",
-        "CITATION.cff",
-        "README.md",
-        "w.lives.pdf",
-        "w.map.tex",
-    ] {
-        assert!(a.contains_key(name), "{name}: {:?}", a.keys());
-    }
-    // Every number, computed again from the mission's JSON and the event log by other code.
-    done(
-        folder,
-        "render runs/w.bag -p 10 -o mission.json --json windows",
-    );
-    let log = done(folder, "events runs/w.bag --format csv");
-    fs::write(folder.join("events.csv"), log).unwrap();
-    let files = ["mission.json", "events.csv", "a"].map(|name| folder.join(name));
-    drive("../exchange/reconfiguration.py", files);
-}
-
 #[test]
 fn one_query_counts_bags_without_nodes_and_with_nodes_missing() {
     let folder = tempfile::tempdir().unwrap();
@@ -446,7 +397,7 @@ fn one_query_counts_bags_without_nodes_and_with_nodes_missing() {
         )
         .unwrap();
     }
-    let docs = include_str!("../docs/src/bundle.md");
+    let docs = include_str!("../docs/src/fleets.md");
     let query = docs
         .split("```sql\n")
         .nth(1)

@@ -95,14 +95,9 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("extract", "r.bag -o out/x.csv", "--start 20"),
     ("extract", "r.bag -o out/x.csv", "--end 20"),
     ("tables", "r.bag", "--output out"),
-    ("tables", "r.bag -o out", "--manifest list.txt"),
+    ("tables", "r.bag -o out", "--format parquet"),
     ("tables", "r.bag -o out", "--period 7s"),
     ("tables", "r.bag -o out", "--align bag"),
-    ("tables", "r.bag -o out", "--mission bag"),
-    ("tables", "r.bag -o out", "--tier chunks"),
-    ("tables", "bags -o out", "--shard 1/2"),
-    ("paper", "r.bag", "--output out/b"),
-    ("paper", "r.bag -o out/b", "--period 7s"),
     ("events", "r.bag", "--format csv"),
     ("events", "r.bag", "--rate-change 5"),
     ("events", "r.bag", "--parts"),
@@ -202,7 +197,6 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--expand /ns", "hint: it applies to pictures"),
     ("render", "r.bag -o out/x.json", "--width 88mm", "hint: it is a width on paper"),
     ("render", "r.bag -o out/x.gif", "--width 88mm", "hint: it is a width on paper"),
-    ("tables", "r.bag -o out/t", "--mission (", "is not a regular expression: unclosed group"),
     ("events", "r.bag", "--start 0:70", "invalid value '0:70'"),
     ("info", "r.bag", "--why /chta", "hint: the nearest name is `/chat`"),
     ("info", "r.bag", "--why /chat /chta", "no node or topic `/chta`"),
@@ -224,7 +218,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("extract", "own.db3 -o out/x.csv", "--msg-path msgs", "--fields"),
     ("extract", "own.db3 --fields -o out", "--msg-path bags", "contains no file of messages"),
     ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
-    ("tables", "r.bag -o out/t", "--shard 0/3", "`1/8` to `8/8`"),
+    ("tables", "r.bag -o out/t", "--format gif", "`gif` is not a format of tables"),
     ("diff", "r.bag s.mcap", "--style dark", "hint: it applies to pictures"),
     ("diff", "r.bag s.mcap", "--size 300x200", "hint: it applies to pictures"),
     ("diff", "r.bag s.mcap", "--source ws", "hint: add a picture"),
@@ -358,7 +352,6 @@ fn folder() -> TempDir {
         expects("  /in: {to: [/talker_late]}\n").as_bytes(),
     );
     put("c.txt", b"0|here it begins\n");
-    put("list.txt", b"bags/a.bag\n");
     put("p.txt", b"0:00 first\n0:11 second\n0:16 third\n");
     put("msgs/my_msgs/msg/Thing.msg", b"string data # words\n");
     let mut own = Recording::default();
@@ -464,11 +457,6 @@ fn every_option_of_render_changes_something() {
 #[test]
 fn every_option_of_figure_changes_something() {
     changes("figure");
-}
-
-#[test]
-fn every_option_of_paper_changes_something() {
-    changes("paper");
 }
 
 #[test]

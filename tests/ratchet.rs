@@ -7,11 +7,11 @@ use crate::architecture;
 use crate::options;
 
 /// Lines of `src` that are neither blank nor comment nor test.
-const MOST_LINES: usize = 76_006;
+const MOST_LINES: usize = 74_592;
 /// Entries of the dependency sections in `Cargo.toml`, optional ones included, those of tests not.
 const MOST_DEPENDENCIES: usize = 50;
 /// Options in the help of all commands; one that three commands have counts three times.
-const MOST_OPTIONS: usize = 143;
+const MOST_OPTIONS: usize = 138;
 /// Options in the help of `render`.
 const MOST_OPTIONS_OF_RENDER: usize = 46;
 

@@ -605,7 +605,7 @@ fn links_to_bags_are_followed_and_links_to_folders_are_not() {
     assert_eq!(paths, ["a.mcap", "b.mcap", "c.mcap"]);
     let said = ends(dir.path(), &["tables", "fleet", "-o", "t"], 3);
     assert!(
-        said.contains("3 bags (1 unreadable), 6472 messages"),
+        said.contains("2 tables of 6472 messages (1 unreadable)"),
         "{said}"
     );
 }

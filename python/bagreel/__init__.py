@@ -1,9 +1,8 @@
 """See how a robot's software reconfigures during a mission, straight from its bag files.
 
 `show` plays a mission in a notebook, `read` reads bags into a `Mission`, `render` draws it. `baseline`, `check` and `diff` compare
-missions, `events` returns the event log, `extract` writes messages as tables. `tables` counts one bag by its index;
-`merge` and `finish` make a mission from the counts. Tables are Arrow: pyarrow, pandas, polars and DuckDB use them
-without copying.
+missions, `events` returns the event log, `extract` writes messages as tables, `tables` counts those of one bag by its index.
+Tables are Arrow: pyarrow, pandas, polars and DuckDB use them without copying.
 """
 
 from __future__ import annotations
@@ -35,9 +34,6 @@ __all__ = [
     "events",
     "extract",
     "figure",
-    "finish",
-    "merge",
-    "plan",
     "read",
     "render",
     "show",
@@ -46,69 +42,17 @@ __all__ = [
 ]
 
 
-def plan(
-    sources: Paths, *, period: str = "10s", align: Literal["clock", "bag"] = "clock", mission: str | None = None
-) -> list[dict[str, Any]]:
-    """Lists the bags of paths and folders.
+def tables(bags: Paths, *, period: str = "10s", align: Literal["clock", "bag"] = "clock") -> Table:
+    """Counts the messages of one recording, a bag or its parts, by its index: a row per publisher, topic and window.
 
-    Each is a dict of `uri`, `mission` and `origin_ns`, sorted by mission. `mission` is a regular expression whose first
-    group, or whole match, in the path names the mission.
-    """
-    return _bagreel.plan(texts(sources), period=period, align=align, mission=mission)
-
-
-def tables(
-    uri: str | os.PathLike[str],
-    *,
-    period: str = "10s",
-    align: Literal["clock", "bag"] = "clock",
-    mission: str | None = None,
-    origin_ns: int | None = None,
-    tier: Literal["index", "chunks"] = "index",
-    start_ns: int | None = None,
-    end_ns: int | None = None,
-) -> dict[str, Table]:
-    """Counts one bag by its index: the tables `counts` (a row per publisher, topic and window) and `bags` (one row).
-
-    A bag that cannot be read has its row in `bags` with an `error`. `start_ns` and `end_ns` (half-open) select
-    a part of the bag's time; `merge` combines such parts. `mission` is the mission's name; `origin_ns` is the start of
-    one of the windows, as returned by `plan`.
+    The columns are those of `bagreel tables`, which counts many bags in parallel; `bag` is the first path as given. Losses
+    of a damaged bag are warnings.
 
     Raises:
-        ValueError: an option is invalid, or `uri` is not one bag.
+        BagreelError: a bag cannot be read.
+        ValueError: an option is invalid.
     """
-    return _bagreel.tables(os.fspath(uri), **given(locals(), "uri"))
-
-
-def _batches(counts: Any) -> list[Table]:
-    """The record batches of a table, or of several."""
-    if isinstance(counts, Table):
-        return [counts]
-    if hasattr(counts, "to_batches"):
-        return [Table(batch) for batch in counts.to_batches()]
-    if hasattr(counts, "__arrow_c_array__"):
-        return [Table(counts)]
-    if not isinstance(counts, Iterable):
-        raise TypeError(f"pass Arrow tables or record batches, not `{type(counts).__name__}`")
-    return [batch for one in counts for batch in _batches(one)]
-
-
-def merge(counts: Any) -> Table:
-    """Merges the tables `counts` of all parts of one or more bags, in any order.
-
-    `counts` is an Arrow table or record batch (of any library), or any number of them. Exact for parts that do not
-    overlap in time.
-    """
-    return _bagreel.merge(_batches(counts))
-
-
-def finish(counts: Any) -> Mission:
-    """Makes the mission from the counts of its bags: states, rates, changes from window to window.
-
-    Raises:
-        ValueError: the counts are from several missions, or empty.
-    """
-    return _bagreel.finish(_batches(counts))
+    return _bagreel.tables(texts(bags), period=period, align=align)
 
 
 def read(uris: Paths, *, period: str | None = None, align: Literal["clock", "bag"] = "bag") -> Mission:

@@ -12,7 +12,6 @@ __version__: str
 class Table:
     """An Arrow record batch, by the PyCapsule interface."""
 
-    def __new__(cls, batch: Any) -> Table: ...
     @property
     def num_rows(self) -> int: ...
     @property
@@ -58,21 +57,6 @@ class Mission:
     def __len__(self) -> int:
         """The number of windows."""
 
-def plan(
-    sources: list[str], *, period: str = "10s", align: str = "clock", mission: str | None = None
-) -> list[dict[str, Any]]: ...
-def tables(
-    uri: str,
-    *,
-    period: str = "10s",
-    align: str = "clock",
-    mission: str | None = None,
-    origin_ns: int | None = None,
-    tier: str = "index",
-    start_ns: int | None = None,
-    end_ns: int | None = None,
-) -> dict[str, Table]: ...
-def merge(tables: list[Table]) -> Table: ...
-def finish(tables: list[Table]) -> Mission: ...
+def tables(uris: list[str], *, period: str = "10s", align: str = "clock") -> Table: ...
 def read(uris: list[str], *, period: str | None = None, align: str = "bag") -> Mission: ...
 def main(args: list[str | PathLike[str]]) -> int: ...

@@ -3,14 +3,14 @@
 mod table;
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
+use std::ffi::{CString, OsString};
 
-use bagreel::commands::{LogFormat, LogOptions, log};
-use bagreel::fleet::arrow::{bags_batch, counts_batch, counts_of, mission_batches};
-use bagreel::fleet::{self, CountDetail, PlannedBag, Planning, Tally};
-use bagreel::values::{Align, Length, Period, Span, Stamp};
+use bagreel::arrow;
+use bagreel::bag::Input;
+use bagreel::commands::{Counting, LogFormat, LogOptions, log};
+use bagreel::values::{Align, Length, Period};
 use bagreel::{Error, Mission as Read, Reading};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -55,132 +55,25 @@ fn align(text: &str) -> PyResult<Align> {
     }
 }
 
-fn detail(text: &str) -> PyResult<CountDetail> {
-    let found = CountDetail::ALL
-        .into_iter()
-        .find(|detail| detail.word() == text);
-    found.ok_or_else(|| PyValueError::new_err(format!("`{text}` is neither `index` nor `chunks`")))
-}
-
-/// Every bag of some paths and folders, with its mission and the start of one of its windows.
+/// A row per publisher, topic and window with messages of one recording, which may have several parts.
 #[pyfunction]
-#[pyo3(signature = (sources, *, period="10s", align="clock", mission=None))]
-fn plan<'py>(
-    py: Python<'py>,
-    sources: Vec<String>,
-    period: &str,
-    align: &str,
-    mission: Option<String>,
-) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let planning = Planning {
+#[pyo3(signature = (uris, *, period="10s", align="clock"))]
+fn tables(py: Python<'_>, uris: Vec<String>, period: &str, align: &str) -> PyResult<Table> {
+    let counting = Counting {
         period: self::period(period)?,
         align: self::align(align)?,
-        mission,
     };
-    let plan = py.detach(|| fleet::plan(&sources, &planning));
-    let bags = plan.map_err(|e| raised(&e))?.bags;
-    bags.into_iter()
-        .map(|bag| {
-            let row = PyDict::new(py);
-            row.set_item("uri", bag.uri)?;
-            row.set_item("mission", bag.mission)?;
-            row.set_item("origin_ns", bag.origin.0)?;
-            Ok(row)
-        })
-        .collect()
-}
-
-/// The tables `counts` and `bags` of one bag, or of a part of its time.
-#[pyfunction]
-#[pyo3(signature = (uri, *, period="10s", align="clock", mission=None, origin_ns=None, tier="index", start_ns=None, end_ns=None))]
-#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
-fn tables(
-    py: Python<'_>,
-    uri: String,
-    period: &str,
-    align: &str,
-    mission: Option<String>,
-    origin_ns: Option<i64>,
-    tier: &str,
-    start_ns: Option<i64>,
-    end_ns: Option<i64>,
-) -> PyResult<BTreeMap<&'static str, Table>> {
-    let planning = Planning {
-        period: self::period(period)?,
-        align: self::align(align)?,
-        mission: None,
-    };
-    let part = (start_ns.is_some() || end_ns.is_some()).then(|| Span {
-        start: Stamp(start_ns.unwrap_or(i64::MIN)),
-        end: Stamp(end_ns.unwrap_or(i64::MAX)),
-    });
-    let tally = Tally {
-        period: planning.period,
-        detail: detail(tier)?,
-        part,
-    };
-    let counted = py.detach(|| {
-        let planned = match origin_ns {
-            Some(origin) => planned(uri, mission, origin),
-            None => one(uri, mission, &planning)?,
-        };
-        fleet::count(&planned, &tally)
-    });
-    let counted = counted.map_err(|e| raised(&e))?;
-    let counts = counts_batch(&counted.counts).map_err(|e| raised(&e))?;
-    let bags = bags_batch(std::slice::from_ref(&counted.bag)).map_err(|e| raised(&e))?;
-    Ok(BTreeMap::from([
-        ("counts", Table(counts)),
-        ("bags", Table(bags)),
-    ]))
-}
-
-fn planned(uri: String, mission: Option<String>, origin: i64) -> PlannedBag {
-    PlannedBag {
-        mission: mission.unwrap_or_else(|| uri.clone()),
-        uri,
-        origin: Stamp(origin),
+    let inputs: Vec<Input> = uris.iter().map(Input::parse).collect();
+    let name = uris.first().map_or("", String::as_str);
+    let counts = py.detach(|| arrow::counts(name, &inputs, &counting));
+    let counts = counts.map_err(|e| raised(&e))?;
+    for notice in counts.notices.iter().filter(|notice| notice.kind.is_loss()) {
+        let text = format!("{name}: {}", notice.text).replace('\0', "\\0");
+        let category = py.get_type::<PyUserWarning>();
+        // The warning belongs to the caller of the function in Python.
+        PyErr::warn(py, &category, &CString::new(text)?, 2)?;
     }
-}
-
-/// The plan of a single bag.
-fn one(uri: String, mission: Option<String>, planning: &Planning) -> Result<PlannedBag, Error> {
-    let plan = fleet::plan(std::slice::from_ref(&uri), planning)?;
-    let mut bags = plan.bags.into_iter();
-    match (bags.next(), bags.next()) {
-        (Some(bag), None) => Ok(PlannedBag {
-            mission: mission.unwrap_or(bag.mission),
-            ..bag
-        }),
-        _ => Err(Error::usage(
-            format!("`{uri}` is not one bag"),
-            "list its bags with `plan`, and pass each of them",
-        )),
-    }
-}
-
-fn counts(tables: Vec<Table>) -> PyResult<Vec<fleet::Count>> {
-    let mut all = Vec::new();
-    for table in &tables {
-        all.extend(counts_of(&table.0).map_err(|e| raised(&e))?);
-    }
-    Ok(all)
-}
-
-/// The merged table `counts` of all parts of one or more bags.
-#[pyfunction]
-fn merge(py: Python<'_>, tables: Vec<Table>) -> PyResult<Table> {
-    let counts = counts(tables)?;
-    let merged = py.detach(|| counts_batch(&fleet::merge(counts)));
-    merged.map(Table).map_err(|e| raised(&e))
-}
-
-/// The mission made from the counts of its bags.
-#[pyfunction]
-fn finish(py: Python<'_>, tables: Vec<Table>) -> PyResult<Mission> {
-    let counts = counts(tables)?;
-    let mission = py.detach(|| fleet::finish(counts));
-    mission.map(Mission).map_err(|e| raised(&e))
+    Ok(Table(counts.rows))
 }
 
 /// Reads bags, or a mission's JSON, as one mission.
@@ -212,7 +105,7 @@ struct Mission(Read);
 impl Mission {
     /// Its tables by name: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
     fn tables(&self, py: Python<'_>) -> PyResult<BTreeMap<&'static str, Table>> {
-        let tables = py.detach(|| mission_batches(&self.0));
+        let tables = py.detach(|| arrow::mission_batches(&self.0));
         let tables = tables.map_err(|e| raised(&e))?.into_iter();
         Ok(tables.map(|(word, batch)| (word, Table(batch))).collect())
     }
@@ -314,5 +207,5 @@ mod _bagreel {
     #[expect(non_upper_case_globals, reason = "its name in Python")]
     const __version__: &str = env!("CARGO_PKG_VERSION");
     #[pymodule_export]
-    use super::{BagreelError, Mission, Table, finish, main, merge, plan, read, tables};
+    use super::{BagreelError, Mission, Table, main, read, tables};
 }

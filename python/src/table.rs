@@ -4,10 +4,9 @@
 
 use std::ffi::CStr;
 
-use arrow_array::ffi::{FFI_ArrowArray, FFI_ArrowSchema, from_ffi, to_ffi};
+use arrow_array::ffi::{FFI_ArrowSchema, to_ffi};
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array as _, RecordBatch, RecordBatchIterator, StructArray};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyTuple};
 
@@ -19,8 +18,7 @@ const STREAM: &CStr = c"arrow_array_stream";
 
 /// An Arrow record batch. `pyarrow.record_batch(table)`, `polars.DataFrame(table)` and DuckDB accept it
 /// directly.
-#[pyclass(frozen, module = "bagreel", from_py_object)]
-#[derive(Clone)]
+#[pyclass(frozen, module = "bagreel")]
 pub(crate) struct Table(pub(crate) RecordBatch);
 
 fn arrow(error: impl std::fmt::Display) -> PyErr {
@@ -29,12 +27,6 @@ fn arrow(error: impl std::fmt::Display) -> PyErr {
 
 #[pymethods]
 impl Table {
-    /// Imports any object that is an Arrow record batch.
-    #[new]
-    fn new(from: &Bound<'_, PyAny>) -> PyResult<Self> {
-        taken(from)
-    }
-
     #[getter]
     fn num_rows(&self) -> usize {
         self.0.num_rows()
@@ -104,26 +96,4 @@ impl Table {
     fn to_pandas(slf: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
         Self::to_pyarrow(slf)?.call_method0("to_pandas")
     }
-}
-
-/// A record batch from another library.
-fn taken(from: &Bound<'_, PyAny>) -> PyResult<Table> {
-    if let Ok(table) = from.cast::<Table>() {
-        return Ok(table.get().clone());
-    }
-    let wrong = || PyTypeError::new_err("pass a record batch: an object with `__arrow_c_array__`");
-    let pair = from
-        .call_method0("__arrow_c_array__")
-        .map_err(|_| wrong())?;
-    let (schema, array): (Bound<'_, PyCapsule>, Bound<'_, PyCapsule>) = pair.extract()?;
-    let schema = schema
-        .pointer_checked(Some(SCHEMA))?
-        .cast::<FFI_ArrowSchema>();
-    let array = array.pointer_checked(Some(ARRAY))?.cast::<FFI_ArrowArray>();
-    // SAFETY: capsules of these names hold these structures. Moving out of the array leaves it released, as
-    // the interface requires of a consumer; the schema is only read.
-    let data = unsafe { from_ffi(FFI_ArrowArray::from_raw(array.as_ptr()), schema.as_ref()) };
-    Ok(Table(RecordBatch::from(StructArray::from(
-        data.map_err(arrow)?,
-    ))))
 }

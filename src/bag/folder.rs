@@ -87,7 +87,7 @@ pub(crate) fn only_recording(folder: &Path) -> Result<Recording> {
                 all.len(),
                 words::some_of(&names, LISTED)
             );
-            let hint = "give one, or all of them for one mission; `bagreel info` and `bagreel tables` take folders of recordings";
+            let hint = "give one, or all of them for one mission; `bagreel info`, `events` and `tables` take folders of recordings";
             Err(Error::usage(what, hint))
         }
     }

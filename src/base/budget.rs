@@ -24,9 +24,6 @@ pub(crate) const TOPOLOGY_ENTRIES: usize = 1 << 17;
 /// times the largest launch system seen (all of Autoware's), and a second or two of work.
 pub(crate) const LAUNCH_WORK: usize = 64 << 20;
 
-/// The longest list of bags, in bytes: a million of them.
-pub(crate) const MANIFEST: u64 = 256 << 20;
-
 /// The longest font file, in bytes: CJK collections have 20 MB.
 pub(crate) const FONT: u64 = 64 << 20;
 

@@ -146,15 +146,18 @@ fn text(text: &[u8], in_list: bool, is_data: bool, to: &mut Vec<u8>) -> io::Resu
     Ok(())
 }
 
-/// A small table of texts as CSV: the column names, then one row per line.
-pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+/// Rows of texts, all of one length, as CSV: one row per line.
+pub(crate) fn lines<R>(rows: impl IntoIterator<Item = R>) -> String
+where
+    R: IntoIterator<Item = String>,
+{
     let mut writer = WriterBuilder::new()
         .terminator(Terminator::Any(b'\n'))
         .from_writer(Vec::new());
-    // Writing to memory cannot fail, and rows are as long as the header.
-    let _ = writer.write_record(columns);
+    // Writing to memory cannot fail.
     for row in rows {
-        let _ = writer.write_record(row.iter().map(|text| cell(text, false).into_owned()));
+        let cells = row.into_iter().map(|text| cell(&text, false).into_owned());
+        let _ = writer.write_record(cells);
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8_lossy(&bytes).into_owned()

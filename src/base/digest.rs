@@ -19,26 +19,9 @@ pub(crate) fn hex_of(bytes: &[u8]) -> String {
 
 /// The first `digits` hex digits of a text's digest, 64 at most.
 pub(crate) fn hex(text: &str, digits: usize) -> String {
-    let mut sum = Sum::default();
-    sum.add(text.as_bytes());
-    sum.hex(digits)
-}
-
-/// A digest of bytes that come in parts.
-#[derive(Default)]
-pub(crate) struct Sum(Sha256);
-
-impl Sum {
-    pub(crate) fn add(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-
-    /// The first `digits` hex digits, 64 at most.
-    pub(crate) fn hex(self, digits: usize) -> String {
-        let mut all = hex_of(&self.0.finalize());
-        all.truncate(digits);
-        all
-    }
+    let mut all = hex_of(&Sha256::digest(text.as_bytes()));
+    all.truncate(digits);
+    all
 }
 
 /// Bytes compressed as a zlib stream (RFC 1950): two bytes, DEFLATE, and a checksum of four bytes.

@@ -42,28 +42,11 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     read_if(path, limit, |_| Ok(()))
 }
 
-/// At most `limit` bytes of a stream that errors call `name`.
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn read_from(stream: impl io::Read, name: &Path, limit: u64) -> Result<Vec<u8>> {
-    bounded(stream, name, limit, |_| Ok(()))
-}
-
 /// As [`read`], if `fits` accepts the first bytes.
 fn read_if(path: &Path, limit: u64, fits: impl Fn(&[u8]) -> io::Result<()>) -> Result<Vec<u8>> {
     let file = File::open(path).map_err(Error::io("read", path))?;
-    bounded(file, path, limit, fits)
-}
-
-fn bounded(
-    stream: impl io::Read,
-    path: &Path,
-    limit: u64,
-    fits: impl Fn(&[u8]) -> io::Result<()>,
-) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let mut file = stream.take(limit.saturating_add(1));
+    let mut file = file.take(limit.saturating_add(1));
     let head = file.by_ref().take(HEAD).read_to_end(&mut bytes);
     let read = head.and_then(|_| fits(&bytes));
     let read = read.and_then(|()| file.read_to_end(&mut bytes));

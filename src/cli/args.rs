@@ -5,7 +5,6 @@ pub(super) mod follow;
 pub(super) mod gate;
 mod help;
 pub(super) mod render;
-#[cfg(feature = "parquet")]
 pub(super) mod tables;
 mod values;
 
@@ -67,14 +66,11 @@ pub(super) enum Command {
     /// Export messages as tables: a row per message, or a table per topic with every field.
     #[command(after_long_help = EXTRACT_HELP)]
     Extract(Box<ExtractArgs>),
-    /// Count the messages of many bags into two Parquet tables: bags, and counts per publisher and window.
-    #[cfg(feature = "parquet")]
+    /// Count the messages of many bags per publisher, topic and window: a table per bag.
     #[command(after_long_help = tables::HELP)]
     Tables(Box<tables::TablesArgs>),
-    /// Write a bundle for replication: digests, commands, a survey, how much each recording reconfigures, and figures.
-    #[cfg(feature = "pdf")]
-    Paper(PaperArgs),
-    /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when.
+    /// Print the event log: what started, stopped, restarted, changed rate or was taken over, and when; for a folder, the logs
+    /// of its bags.
     Events(Box<EventsArgs>),
     /// Compare two missions: nodes, topics, connections, rates and events.
     #[command(after_long_help = gate::DIFF_HELP)]
@@ -117,20 +113,6 @@ pub(super) struct InfoArgs {
     pub(super) why: Vec<String>,
     #[command(flatten)]
     pub(super) graph: GraphArgs,
-}
-
-#[cfg(feature = "pdf")]
-#[derive(Debug, Args)]
-pub(super) struct PaperArgs {
-    /// Recordings, or folders with recordings below them.
-    #[arg(required = true, value_name = "RUN")]
-    pub(super) runs: Vec<PathBuf>,
-    /// Output folder.
-    #[arg(long, short, value_name = "FOLDER")]
-    pub(super) output: PathBuf,
-    /// Length of a window, as for `render`. [default: as for `render`]
-    #[arg(long, short, value_parser = length)]
-    pub(super) period: Option<Length>,
 }
 
 #[derive(Debug, Args)]

@@ -1,22 +1,18 @@
-//! The commands that describe the contents of bags: `info`, `events`, `paper`.
+//! The commands that describe the contents of bags: `info`, `events`.
+
+use std::path::Path;
 
 use super::applies::{self, Given};
-#[cfg(feature = "pdf")]
-use super::args::PaperArgs;
 use super::args::{EventsArgs, EventsFormat, InfoArgs, InfoFormat, RangeArgs, RateArgs, TimeArgs};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{DONE, SKIPPED, code};
 use crate::base::error::Error;
-use crate::base::notice::NoticeKind;
-#[cfg(feature = "pdf")]
-use crate::base::words;
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::graph::window::Length;
-use crate::mission::events::{LogFormat, LogOptions, lines, log};
+use crate::mission::events::{LogFormat, LogLine, LogOptions, body, lines, log, whole};
 use crate::mission::info::{SurveyRow, json, survey_text};
-#[cfg(feature = "pdf")]
-use crate::pipeline::{self, Reading, paper::Paper};
-use crate::pipeline::{Survey, explain, is_survey, read, survey, survey_file};
+use crate::pipeline::{Reading, Survey, each, explain, is_survey, read, survey, survey_file};
 
 /// The number of parts of a mission for which `info` shows the activity.
 const PARTS: u32 = 32;
@@ -24,7 +20,7 @@ const PARTS: u32 = 32;
 /// The note about an empty log.
 pub(super) const NO_EVENTS: &str = "no events: nothing started, stopped or changed";
 
-/// Prints the log of a mission.
+/// Prints the log of a mission, or those of the bags in a folder.
 pub(super) fn events(
     args: &EventsArgs,
     given: &Given,
@@ -37,7 +33,6 @@ pub(super) fn events(
         terminal
             .note("elements that only source code declares have no times and are not in the log");
     }
-    let mission = read(&reading, terminal)?;
     let options = LogOptions {
         parts: args.parts,
         all: args.all,
@@ -50,6 +45,13 @@ pub(super) fn events(
         EventsFormat::Json => LogFormat::Json,
         EventsFormat::Markdown => LogFormat::Markdown,
     };
+    if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
+        && is_survey(input)
+    {
+        let each = LogOf { format, options };
+        return events_of_folder(folder, &reading, each, terminal);
+    }
+    let mission = read(&reading, terminal)?;
     let lines = lines(&mission, options);
     match format {
         LogFormat::Text => drop(terminal.log(&lines, format)?),
@@ -61,6 +63,54 @@ pub(super) fn events(
     // The log is the same for every period.
     terminal.notices(&mission.notices.without(NoticeKind::Chosen));
     Ok(code(&mission))
+}
+
+/// The requested form of a log.
+struct LogOf {
+    format: LogFormat,
+    options: LogOptions,
+}
+
+/// Prints the logs of all bags below a folder as one.
+fn events_of_folder(
+    folder: &Path,
+    reading: &Reading,
+    form: LogOf,
+    terminal: &mut Terminal,
+) -> Result<u8, Error> {
+    let LogOf { format, options } = form;
+    let (mut rows, mut shown) = (String::new(), Vec::new());
+    let mut notices = Notices::new();
+    for bag in each(folder, reading, terminal)? {
+        let name = &bag.name;
+        match bag.mission {
+            Ok(mission) => {
+                if format == LogFormat::Text {
+                    shown.push(LogLine::plain(name));
+                    let own = lines(&mission, options);
+                    let none = own.is_empty().then(|| LogLine::plain(NO_EVENTS));
+                    shown.extend(own.into_iter().chain(none));
+                } else {
+                    rows += &body(&mission, Some(name), format, options);
+                }
+                let own = mission.notices.without(NoticeKind::Chosen);
+                notices.extend(own.iter().map(|notice| Notice {
+                    text: format!("`{name}`: {}", notice.text),
+                    ..notice
+                }));
+            }
+            Err(unread) if unread.is_loss => {
+                notices.add(Notice::new(NoticeKind::Damaged, unread.why));
+            }
+            Err(empty) => notices.add(Notice::new(NoticeKind::Note, empty.why)),
+        }
+    }
+    match format {
+        LogFormat::Text => drop(terminal.log(&shown, format)?),
+        _ => terminal.results(&whole(&rows, format, true))?,
+    }
+    terminal.notices(&notices);
+    Ok(if notices.any_loss() { SKIPPED } else { DONE })
 }
 
 /// Prints the summary of a mission, or a row for each bag of a folder.
@@ -123,31 +173,4 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
     }
     terminal.notices(&mission.notices);
     Ok(code(&mission))
-}
-
-/// Writes the bundle.
-#[cfg(feature = "pdf")]
-pub(super) fn paper(args: &PaperArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let mut reading = Reading::default();
-    reading.division.length = args.period.unwrap_or(Length::Auto);
-    let period = |length: Length| match length {
-        Length::Fixed(period) => period.to_string().replace(' ', ""),
-        _ => "all".to_owned(),
-    };
-    let job = Paper {
-        runs: args.runs.clone(),
-        folder: args.output.clone(),
-        options: args.period.map_or_else(String::new, |length| {
-            format!(" --period {}", period(length))
-        }),
-        reading,
-    };
-    let done = pipeline::paper::paper(&job, terminal)?;
-    for remark in &done.remarks {
-        terminal.note(remark);
-    }
-    let files = words::count(done.files, "file");
-    let runs = words::count(done.runs, "recording");
-    terminal.wrote([&*job.folder], &format!("{files} about {runs}"));
-    Ok(if done.skipped { SKIPPED } else { DONE })
 }

@@ -149,22 +149,23 @@ pub(crate) fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
+/// The path without links and `..`: resolved by the system for existing folders, by name for others.
+pub(crate) fn resolved(path: &Path) -> PathBuf {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut full = PathBuf::new();
+    for part in whole.components() {
+        match part {
+            Component::ParentDir => drop(full.pop()),
+            part => full.push(part),
+        }
+        full = full.canonicalize().unwrap_or(full);
+    }
+    full
+}
+
 /// Whether two paths refer to the same file, or will once missing folders are created.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    /// The path without links and `..`: resolved by the system for existing folders, by name for others.
-    fn full(path: &Path) -> PathBuf {
-        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let mut full = PathBuf::new();
-        for part in whole.components() {
-            match part {
-                Component::ParentDir => drop(full.pop()),
-                part => full.push(part),
-            }
-            full = full.canonicalize().unwrap_or(full);
-        }
-        full
-    }
-    full(a) == full(b)
+    resolved(a) == resolved(b)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub(crate) use self::sentence::{predicate, sentence, sentence_with};
 use super::json::events::rows;
 pub(crate) use super::json::events::text as quoted;
 use crate::base::columns::hang;
-use crate::base::csv::table;
+use crate::base::csv;
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::graph::{ById, Element, NodeId};
@@ -57,24 +57,44 @@ pub(crate) enum LogRow<'a> {
 /// The log of a mission; ends in a new line unless it is empty. Control and direction characters in names are
 /// escaped.
 pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String {
-    if format == LogFormat::Text {
-        return lines(mission, options)
-            .iter()
-            .map(|line| line.text(None))
-            .collect();
-    }
+    whole(&body(mission, None, format, options), format, false)
+}
+
+/// The rows of a log; those of a `bag` in a folder contain its name.
+pub(crate) fn body(
+    mission: &Mission,
+    bag: Option<&str>,
+    format: LogFormat,
+    options: LogOptions,
+) -> String {
     let rows = chosen(mission, options);
     match format {
-        LogFormat::Text => String::new(),
-        LogFormat::Csv => csv(mission, &rows),
-        LogFormat::Ndjson => ndjson(mission, &rows),
+        LogFormat::Text => {
+            let title = bag.map(LogLine::plain);
+            let lines = title.into_iter().chain(lines(mission, options));
+            lines.map(|line| line.text(None)).collect()
+        }
+        LogFormat::Csv => csv(mission, bag, &rows),
+        LogFormat::Ndjson | LogFormat::Json => ndjson(mission, bag, &rows),
+        LogFormat::Markdown => {
+            let title = bag.map_or_else(String::new, |bag| format!("\n### {}\n\n", escaped(bag)));
+            title + &markdown(mission, &with_switches(mission, rows))
+        }
+    }
+}
+
+/// The log with these rows, which are of one mission or of the bags of a folder.
+pub(crate) fn whole(rows: &str, format: LogFormat, is_of_folder: bool) -> String {
+    match format {
+        LogFormat::Csv => {
+            let bag = if is_of_folder { "bag," } else { "" };
+            format!("{bag}{}\n{rows}", COLUMNS.join(","))
+        }
         LogFormat::Json => {
-            let rows = ndjson(mission, &rows);
-            let rows: Vec<&str> = rows.lines().collect();
-            let rows = rows.join(",\n");
+            let rows = rows.lines().collect::<Vec<_>>().join(",\n");
             format!("{{\"schema\": \"bagreel.events/2\", \"events\": [\n{rows}\n]}}\n")
         }
-        LogFormat::Markdown => markdown(mission, &with_switches(mission, rows)),
+        LogFormat::Text | LogFormat::Ndjson | LogFormat::Markdown => rows.to_owned(),
     }
 }
 
@@ -90,7 +110,8 @@ pub(crate) fn headlines(mission: &Mission, format: LogFormat) -> Vec<LogRow<'_>>
 /// Rows of the log, each as [`LogFormat::Ndjson`] or as text.
 pub(crate) fn row_lines(mission: &Mission, rows: &[LogRow<'_>], format: LogFormat) -> Vec<LogLine> {
     if format == LogFormat::Ndjson {
-        return ndjson(mission, rows).lines().map(LogLine::plain).collect();
+        let rows = ndjson(mission, None, rows);
+        return rows.lines().map(LogLine::plain).collect();
     }
     let parts = mission.log.all_parts();
     rows.iter().map(|row| line(mission, &parts, row)).collect()
@@ -303,15 +324,17 @@ const COLUMNS: [&str; 16] = [
     "weight",
 ];
 
-fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
-    table(
-        &COLUMNS,
-        rows.iter().map(|row| match row {
-            LogRow::Phase(at, phase) => phase_cells(*at, phase),
-            LogRow::Interruption(one) => interruption_cells(one),
-            LogRow::Switch(_) => Vec::new(),
-            LogRow::Event(id, event) | LogRow::Part(id, event) => cells(mission, *id, event),
-        }),
+fn csv(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
+    let cells = |row: &LogRow<'_>| match row {
+        LogRow::Phase(at, phase) => phase_cells(*at, phase),
+        LogRow::Interruption(one) => interruption_cells(one),
+        LogRow::Switch(_) => Vec::new(),
+        LogRow::Event(id, event) | LogRow::Part(id, event) => cells(mission, *id, event),
+    };
+    let bag = bag.map(str::to_owned);
+    csv::lines(
+        rows.iter()
+            .map(|row| bag.clone().into_iter().chain(cells(row))),
     )
 }
 
@@ -386,10 +409,12 @@ fn until(one: &Interruption) -> Stamp {
     }
 }
 
-fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
+fn ndjson(mission: &Mission, bag: Option<&str>, rows: &[LogRow<'_>]) -> String {
     let events = rows_of(mission);
+    let bag = bag.map(|bag| harmless(&format!("{{\"bag\":{},", quoted(bag))));
     let mut all = String::new();
     for row in rows {
+        let start = all.len();
         match row {
             LogRow::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
             LogRow::Interruption(one) => {
@@ -403,6 +428,9 @@ fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
             LogRow::Event(id, _) | LogRow::Part(id, _) => {
                 all.push_str(events.get(*id).map_or("{}", String::as_str));
             }
+        }
+        if let Some(bag) = &bag {
+            all.replace_range(start..=start, bag);
         }
         all.push('\n');
     }
@@ -418,7 +446,7 @@ fn rows_of(mission: &Mission) -> ById<EventId, String> {
 
 fn phase_line(at: usize, phase: &Phase) -> String {
     let (start, end) = (phase.span.start.0, phase.span.end.0);
-    let name = crate::mission::json::events::text(&phase.name);
+    let name = quoted(&phase.name);
     let number = at + 1;
     harmless(&format!(
         "{{\"kind\":\"phase\",\"number\":{number},\"name\":{name},\"time_ns\":{start},\"until_ns\":{end}}}"

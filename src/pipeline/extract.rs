@@ -147,7 +147,7 @@ fn stop(watch: &dyn Watch) -> Result<()> {
 }
 
 /// The notice about losses of a bag that reported none.
-fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
+pub(super) fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
     use crate::base::notice::NoticeKind::Damaged;
     let silent = !report.complete && !notices.any_loss();
     silent.then(|| Notice::new(Damaged, format!("`{}` is not complete", report.name)))

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::Reading;
-use super::contents::Contents;
 use crate::bag::moved::Moved;
 use crate::bag::{self, Connection, ConnectionId, Input, OpenOptions, Reader, Sink, Want};
 use crate::base::error::{Error, Result};
@@ -121,7 +120,7 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
     let contents = |input: &Input| {
         let mut sink = ContentsSink::default();
         open(input)?.read(None, &mut sink).ok()?;
-        sink.0.digest()
+        (sink.messages > 0).then_some((sink.messages, sink.sum))
     };
     let mut alike: BTreeMap<_, Vec<&Input>> = BTreeMap::new();
     if near.len() > 1 {
@@ -145,17 +144,37 @@ fn refuse_copies(inputs: &[Input]) -> Result<()> {
     Ok(())
 }
 
-/// The digest of a bag that is read.
+/// The number of messages of a bag, and a sum over their topics and times in which their order does not matter.
 #[derive(Default)]
-struct ContentsSink(Contents);
+struct ContentsSink {
+    messages: usize,
+    sum: u64,
+    /// A number for the topic of each connection.
+    topics: Vec<u64>,
+}
 
 impl Sink for ContentsSink {
     fn connection(&mut self, connection: &Connection) -> Want {
-        self.0.connection(connection.topic.as_str());
+        let bytes = connection.topic.as_str().bytes();
+        let topic = bytes.fold(0, |sum, byte| mixed(sum ^ u64::from(byte)));
+        self.topics.push(topic);
         Want::Stamps
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        self.0.add(connection, stamps);
+        let topic = self.topics.get(connection.0 as usize);
+        let topic = topic.copied().unwrap_or_default();
+        for at in stamps {
+            self.sum = self.sum.wrapping_add(mixed(topic ^ at.0.cast_unsigned()));
+        }
+        self.messages += stamps.len();
     }
+}
+
+/// A number of which each bit depends on every bit of `number` (`SplitMix64`).
+fn mixed(number: u64) -> u64 {
+    let number = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let number = (number ^ (number >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    number ^ (number >> 31)
 }

@@ -41,25 +41,80 @@ pub struct Survey {
 /// # Errors
 /// If the folder itself cannot be read or contains no bag.
 pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
-    let bags = recordings(folder)?;
-    let mut skipped = false;
-    let row = |recording: Recording| {
-        let one = Reading {
-            inputs: recording.inputs(),
-            ..reading.clone()
-        };
-        let shown = recording.name_in(folder);
-        let read = alone(&shown, || read(&one, watch));
-        let row = surveyed(shown, size(&one.inputs), read);
-        skipped |= !row.is_complete;
-        row
-    };
-    let rows = bags.into_iter().map(row).collect();
+    let rows: Vec<SurveyRow> = each(folder, reading, watch)?.map(row).collect();
+    let skipped = rows.iter().any(|row| !row.is_complete);
     Ok(Survey { rows, skipped })
 }
 
+fn row(one: FolderBag) -> SurveyRow {
+    match one.mission {
+        Ok(mission) => SurveyRow::of(one.name, &mission),
+        Err(unread) => SurveyRow {
+            path: one.name,
+            file_bytes: one.file_bytes,
+            is_complete: !unread.is_loss,
+            error: Some(unread.why),
+            ..SurveyRow::default()
+        },
+    }
+}
+
+/// A recording in a folder.
+pub(crate) struct FolderBag {
+    /// Its name relative to the folder.
+    pub(crate) name: String,
+    /// Its size in bytes, if known.
+    file_bytes: Option<u64>,
+    pub(crate) mission: std::result::Result<Mission, Unread>,
+}
+
+/// Why there is no mission of a recording.
+pub(crate) struct Unread {
+    pub(crate) why: String,
+    /// Whether data is lost; an empty bag may be intact.
+    pub(crate) is_loss: bool,
+}
+
+/// Every recording below `folder`, sorted by path, each read when its turn comes.
+///
+/// # Errors
+/// If the folder itself cannot be read or contains no bag.
+pub(crate) fn each<'a>(
+    folder: &'a Path,
+    reading: &'a Reading,
+    watch: &'a mut dyn Watch,
+) -> Result<impl Iterator<Item = FolderBag> + use<'a>> {
+    let bags = recordings(folder)?.into_iter();
+    Ok(bags.map_while(move |recording| {
+        let reading = Reading {
+            inputs: recording.inputs(),
+            ..reading.clone()
+        };
+        let name = recording.name_in(folder);
+        let mission = alone(&name, || read(&reading, watch));
+        (!watch.stopped()).then(|| FolderBag {
+            name,
+            file_bytes: reading.inputs.iter().map(bag::size_on_disk).sum(),
+            mission: mission.map_err(unread),
+        })
+    }))
+}
+
+fn unread(error: Error) -> Unread {
+    match error {
+        Error::NoMessages { path, hint } => Unread {
+            is_loss: hint != NOTHING_RECORDED,
+            why: format!("`{}` contains no messages: {hint}", path.display()),
+        },
+        error => Unread {
+            is_loss: true,
+            why: error.to_string(),
+        },
+    }
+}
+
 /// The result of reading one bag; if bagreel fails at it, the error of this bag alone. The panic was printed.
-fn alone<T>(bag: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(super) fn alone<T>(bag: &str, read: impl FnOnce() -> Result<T>) -> Result<T> {
     let failed = |_| Err(Error::unsupported(bag, "a fault of bagreel: report it", ""));
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(failed)
 }
@@ -82,33 +137,6 @@ pub(super) fn no_bags(folder: &Path) -> Error {
         path: folder.to_owned(),
         looks_like: "a folder without bags".to_owned(),
         hint: "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned(),
-    }
-}
-
-/// The size of a recording in bytes, if known.
-pub(super) fn size(inputs: &[Input]) -> Option<u64> {
-    inputs.iter().map(bag::size_on_disk).sum()
-}
-
-/// The row of a bag that was read, or not.
-pub(super) fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -> SurveyRow {
-    let row = SurveyRow {
-        path,
-        file_bytes: size,
-        ..SurveyRow::default()
-    };
-    match read {
-        Ok(mission) => SurveyRow::of(row.path, &mission),
-        // An empty bag may be intact.
-        Err(Error::NoMessages { path, hint }) => SurveyRow {
-            is_complete: hint == NOTHING_RECORDED,
-            error: Some(format!("`{}` contains no messages: {hint}", path.display())),
-            ..row
-        },
-        Err(error) => SurveyRow {
-            error: Some(error.to_string()),
-            ..row
-        },
     }
 }
 

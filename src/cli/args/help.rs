@@ -7,10 +7,7 @@ use super::Typed;
 
 /// The headings of `--help`, in their order, and the options under each, in every command.
 const HEADINGS: [(&str, &str); 7] = [
-    (
-        "Input",
-        "ns verify manifest mission msg_path on_error expect only update",
-    ),
+    ("Input", "ns verify msg_path on_error expect only update"),
     (
         "Time",
         "offset period step start end align cut rate_change grace phases idle keep",
@@ -30,11 +27,11 @@ const HEADINGS: [(&str, &str); 7] = [
          fields parts undecidable explain",
     ),
     ("Evidence", "topology source infer why"),
-    ("Performance", "tier shard skip_existing jobs"),
+    ("Performance", "skip_existing jobs"),
 ];
 
 /// What `-h` shows of each command: its most important options, and three examples.
-const SCREENS: [(&str, &str, &str); 14] = [
+const SCREENS: [(&str, &str, &str); 13] = [
     (
         "render",
         "outputs period start end mode ns_filter topic_filter style size for",
@@ -69,19 +66,11 @@ const SCREENS: [(&str, &str, &str); 14] = [
     ),
     (
         "tables",
-        "output manifest period mission shard skip_existing on_error jobs",
+        "output format period align skip_existing on_error jobs",
         "
-  bagreel tables bags/ -o fleet/                      all bags of a folder
-  bagreel tables bags/ -o fleet/ --skip-existing      again, for new bags only
-  bagreel tables bags/ -o part/ --shard 1/8           the first of eight jobs",
-    ),
-    (
-        "paper",
-        "output period",
-        "
-  bagreel paper run.bag -o bundle/                    one recording
-  bagreel paper bags/ -o study/                       all recordings of a folder
-  bagreel paper bags/ -o study10/ --period 10         in windows of ten seconds",
+  bagreel tables bags/ -o counts/                     all bags of a folder
+  bagreel tables bags/ -o counts/ --skip-existing     again, for new bags only
+  bagreel tables good.bag run.bag -o counts/ --period 60   two bags, a minute per window",
     ),
     (
         "events",

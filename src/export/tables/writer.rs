@@ -10,9 +10,10 @@ use crate::base::table::Batch;
 use crate::export::parquet;
 
 /// The format of a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableFormat {
     /// Comma-separated values, stamps as nanoseconds since 1970.
+    #[default]
     Csv,
     /// Apache Parquet, stamps as timestamps.
     #[cfg(feature = "parquet")]

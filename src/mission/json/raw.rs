@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use super::elements::{
-    EdgeJson, EdgeNumbers, ElementJson, KnownJson, LifeJson, NodeJson, NodeNumbers, PublishJson,
-    SubscribeJson, Text, TopicJson, TopicNumbers,
+pub(super) use super::elements::{
+    ElementJson, NodeJson, PublishJson, SubscribeJson, Text, TopicJson,
 };
 use super::events::{EventJson, InterruptionRow, PhaseRow};
 use super::sending::OldSendingJson;

@@ -6,9 +6,7 @@
 use std::path::Path;
 
 use super::names::{Names, graph};
-use super::raw::{
-    BagJson, ElementJson, NodeJson, NoticeJson, PublishJson, Raw, RawWindow, TopicJson,
-};
+use super::raw::{BagJson, ElementJson, NodeJson, NoticeJson, PublishJson, Raw, TopicJson};
 use super::sending::sending;
 use super::write::{OLD_SCHEMAS, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
@@ -76,14 +74,6 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
         }
     }
     Ok(spans)
-}
-
-/// The mission of given windows, each with its full graph; changes are left to [`Mission::find_changes`].
-/// There is at least one window, and they are in order of time.
-pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
-    let span = |w: &RawWindow| Span::new(Stamp(w.start_ns), Stamp(w.end_ns));
-    let spans: Vec<Span> = raw.windows.iter().map(span).collect();
-    build(raw, &spans)
 }
 
 fn build(mut raw: Raw, spans: &[Span]) -> Result<Mission, String> {
