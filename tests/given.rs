@@ -233,6 +233,19 @@ fn introspection_names_the_client_and_the_server_if_the_recorder_names_publisher
     assert!(why.contains("/ui publishes /plan"), "{why}");
     let why = done(folder.path(), "info r.mcap --why /plan /planner");
     assert!(why.contains("/planner subscribes to /plan"), "{why}");
+
+    // Otherwise the service is known, and a number for each client.
+    bag.publishers.iter_mut().for_each(|one| one.node.clear());
+    let folder = self::folder(&bag, &ros2());
+    let info = done(folder.path(), "info r.mcap");
+    let service = info.lines().find(|line| line.contains(" /plan "));
+    assert!(
+        service.is_some_and(|line| line.contains("nav_msgs/srv/GetPlan ")),
+        "{info}"
+    );
+    let why = done(folder.path(), "info r.mcap --why /plan");
+    let client = "/plan: request sent, client 000102030405060708090a0b0c0d0e0f";
+    assert!(why.contains(client), "{why}");
 }
 
 #[test]

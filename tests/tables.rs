@@ -374,7 +374,7 @@ fn poor_definitions_are_replaced_by_known_ones() {
     }
     assert!(!tables.contains_key("custom"));
     let why = "messages of `/custom` (my_msgs/Reading) were left out: \
-               line 3 of its definition is not a field: `encoder_msgs/MeasurementMe` (20 times)";
+               line 3 of its definition is not a field: `encoder_msgs/MeasurementMe`; `--msg-path` replaces it (20 times)";
     assert!(said.contains(why), "{said}");
 
     // The user's files take precedence over a text that fails.

@@ -32,22 +32,20 @@ pub(crate) fn read(
     };
     let client = hex_of(client);
     let of = context.stream.topic;
-    if let Some(node) = context.stream.publisher
-        && !service.contains("/_action/")
-    {
+    if !service.contains("/_action/") {
         let kind = context.stream.connection.type_name.clone();
         let kind = context.name(kind.strip_suffix("_Event").unwrap_or(SERVICE));
         let called = context.name(service);
-        let end = match word {
-            "request sent" | "reply received" => Observation::Publish(node, called),
-            _ => Observation::Subscribe(node, called),
+        let end = match (context.stream.publisher, word) {
+            (None, _) => Observation::Topic(called),
+            (Some(node), "request sent" | "reply received") => Observation::Publish(node, called),
+            (Some(node), _) => Observation::Subscribe(node, called),
         };
-        context.observation(end, Confidence::Measured, || format!("{service}: {word}"));
-        context.observation(
-            Observation::Type(called, kind),
-            Confidence::Measured,
-            String::new,
-        );
+        context.observation(end, Confidence::Measured, || {
+            format!("{service}: {word}, client {client}")
+        });
+        let known = Observation::Type(called, kind);
+        context.observation(known, Confidence::Measured, String::new);
     }
     let words = || format!("{service}: {word}, client {client}");
     context.observation(Observation::Topic(of), Confidence::Measured, words);

@@ -29,7 +29,10 @@ impl Definition {
             );
         }
         let text = connection.definition.as_deref().unwrap_or_default();
-        let messages = text::messages(text, &connection.type_name, Form::of(connection))?;
+        let mut messages = text::messages(text, &connection.type_name, Form::of(connection))?;
+        for reason in messages.iter_mut().filter_map(|one| one.wrong.as_mut()) {
+            reason.push_str("; `--msg-path` replaces it");
+        }
         Ok(Self {
             loose: messages.len(),
             messages: messages.into_iter().map(Arc::new).collect(),

@@ -420,7 +420,7 @@ fn sections_are_read_in_their_own_form() {
     );
     assert_eq!(
         decoded(&other, &data).unwrap_err(),
-        "its definition is that of other types"
+        "its definition is that of other types; `--msg-path` replaces it"
     );
 }
 
