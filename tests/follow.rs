@@ -202,10 +202,13 @@ fn a_second_signal_ends_the_writing_of_outputs() {
     // Opens when it is written to.
     let unread = fs::File::open(&pipe).unwrap();
     let begun = Instant::now();
-    assert!(interrupt().success());
-    let done = follower.wait_with_output().unwrap();
-    assert_eq!(done.status.code(), Some(130));
-    assert!(begun.elapsed() < Duration::from_mins(1));
+    // A signal soon after another counts as the same, and a busy system may deliver both together.
+    while follower.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < Duration::from_mins(1));
+        assert!(interrupt().success());
+        sleep(Duration::from_millis(500));
+    }
+    assert_eq!(follower.wait().unwrap().code(), Some(130));
     drop(unread);
 }
 
