@@ -223,7 +223,7 @@ fn gallery_shows_what_its_commands_draw() {
         Vec::<&str>::new(),
         "draw them anew with INSTA_UPDATE=always"
     );
-    assert_eq!(shown, 21);
+    assert_eq!(shown, 20);
     let files = fs::read_dir(images).unwrap();
     let bytes: u64 = files
         .map(|file| file.unwrap().metadata().unwrap().len())
