@@ -609,6 +609,26 @@ fn the_recorder_is_recognized_by_its_file_in_any_folder() {
 }
 
 #[test]
+fn a_status_named_after_no_known_node_shows_none() {
+    let of = |has_log: bool| {
+        let mut bag = Recording::default();
+        let diagnostics = bag.topic2("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray");
+        let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+        for (at, name) in ["lidar: rate", "battery: voltage"].iter().enumerate() {
+            let status = Cdr::default().header(ORIGIN, "").u32(1).u8(0).text(name);
+            let status = status.text("").text("").u32(0);
+            bag.at(diagnostics, 60 + i64::try_from(at).unwrap(), status.done());
+        }
+        if has_log {
+            bag.at(log, 100, log2("lidar", "up", "lidar.cpp"));
+        }
+        edges(&bag, "diagnostics")
+    };
+    assert!(of(false).is_empty());
+    assert_eq!(of(true), ["/lidar > /diagnostics inferred"]);
+}
+
+#[test]
 fn diagnostics_count_before_lists_are_read() {
     let mut bag = Recording::default();
     // One connection for all, as tools that merge connections leave it.

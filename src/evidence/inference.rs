@@ -423,19 +423,21 @@ impl<'a> Conclusions<'a> {
         );
     }
 
+    /// The names of all known nodes and loggers.
+    pub(crate) fn names(&self) -> BTreeSet<Name> {
+        let facts = self.facts.list.iter();
+        let loggers = facts.filter_map(|fact| match fact.observation {
+            Observation::Logger(name, _) => Some(name),
+            _ => None,
+        });
+        loggers.chain(self.nodes.iter().copied()).collect()
+    }
+
     /// The node for a name without its namespace: the only known one with this ending, otherwise one with
     /// exactly this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
-        let loggers = self
-            .facts
-            .list
-            .iter()
-            .filter_map(|fact| match fact.observation {
-                Observation::Logger(name, _) => Some(name),
-                _ => None,
-            });
-        let names: BTreeSet<Name> = loggers.chain(self.nodes.iter().copied()).collect();
+        let names = self.names();
         let mut ending = names.iter().filter(|n| self.text(**n).ends_with(&*text));
         match (names.contains(&node), ending.next(), ending.next()) {
             (false, Some(only), None) => *only,

@@ -68,7 +68,8 @@ fn node(name: &str) -> Option<&str> {
     node.split('/').all(part).then_some(node)
 }
 
-/// Adds publishers by the names in statuses, if the header does not name the publisher.
+/// Adds publishers by the names in statuses, if the header does not name the publisher. A status may be named after anything,
+/// so only names that are those of nodes by other evidence count.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let stated = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);
@@ -80,12 +81,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             |observation| matches!(observation, Observation::Reports(_, topic) if !stated(*topic)),
         )
         .collect();
+    let names = known.names();
     for (fact, signs, ends) in known.observations(source) {
         let Observation::Reports(node, topic) = fact.observation else {
             continue;
         };
-        if unnamed.contains(&fact.observation) {
-            let node = known.meant(node);
+        let node = known.meant(node);
+        if unnamed.contains(&fact.observation) && names.contains(&node) {
             let what = ElementKey::Publish(node, topic);
             let when = Validity::Signs { signs, ends };
             known.add(Inference::new(source, what, Confidence::Inferred, when));
