@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use bagreel::internals::base::notice::NoticeKind;
-use bagreel::internals::base::time::Stamp;
+use bagreel::internals::base::time::{Moment, Stamp};
 use bagreel::internals::mission::event_log::Kind;
 use bagreel::internals::mission::info::{Info, info};
 use bagreel::{Mission, Reading, read};
@@ -134,6 +134,39 @@ fn messages_before_a_simulation_runs_are_set_aside_however_many() {
         assert!(mission.span.nanos() < 6 * SECOND);
         assert_eq!(warnings(&mission).is_empty(), messages == 200);
     }
+}
+
+#[test]
+fn a_part_is_cut_out_by_the_times_that_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |reading: &Reading| {
+        let mission = sound(reading);
+        (mission.messages, mission.span.nanos() / SECOND)
+    };
+    let part = |bag: &Recording, change: &dyn Fn(&mut Reading)| {
+        let mut reading = Reading::of(written(folder.path(), &[("one.bag", bag)]));
+        change(&mut reading);
+        of(&reading)
+    };
+    let late = |reading: &mut Reading| reading.division.start = Some(Moment::AfterStart(SECOND));
+    let early = |reading: &mut Reading| reading.division.end = Some(Moment::AfterStart(SECOND));
+    let mut bag = wall();
+    simulated(&mut bag, &[(100, 1)]);
+    assert_eq!(part(&bag, &late), (20, 1));
+    assert_eq!(part(&bag, &early), (10, 1));
+    // The clock goes back by two seconds after three.
+    let mut bag = wall();
+    let again = |n| (0, ORIGIN + SECOND + n * SECOND / 10, Vec::new());
+    bag.messages.extend((0..100).map(again));
+    let other = bag.publisher("/other", "/other", "std_msgs/Empty");
+    let beside: Vec<_> = bag
+        .messages
+        .iter()
+        .map(|m| (other, m.1, Vec::new()))
+        .collect();
+    bag.messages.extend(beside);
+    assert_eq!(part(&bag, &early).1, 1);
+    assert_eq!(part(&bag, &|_| ()).0, 260);
 }
 
 /// The summary of one bag.

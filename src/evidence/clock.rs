@@ -74,6 +74,11 @@ fn begins_at_0(bag: &Calendar) -> bool {
     bag.zeros == 1 || bag.zeros > 0 && bag.next.is_none_or(|next| next.0 <= GAP_NS)
 }
 
+/// Whether all times between the first and the last of some bags may be credible, as far as these show.
+pub(crate) fn is_sure(bags: Span) -> bool {
+    bags.start != Stamp(0) && bags.nanos() <= FAR_DAYS * DAY
+}
+
 /// The credible days of a bag, and a sentence about clock jumps between them; `None` for a bag without messages.
 fn of_bag(bag: &Calendar) -> Option<(DayCluster, Option<String>)> {
     let mut days = bag.days.clone();

@@ -4,9 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
-use super::clock::{Belief, believed};
-use super::offsets::{ClockOffset, offsets};
-
 use crate::bag::{Connection, Message, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::is_log;
@@ -18,7 +15,6 @@ use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::numbers::Numbers;
 use crate::evidence::observation::{Observations, SourceId};
-use crate::evidence::publishers;
 use crate::evidence::source::equal_stamps::FirstHeader;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
@@ -354,27 +350,6 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
-        let belief = believed(self.messages.calendars());
-        // What is set aside may show by how much clocks differ.
-        let mut offsets = offsets(&self.streams, &self.facts).map_err(spool_error)?;
-        let others = self.set_aside(&belief).map_err(spool_error)?;
-        offsets.extend(others);
-        let jumps = belief.jumps.into_iter();
-        self.notices
-            .extend(jumps.map(|text| Notice::new(NoticeKind::Note, text)));
-        source::rosout::interpret_lists(&mut self.facts);
-        let (streams, facts) = (&mut self.streams, &mut self.facts);
-        let judged = publishers::judge(streams, facts, &mut self.messages, &self.numbers);
-        self.notices.extend(judged.map_err(spool_error)?);
-        if self.facts.dropped > 0 {
-            let text = "there are implausibly many or long names: an observation was left out";
-            self.notices.add(Notice::counted(
-                NoticeKind::Damaged,
-                self.facts.dropped,
-                text,
-            ));
-        }
-        self.facts.seal();
         self.texts.sort();
         let mut all = Recorded {
             texts: self.texts,
@@ -383,57 +358,10 @@ impl Collector {
             numbers: self.numbers,
             facts: self.facts,
             notices: self.notices,
-            falls: Vec::new(),
-            overlaps: false,
-            offsets,
-            span: None,
+            ..Recorded::default()
         };
-        all.span = all.measure();
+        all.judge().map_err(spool_error)?;
         Ok(all)
-    }
-
-    /// Removes the messages at incredible times, and everything that they state: they prove nothing. Returns the offsets of
-    /// other clocks so that their first messages are together.
-    fn set_aside(&mut self, belief: &Belief) -> io::Result<Vec<ClockOffset>> {
-        let Some(span) = belief.span else {
-            return Ok(Vec::new());
-        };
-        let before = self.firsts();
-        let mut aside = 0;
-        for stream in &self.streams {
-            aside += self.messages.clip(stream.times, span)?;
-        }
-        self.facts.clip(span)?;
-        let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
-        self.facts.headers.retain(|at, _| has_messages(at));
-        self.numbers.values_mut().for_each(|own| own.clip(span));
-        self.texts.retain(|(time, _)| span.contains(*time));
-        let text = "message at an impossible time, set aside";
-        let notice = Notice::counted(NoticeKind::ImpossibleTime, aside, text);
-        self.notices.add(notice);
-        let kept = self.firsts().into_iter().min_by_key(|(_, first)| *first);
-        let offset = |bag: &usize| {
-            let ((other, start), first) = kept.zip(before.get(bag))?;
-            Some(ClockOffset {
-                bag: *bag,
-                other,
-                ahead: first.since(start),
-                messages: 0,
-            })
-        };
-        Ok(belief.others.iter().filter_map(offset).collect())
-    }
-
-    /// The time of the first message of each bag.
-    fn firsts(&self) -> BTreeMap<usize, Stamp> {
-        let mut firsts = BTreeMap::new();
-        for stream in &self.streams {
-            if let Some((first, _)) = self.messages.bounds(stream.times) {
-                let own = firsts.entry(stream.bag).or_insert(first);
-                *own = first.min(*own);
-            }
-        }
-        firsts
     }
 }
 

@@ -10,6 +10,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::words;
+use crate::evidence::clock;
 use crate::evidence::collector::{self, Collector, Recorded};
 use crate::evidence::offsets::ClockOffset;
 use crate::graph::window;
@@ -35,9 +36,14 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     let readers = readers.map(|(reader, input)| Ok(in_time(reading, input, reader?)));
     let mut readers = readers.collect::<Result<Vec<_>>>()?;
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
-    // If time goes back, a part of the mission is not a range of times.
-    let cut = cut && readers.iter().all(|reader| reader.is_straight());
-    let known = if cut { known_span(&mut readers)? } else { None };
+    // If time goes back, a part of the mission is not a range of times: such a part is cut out once all is read.
+    let is_range = cut && readers.iter().all(|reader| reader.is_straight());
+    let known = if is_range {
+        known_span(&mut readers)?
+    } else {
+        None
+    };
+    let known = known.filter(|span| clock::is_sure(*span));
     let range = known
         .map(|span| window::range(&reading.division, span))
         .transpose()?;
@@ -69,8 +75,15 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         }
     }
     let mut recorded = collector.finish()?;
-    if let Some((range, known)) = range.zip(known) {
-        recorded.mark_outside(range.start <= known.start);
+    let Some(whole) = known.or(recorded.span) else {
+        return Err(no_messages(&reading.inputs, &recorded.notices));
+    };
+    let range = match range {
+        Some(range) => range,
+        None => window::range(&reading.division, whole)?,
+    };
+    if cut {
+        recorded.cut(range, range.start <= whole.start)?;
     }
     recorded.notices.extend(twice);
     let offsets = recorded.offsets.iter();
@@ -93,13 +106,9 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
         let text = format!("{SET_BACK} {length}; the two runs {shown}");
         recorded.notices.add(Notice::new(NoticeKind::Note, text));
     }
-    let Some(span) = recorded.span else {
+    if recorded.span.is_none() {
         return Err(no_messages(&reading.inputs, &recorded.notices));
-    };
-    let range = match range {
-        Some(range) => range,
-        None => window::range(&reading.division, span)?,
-    };
+    }
     Ok(Collected {
         reports,
         recorded,

@@ -10,7 +10,7 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
-/// Every input once, with a notice for duplicates, which would be counted twice.
+/// Every input once, sorted by name, with a notice for duplicates, which would be counted twice.
 pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     let mut seen = BTreeMap::new();
     let (mut once, mut twice) = (Vec::new(), Vec::new());
@@ -41,6 +41,8 @@ pub(super) fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
             twice.push(Notice::new(NoticeKind::Note, text));
         }
     }
+    // The order in which they are given does not matter.
+    once.sort_by_key(|input| (input.name(), input.given()));
     refuse_copies(&once)?;
     Ok((once, twice))
 }

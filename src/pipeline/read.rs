@@ -328,13 +328,9 @@ fn mission(
 
 /// Sorts bags by their first messages, then by name: the order in which they were given does not matter.
 fn in_order(bags: &mut Vec<Report>, recorded: &Recorded) {
-    let mut first = vec![Stamp::MAX; bags.len()];
-    for stream in &recorded.streams {
-        if let Some((begin, _)) = recorded.messages.bounds(stream.times) {
-            first[stream.bag] = first[stream.bag].min(begin);
-        }
-    }
-    let mut all: Vec<_> = first.into_iter().zip(bags.drain(..)).collect();
+    let firsts = recorded.firsts();
+    let first = |bag| firsts.get(&bag).copied().unwrap_or(Stamp::MAX);
+    let mut all: Vec<_> = (0..).map(first).zip(bags.drain(..)).collect();
     all.sort_by(|(a, x), (b, y)| (a, &x.name).cmp(&(b, &y.name)));
     bags.extend(all.into_iter().map(|(_, bag)| bag));
 }
