@@ -1,7 +1,5 @@
 //! Reads every bag once and gathers its evidence.
 
-use std::path::PathBuf;
-
 use super::inputs::{check_named, each_once, in_time, space_of};
 use super::{Reading, Watch};
 use crate::bag::straight::{self, ClockFall, Straightened, Watched};
@@ -169,8 +167,11 @@ pub(super) fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
         .collect();
     Error::NoMessages {
         path: inputs
-            .first()
-            .map_or_else(PathBuf::new, |i| PathBuf::from(i.name())),
+            .iter()
+            .map(Input::name)
+            .min()
+            .unwrap_or_default()
+            .into(),
         hint: if lost.is_empty() {
             NOTHING_RECORDED.to_owned()
         } else {
