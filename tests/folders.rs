@@ -393,10 +393,8 @@ fn copies_of_one_recording_are_refused() {
             let both = line.replace('F', &format!("F {other}"));
             let (code, said, _) = bagreel(folder.path(), &both, "run.mcap");
             assert_eq!(code, 2, "{both}: {said}");
-            assert!(
-                said.contains("the same messages as `run.mcap`"),
-                "{both}: {said}"
-            );
+            let advice = format!("`run.mcap` contains the same messages as `{other}`");
+            assert!(said.contains(&advice), "{both}: {said}");
         }
         let both = line.replace('F', "F other.mcap");
         let (code, said, _) = bagreel(folder.path(), &both, "run.mcap");
