@@ -37,8 +37,7 @@ pub(crate) use model::Growing;
 #[doc(hidden)]
 pub use model::Growth;
 pub use model::{
-    ChunkCounts, Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink,
-    Tier, Want,
+    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
 use unknown::explain;
 

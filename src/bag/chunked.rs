@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::bag::adapters::{Clip, GROUP, in_order, share};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{ChunkCounts, Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -116,7 +116,6 @@ struct Indexed<G> {
     plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
     verify: bool,
-    chunk_counts: Option<ChunkCounts>,
     grammar: PhantomData<fn() -> G>,
 }
 
@@ -148,7 +147,6 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 plan,
                 facts,
                 verify: options.verify,
-                chunk_counts: options.chunk_counts,
                 grammar,
             }))
         }
@@ -241,7 +239,6 @@ impl<G: Grammar> Indexed<G> {
         let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
         Want::resolve(&mut wants);
         let chunks = plan.within(range);
-        let (chunks, tier) = self.by_chunk_counts(plan, chunks, range, sink);
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
@@ -259,35 +256,8 @@ impl<G: Grammar> Indexed<G> {
             .collect();
         Report {
             complete: !sink.lost,
-            ..self.report(tier, &compression)
+            ..self.report(Tier::Index, &compression)
         }
-    }
-
-    /// Counts chunks as a whole where that is requested and sufficient; returns the other chunks and the tier that
-    /// results.
-    fn by_chunk_counts<'p>(
-        &self,
-        plan: &ChunkPlan,
-        chunks: Vec<&'p Chunk>,
-        range: Option<Span>,
-        sink: &mut Clip<'_>,
-    ) -> (Vec<&'p Chunk>, Tier) {
-        let Some(chunk_counts) = self.chunk_counts else {
-            return (chunks, Tier::Index);
-        };
-        let is_inside = |c: &Chunk| range.is_none_or(|r| r.contains(c.first) && r.contains(c.last));
-        let left = chunks.into_iter().filter(|chunk| {
-            let window = chunk_counts.window(chunk.first);
-            let is_one = window == chunk_counts.window(chunk.last) && is_inside(chunk);
-            let Some(counts) = is_one.then(|| plan.chunk_count(chunk)).flatten() else {
-                return true;
-            };
-            for (connection, count) in counts {
-                sink.chunk_count(connection, window, count);
-            }
-            false
-        });
-        (left.collect(), Tier::Chunks)
     }
 
     fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {

@@ -8,7 +8,7 @@ use crate::base::error::Result;
 use crate::base::ids::ids;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::{Period, Span, Stamp};
+use crate::base::time::{Span, Stamp};
 use crate::base::words::worded;
 
 /// The serialisation of a payload.
@@ -125,14 +125,6 @@ pub trait Sink {
     /// wanted), contains each payload's size in bytes and is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
-    /// Takes the number of messages of one connection in the window that begins at `window`, without their
-    /// stamps; only if [`OpenOptions::chunk_counts`] requests it.
-    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
-        if let Some(sink) = self.behind() {
-            sink.chunk_count(connection, window, count);
-        }
-    }
-
     /// Takes a wanted message.
     fn message(&mut self, message: Message<'_>) {
         if let Some(sink) = self.behind() {
@@ -162,8 +154,6 @@ worded! {
         /// By its index: only wanted payloads are read.
         #[default]
         Index = "index",
-        /// By the message counts per chunk in its tail; by the index only if a chunk spans several windows.
-        Chunks = "chunks",
         /// Record by record from the front.
         Forward = "forward",
         /// By a second, independent reader of the whole bag.
@@ -249,26 +239,6 @@ pub(crate) trait Growing: Send {
 pub struct OpenOptions {
     /// Read everything by the second, independent reader instead (tier `verify`).
     pub verify: bool,
-    /// How to count by chunks where that suffices; `None` to count message by message.
-    pub chunk_counts: Option<ChunkCounts>,
-}
-
-/// How to count a chunk that lies in a single window as a whole, without reading it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ChunkCounts {
-    /// The start of one of the windows.
-    pub origin: Stamp,
-    /// The length of all windows.
-    pub period: Period,
-}
-
-impl ChunkCounts {
-    /// The start of the window that contains `at`; saturates at the ends of the range.
-    pub fn window(&self, at: Stamp) -> Stamp {
-        let (origin, period) = (i128::from(self.origin.0), i128::from(self.period.nanos()));
-        let start = (i128::from(at.0) - origin).div_euclid(period) * period + origin;
-        Stamp(i64::try_from(start).unwrap_or(i64::MIN))
-    }
 }
 
 /// The longest payload or connection record kept in memory, in bytes.

@@ -54,11 +54,6 @@ impl Sink for MovedSink<'_> {
         self.sink.stamps(connection, &stamps, sizes);
     }
 
-    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
-        self.sink
-            .chunk_count(connection, window.plus(self.by), count);
-    }
-
     fn message(&mut self, message: Message<'_>) {
         let time = message.time.plus(self.by);
         self.sink.message(Message { time, ..message });

@@ -410,11 +410,6 @@ impl Sink for PartsAdapter<'_> {
         self.sink.stamps(id, stamps, sizes);
     }
 
-    fn chunk_count(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
-        let id = self.part.ids[connection.0 as usize];
-        self.sink.chunk_count(id, window, count);
-    }
-
     fn message(&mut self, message: Message<'_>) {
         let connection = self.part.ids[message.connection.0 as usize];
         self.sink.message(Message {

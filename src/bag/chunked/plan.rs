@@ -22,8 +22,6 @@ pub(crate) struct Chunk {
     pub(crate) last: Stamp,
     /// The expected sum of its index; `None` if it has none.
     pub(crate) promised: Option<IndexSum>,
-    /// The range of its message counts in [`ChunkPlan::counts`]; empty if they are not kept.
-    pub(crate) counts: Range<usize>,
     /// The time that its messages cover, if it was inspected.
     pub(crate) seen: Option<Span>,
 }
@@ -51,8 +49,6 @@ pub(crate) struct ChunkPlan {
     pub(crate) connections: Connections,
     /// The chunks in file order, without duplicates or overlaps.
     pub(crate) chunks: Vec<Chunk>,
-    /// The stated message count per connection, by its number in the bag, chunk after chunk.
-    pub(crate) counts: Vec<(u32, u32)>,
     /// The part of the file that contains the chunks.
     pub(crate) body: Range<u64>,
 }
@@ -63,32 +59,7 @@ pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 /// The most chunks that are all inspected to determine the covered time.
 const MOST_LOOKED_INTO: usize = 512;
 
-/// The most message counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
-const MOST_COUNTS: usize = 1 << 21;
-
 impl ChunkPlan {
-    /// Keeps the counts of a chunk, all of them or none.
-    pub(crate) fn keep(&mut self, counts: &[(u32, u32)]) -> Range<usize> {
-        let start = self.counts.len();
-        if start + counts.len() <= MOST_COUNTS {
-            self.counts.extend_from_slice(counts);
-        }
-        start..self.counts.len()
-    }
-
-    /// The stated message count of a chunk per connection; `None` if a connection is not described or the counts are
-    /// inconsistent.
-    pub(super) fn chunk_count(&self, chunk: &Chunk) -> Option<Vec<(ConnectionId, u64)>> {
-        let counts = self.counts.get(chunk.counts.clone())?;
-        let known = |(raw, count): &(u32, u32)| {
-            let id = self.connections.get(*raw);
-            id.map(|id| (id, u64::from(*count)))
-        };
-        let chunk_count: Vec<_> = counts.iter().map(known).collect::<Option<_>>()?;
-        let sum: u64 = chunk_count.iter().map(|(_, count)| count).sum();
-        (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(chunk_count)
-    }
-
     /// The number of bytes of the longest index.
     pub(super) fn longest_index(&self) -> u64 {
         let len = |c: &Chunk| c.index.end - c.index.start;

@@ -126,8 +126,11 @@ impl Summary {
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
                 op::CHUNK_INDEX => {
-                    let index = chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
-                    self.chunk(index)?;
+                    if self.plan.chunks.len() >= MOST_CHUNKS {
+                        return Err(NoRecord::Broken);
+                    }
+                    let chunk = chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
+                    self.plan.chunks.push(chunk);
                 }
                 _ => {}
             }
@@ -148,16 +151,6 @@ impl Summary {
                 connections.add(raw, connection);
             }
         }
-        Ok(())
-    }
-
-    fn chunk(&mut self, index: ChunkIndex) -> Result<(), NoRecord> {
-        let ChunkIndex { chunk, counts } = index;
-        if self.plan.chunks.len() >= MOST_CHUNKS {
-            return Err(NoRecord::Broken);
-        }
-        let counts = self.plan.keep(&counts);
-        self.plan.chunks.push(Chunk { counts, ..chunk });
         Ok(())
     }
 
@@ -263,14 +256,8 @@ fn statistics(record: &[u8]) -> Option<Statistics> {
     })
 }
 
-/// A chunk index record.
-struct ChunkIndex {
-    chunk: Chunk,
-    /// Message counts by channel.
-    counts: Vec<(u32, u32)>,
-}
-
-fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
+/// The chunk of a chunk index record.
+fn chunk_index(record: &[u8], used: &mut Used) -> Option<Chunk> {
     let mut cursor = FieldCursor(record);
     let (first, last) = (cursor.u64()?, cursor.u64()?);
     let (start, len) = (cursor.u64()?, cursor.u64()?);
@@ -284,20 +271,14 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
         return None;
     }
     let counts = counts(offsets, behind, end);
-    let promised = counts.as_ref().map(|counts| promised(counts, used));
-    let chunk = Chunk {
+    Some(Chunk {
         start,
         index: behind..end,
         end,
         first: Stamp::from_nanos(first),
         last: Stamp::from_nanos(last),
-        promised,
-        counts: 0..0,
+        promised: counts.map(|counts| promised(&counts, used)),
         seen: None,
-    };
-    Some(ChunkIndex {
-        chunk,
-        counts: counts.unwrap_or_default(),
     })
 }
 

@@ -140,8 +140,7 @@ impl Tail {
         else {
             return Err(NoRecord::Broken);
         };
-        let (promised, counts) = self.promised(stream, count, len)?;
-        let counts = self.plan.keep(&counts);
+        let promised = self.promised(stream, count, len)?;
         self.plan.chunks.push(Chunk {
             start: pos,
             index: 0..0,
@@ -149,21 +148,19 @@ impl Tail {
             first: start,
             last: end,
             promised: Some(promised),
-            counts,
             seen: None,
         });
         Ok(())
     }
 
-    /// The counts of a chunk info record.
+    /// The sum of a chunk info record.
     fn promised(
         &mut self,
         stream: &mut ByteStream<'_>,
         count: u32,
         len: u32,
-    ) -> Result<(IndexSum, Vec<(u32, u32)>), NoRecord> {
+    ) -> Result<IndexSum, NoRecord> {
         let mut sum = IndexSum::default();
-        let mut counts = Vec::new();
         if u64::from(count) * 8 != u64::from(len) {
             return Err(NoRecord::Broken);
         }
@@ -172,13 +169,12 @@ impl Tail {
             let raw = records::u32_at(pair, 0).ok_or(NoRecord::Cut)?;
             let messages = records::u32_at(pair, 4).ok_or(NoRecord::Cut)?;
             sum.add(raw, messages);
-            counts.push((raw, messages));
             if messages > 0 {
                 self.used.add(raw);
             }
             stream.advance(8);
         }
-        Ok((sum, counts))
+        Ok(sum)
     }
 
     /// Sorts the chunks and sets the end of each.
