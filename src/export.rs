@@ -126,11 +126,14 @@ pub const FORMATS: &[OutputFormat] = &[
         start: |sequence, target| tables::start(sequence, target, TableFormat::Csv),
         ..DATA
     },
-    #[cfg(feature = "parquet")]
     OutputFormat {
         word: "parquet",
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
-        check: Some(tables::check),
+        check: Some(|target| {
+            TableFormat::Parquet
+                .built()
+                .and_then(|_| tables::check(target))
+        }),
         start: |sequence, target| tables::start(sequence, target, TableFormat::Parquet),
         ..DATA
     },

@@ -67,7 +67,7 @@
 //! same bytes for the same bag.
 
 #![cfg_attr(
-    not(all(feature = "cli", feature = "parquet", feature = "pdf")),
+    not(all(feature = "cli", feature = "pdf")),
     allow(
         dead_code,
         unreachable_pub,

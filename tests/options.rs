@@ -88,7 +88,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("info", "s.mcap", "--source ws"),
     ("info", "r.bag", "--infer stamps"),
     ("extract", "r.bag", "--output out/y.csv"),
-    ("extract", "r.bag -o out/x.csv", "--format parquet"),
+    ("extract", "r.bag -o out/x.dat", "--format csv"),
     ("extract", "r.bag -o out", "--fields"),
     ("extract", "own.db3 --fields -o out", "--msg-path msgs"),
     ("extract", "r.bag -o out/x.csv", "--topic-filter /chat"),

@@ -628,6 +628,28 @@ fn a_recorder_is_not_a_subscriber() {
     assert_eq!(recorder, counted("/record_12345,[],[]\n"));
 }
 
+#[cfg(not(feature = "parquet"))]
+#[test]
+fn a_build_without_parquet_names_those_with_it() {
+    println!("skipped: Parquet, which needs `--features parquet`");
+    let dir = tempfile::tempdir().unwrap();
+    for args in [
+        &["render", WAREHOUSE, "-o", "x.parquet"][..],
+        &["extract", WAREHOUSE, "-o", "x.parquet"],
+        &[
+            "extract", WAREHOUSE, "-o", "x", "--fields", "--format", "parquet",
+        ],
+        &["info", WAREHOUSE, "--format", "parquet"],
+    ] {
+        let said = ends(dir.path(), args, 2);
+        assert!(
+            said.contains("does not write Parquet") && said.contains("--features parquet"),
+            "{args:?}: {said}"
+        );
+    }
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
 #[cfg(feature = "parquet")]
 mod parquet {
     use std::fs::File;
@@ -682,7 +704,10 @@ mod parquet {
     #[test]
     fn fields_keep_their_types() {
         let dir = tempfile::tempdir().unwrap();
-        ends(dir.path(), &["extract", COURIER, "-o", "t", "--fields"], 0);
+        let args = [
+            "extract", COURIER, "-o", "t", "--fields", "--format", "parquet",
+        ];
+        ends(dir.path(), &args, 0);
         let kind = |table: &str, path: &str| {
             let columns = columns(&dir.path().join(table));
             let column = columns.iter().find(|c| c.path().string() == path).unwrap();

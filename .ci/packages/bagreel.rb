@@ -10,7 +10,7 @@ class Bagreel < Formula
   depends_on "rust" => :build
 
   def install
-    system "cargo", "install", *std_cargo_args
+    system "cargo", "install", *std_cargo_args(features: "parquet")
     generate_completions_from_executable(bin/"bagreel", "completions")
     pages = Utils.safe_popen_read(bin/"bagreel", "man")
     (man1/"bagreel.1").write pages

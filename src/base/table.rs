@@ -136,24 +136,6 @@ impl ColumnValues {
         }
     }
 
-    fn bytes(&self) -> usize {
-        match self {
-            Self::Flag(v) => size_of_val(&v[..]),
-            Self::I8(v) => size_of_val(&v[..]),
-            Self::U8(v) => size_of_val(&v[..]),
-            Self::I16(v) => size_of_val(&v[..]),
-            Self::U16(v) => size_of_val(&v[..]),
-            Self::I32(v) => size_of_val(&v[..]),
-            Self::U32(v) => size_of_val(&v[..]),
-            Self::F32(v) => size_of_val(&v[..]),
-            Self::I64(v) => size_of_val(&v[..]),
-            Self::U64(v) => size_of_val(&v[..]),
-            Self::F64(v) => size_of_val(&v[..]),
-            Self::Texts(v) => v.bytes.len() + size_of_val(&v.ends[..]),
-            Self::Words(v) => v.words.bytes.len() + size_of_val(&v.numbers[..]),
-        }
-    }
-
     /// Adds a placeholder for an unknown value.
     fn push_blank(&mut self) {
         match self {
@@ -242,11 +224,6 @@ impl TableColumn {
         if let Some(valid) = &mut self.valid {
             valid.truncate(rows);
         }
-    }
-
-    fn bytes(&self) -> usize {
-        let ends: usize = self.lists.iter().map(|ends| size_of_val(&ends[..])).sum();
-        ends + self.values.bytes() + self.valid.as_ref().map_or(0, Vec::len)
     }
 
     /// Adds a cell; a cell of another kind than the column becomes unknown.
@@ -354,11 +331,6 @@ impl Batch {
             column.push(cell);
         }
         self.rows += 1;
-    }
-
-    /// The memory used by its values, in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        self.columns.iter().map(TableColumn::bytes).sum()
     }
 
     /// Removes the cells of an incomplete last row.

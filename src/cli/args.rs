@@ -12,6 +12,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::base::error::Error;
 use crate::base::time::{Moment, Period};
 use crate::export::tables::TableFormat;
 use crate::graph::diff::RATE_CHANGE;
@@ -177,17 +178,18 @@ pub(super) enum InfoFormat {
     Text,
     Json,
     Csv,
-    #[cfg(feature = "parquet")]
     Parquet,
 }
 
 impl InfoFormat {
     /// The table format; CSV if the format is not one.
-    pub(super) fn of_table(self) -> TableFormat {
+    ///
+    /// # Errors
+    /// If this build does not write it.
+    pub(super) fn of_table(self) -> Result<TableFormat, Error> {
         match self {
-            #[cfg(feature = "parquet")]
-            Self::Parquet => TableFormat::Parquet,
-            _ => TableFormat::Csv,
+            Self::Parquet => TableFormat::Parquet.built(),
+            _ => Ok(TableFormat::Csv),
         }
     }
 }

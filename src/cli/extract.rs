@@ -62,7 +62,7 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
 fn format(args: &ExtractArgs, target: &Target) -> Result<TableFormat, Error> {
     match (&args.format, target.extension()) {
         (Some(word), _) => TableFormat::parse(word),
-        (None, _) if args.fields => Ok(*TableFormat::ALL.last().unwrap_or(&TableFormat::Csv)),
+        (None, _) if args.fields => Ok(TableFormat::Csv),
         (None, Some(word)) => TableFormat::parse(&word),
         (None, None) => Err(Error::usage(
             format!("`{}` has no known extension", args.output),

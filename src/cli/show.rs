@@ -114,13 +114,6 @@ fn events_of_folder(
 }
 
 /// Prints the summary of a mission, or a row for each bag of a folder.
-#[cfg_attr(
-    not(feature = "parquet"),
-    expect(
-        clippy::match_wildcard_for_single_variants,
-        reason = "with Parquet, there are two tables"
-    )
-)]
 pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
     let time = TimeArgs {
         period: Some(Length::Parts(PARTS)),
@@ -134,6 +127,7 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
         &args.graph,
     )?;
     applies::check_inputs(given, &reading)?;
+    let table = args.format.of_table()?;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {
@@ -145,7 +139,7 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
         match args.format {
             InfoFormat::Text => terminal.results(&survey_text(&rows, terminal.width()))?,
             InfoFormat::Json => terminal.results(&json(&rows))?,
-            table => terminal.table(&survey_file(&rows, table.of_table())?)?,
+            _ => terminal.table(&survey_file(&rows, table)?)?,
         }
         return Ok(if skipped { SKIPPED } else { DONE });
     }
@@ -164,11 +158,11 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
             terminal.results(&crate::mission::info::text(&info(), terminal.width()))?;
         }
         InfoFormat::Json => terminal.results(&json(&info()))?,
-        table => {
+        _ => {
             let bag = mission.bags.first();
             let name = bag.map_or_else(String::new, |bag| bag.name.clone());
             let row = SurveyRow::of(name, &mission);
-            terminal.table(&survey_file(&[row], table.of_table())?)?;
+            terminal.table(&survey_file(&[row], table)?)?;
         }
     }
     terminal.notices(&mission.notices);

@@ -86,7 +86,7 @@ impl<W: Write + Send> Rows<W> {
 
     /// The number of bytes of rows in memory.
     pub(crate) fn held(&self) -> usize {
-        self.waiting.iter().map(Batch::bytes).sum()
+        self.waiting.iter().map(memory).sum()
     }
 
     /// Writes the rows in memory as one group.
@@ -114,6 +114,34 @@ impl<W: Write + Send> Rows<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         self.unload()?;
         self.writer.into_inner().map_err(io::Error::other)
+    }
+}
+
+/// The memory used by the values of a batch, in bytes.
+fn memory(batch: &Batch) -> usize {
+    let columns = batch.columns.iter().map(|column| {
+        let ends = column.lists.iter().map(|ends| size_of_val(&ends[..]));
+        let valid = column.valid.as_ref().map_or(0, Vec::len);
+        ends.sum::<usize>() + valid + memory_of(&column.values)
+    });
+    columns.sum()
+}
+
+fn memory_of(values: &ColumnValues) -> usize {
+    match values {
+        ColumnValues::Flag(v) => size_of_val(&v[..]),
+        ColumnValues::I8(v) => size_of_val(&v[..]),
+        ColumnValues::U8(v) => size_of_val(&v[..]),
+        ColumnValues::I16(v) => size_of_val(&v[..]),
+        ColumnValues::U16(v) => size_of_val(&v[..]),
+        ColumnValues::I32(v) => size_of_val(&v[..]),
+        ColumnValues::U32(v) => size_of_val(&v[..]),
+        ColumnValues::F32(v) => size_of_val(&v[..]),
+        ColumnValues::I64(v) => size_of_val(&v[..]),
+        ColumnValues::U64(v) => size_of_val(&v[..]),
+        ColumnValues::F64(v) => size_of_val(&v[..]),
+        ColumnValues::Texts(v) => v.bytes.len() + size_of_val(&v.ends[..]),
+        ColumnValues::Words(v) => v.words.bytes.len() + size_of_val(&v.numbers[..]),
     }
 }
 

@@ -152,7 +152,7 @@ def main():
                 differs(f"{bag.name}, messages", "the CSV file has others")
             # A table per topic with every field, and those of a mission.
             fields, mission = folder / f"{bag.name} fields", folder / f"{bag.name} mission"
-            bagreel("extract", bag, "-o", f"{fields}/", "--fields")
+            bagreel("extract", bag, "-o", f"{fields}/", "--fields", "--format", "parquet")
             mission.mkdir()
             bagreel("render", bag, "-o", mission / "x.parquet", "--period", "10s")
             files = sorted([*fields.glob("*.parquet"), *mission.rglob("*.parquet")])

@@ -153,7 +153,7 @@ def missions_are_judged():
         assert not other.same and len(other) > 50 and other[0]["kind"] == "node" and page.exists()
         assert bagreel.diff(COURIER, COURIER).same
         table = bagreel.extract(COURIER, Path(folder) / "t", fields=True, topic_filter="/scan")
-        assert sorted(path.name for path in table.iterdir()) == ["index.parquet", "scan.parquet"]
+        assert sorted(path.name for path in table.iterdir()) == ["index.csv", "scan.csv"]
 
 
 def signatures_are_those_of_the_command():

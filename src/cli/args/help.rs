@@ -61,8 +61,8 @@ const SCREENS: [(&str, &str, &str); 13] = [
         "output format fields msg_path topic_filter start end",
         "
   bagreel extract run.bag -o messages.csv             one row per message
-  bagreel extract run.mcap --fields -o fields/        one Parquet table per topic, one column per field
-  bagreel extract run.bag --topic-filter '/robot1/.*' --start 60 -o part.parquet   some topics, from 1:00",
+  bagreel extract run.mcap --fields -o fields/        one table per topic, one column per field
+  bagreel extract run.bag --topic-filter '/robot1/.*' --start 60 -o part.csv   some topics, from 1:00",
     ),
     (
         "tables",

@@ -15,24 +15,15 @@ pub enum TableFormat {
     /// Comma-separated values, stamps as nanoseconds since 1970.
     #[default]
     Csv,
-    /// Apache Parquet, stamps as timestamps.
-    #[cfg(feature = "parquet")]
+    /// Apache Parquet, stamps as timestamps; written with the feature `parquet`.
     Parquet,
 }
 
 impl TableFormat {
-    /// All formats.
-    pub const ALL: &'static [Self] = &[
-        Self::Csv,
-        #[cfg(feature = "parquet")]
-        Self::Parquet,
-    ];
-
     /// Its name on the command line and its file extension.
     pub fn word(self) -> &'static str {
         match self {
             Self::Csv => "csv",
-            #[cfg(feature = "parquet")]
             Self::Parquet => "parquet",
         }
     }
@@ -40,18 +31,34 @@ impl TableFormat {
     /// The format of this word.
     ///
     /// # Errors
-    /// [`Error::Usage`] for another word.
+    /// [`Error::Usage`] for another word, and for a format that this build does not write.
     pub fn parse(word: &str) -> Result<Self> {
-        let found = Self::ALL.iter().find(|f| f.word() == word);
-        found.copied().ok_or_else(|| {
-            let all: Vec<&str> = Self::ALL.iter().map(|f| f.word()).collect();
-            Error::usage(
+        match word {
+            "csv" => Ok(Self::Csv),
+            "parquet" => Self::Parquet.built(),
+            _ => Err(Error::usage(
                 format!("`{word}` is not a format of tables"),
-                format!("formats: {}", all.join(", ")),
-            )
-        })
+                "formats: csv, parquet",
+            )),
+        }
+    }
+
+    /// The format, if this build writes it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if not, with the builds that do.
+    pub(crate) fn built(self) -> Result<Self> {
+        if self == Self::Parquet && cfg!(not(feature = "parquet")) {
+            return Err(Error::usage(
+                NO_PARQUET,
+                "packages and the Python wheel do, and `cargo install --path . --features parquet`",
+            ));
+        }
+        Ok(self)
     }
 }
+
+const NO_PARQUET: &str = "this build of bagreel does not write Parquet";
 
 /// A whole small table as bytes.
 ///
@@ -89,6 +96,8 @@ impl<W: Write + Send> Writer<W> {
                 let rows = parquet::Rows::new(to, batch, facts)?;
                 Ok(Self::Parquet(Box::new(rows)))
             }
+            #[cfg(not(feature = "parquet"))]
+            TableFormat::Parquet => Err(io::Error::other(NO_PARQUET)),
         }
     }
 
