@@ -15,7 +15,7 @@ from std_msgs.msg import String
 
 out = pathlib.Path(tempfile.mkdtemp())
 dots, data = str(out / "{n}.dot"), out / "windows.json"
-subprocess.run(["bagreel", "render", sys.argv[1], "--json", "windows", "-o", dots, "-o", str(data)], check=True)
+subprocess.run(["bagreel", "render", sys.argv[1], "-o", dots, "-o", str(data)], check=True)
 starts = [window["start_ns"] for window in json.loads(data.read_text())["windows"]]
 graphs = [path.read_text() for path in sorted(out.glob("*.dot"))]
 

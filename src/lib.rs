@@ -59,7 +59,7 @@
 //! Versions. Before 1.0 a minor version (0.2) may change this library: names, fields and signatures may
 //! change, and `CHANGELOG.md` lists each such change; a patch (0.1.1) changes none of them. Structs and enums
 //! that will grow are `#[non_exhaustive]`. The same applies to interfaces that other programs rely on: the
-//! exit codes, the JSON of missions (with a version in `schema`; older ones are read), columns of tables (new
+//! exit codes, the JSON of missions (with a version in `schema`), columns of tables (new
 //! ones may be added) and the keys of `graph.yaml`. Pictures may change in any version. The module
 //! `internals` is not part of the library.
 //!
@@ -143,7 +143,7 @@ pub mod values {
     pub use crate::mission::info::{
         BagInfo, ConfidenceCounts, EvidenceInfo, FigureInfo, NodeInfo, SurveyRow, TopicInfo,
     };
-    pub use crate::mission::{JsonForm, Place, Places};
+    pub use crate::mission::{Place, Places};
     pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};
     #[cfg(feature = "render")]
     pub use crate::{
@@ -155,7 +155,7 @@ pub mod values {
         draw::style::Color,
         draw::text::{Fonts, Weight},
         export::Written,
-        export::options::{Profile, SequenceOptions},
+        export::options::SequenceOptions,
         export::tables::TableFormat,
         export::target::Target,
         gate::{

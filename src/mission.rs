@@ -8,7 +8,7 @@ pub mod phases;
 mod json;
 pub use json::read::read_json;
 pub(crate) use json::write::Json;
-pub use json::write::{JsonForm, write_json};
+pub use json::write::write_json;
 
 use serde::{Deserialize, Serialize};
 

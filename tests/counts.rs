@@ -8,6 +8,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::support::windows;
+
 /// For each window in the data: the indices of its headlines.
 fn headlines(mission: &Value) -> Vec<BTreeSet<u64>> {
     let ledger = mission["events"].as_array().unwrap();
@@ -95,11 +97,12 @@ fn every_frame_has_the_counts_of_the_data() {
         let (lasting, over) = lasting(&mission);
         let reported = joined(&expected, &lasting);
         let changed = joined(&expected, &over);
+        let windows = windows::windows(&mission);
         for (index, shown) in reported.iter().enumerate() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, shown, &at);
-            alive(&svg, &mission["windows"][index], &at);
+            alive(&svg, &windows[index], &at);
             chart(&text(&format!("x{index:0digits$}.mmd")), shown, &at);
         }
         settled(&folder.path().join("x"), &reported, digits);

@@ -14,7 +14,7 @@ use bagreel::values::{EdgeId, TopicId};
 
 use crate::support::cdr::Cdr;
 use crate::support::rosbag1::{Pack, write};
-use crate::support::{ORIGIN, Recording};
+use crate::support::{ORIGIN, Recording, windows};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -801,12 +801,13 @@ fn publishers_without_messages_in_the_range_are_left_out() {
     assert!(command.arg(&json).status().unwrap().success());
     let mission: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
-    let nodes = mission["windows"][0]["nodes"].as_array().unwrap();
+    let first = &windows::windows(&mission)[0];
+    let nodes = first["nodes"].as_array().unwrap();
     let is_there = |name: &str| nodes.iter().any(|node| node["name"] == name);
     // It starts in the fifth minute and is named in the bag's headers.
     assert!(!is_there("/robot1/dock_controller") && is_there("/robot1/amcl"));
     // Conclusions from a node's name still apply to its topic.
-    let topics = mission["windows"][0]["topics"].as_array().unwrap();
+    let topics = first["topics"].as_array().unwrap();
     let joints = topics.iter().find(|t| t["name"] == "/robot1/joint_states");
     let evidence = joints.unwrap()["evidence"].as_array().unwrap();
     assert!(evidence.contains(&"contract".into()), "{evidence:?}");

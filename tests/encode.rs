@@ -56,7 +56,7 @@ fn mission(windows: usize) -> (Mission, View) {
     };
     let spans: Vec<String> = (0..windows).map(window).collect();
     let text = format!(
-        r#"{{"schema": "bagreel.evolution/2", "windows": [{}]}}"#,
+        r#"{{"schema": "bagreel.mission/3", "windows": [{}]}}"#,
         spans.join(", ")
     );
     let mission = read_json(&text, "mission.json".as_ref()).unwrap();

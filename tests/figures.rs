@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::{Value, json};
 
-use crate::support::{pdf::letters_pt, shared};
+use crate::support::{pdf::letters_pt, shared, windows};
 
 /// A figure as SVG text, or the command's error.
 fn figure(bag: &Path, flags: &[&str]) -> Result<String, String> {
@@ -367,7 +367,9 @@ fn large() -> Value {
             "subscribes": heard.collect::<Vec<_>>(),
         })
     };
-    json!({"schema": "bagreel.evolution/1", "bags": [{"name": "large", "format": "mcap"}], "windows": (0..12).map(window).collect::<Vec<_>>()})
+    let mut mission = windows::mission((0..12).map(window).collect());
+    mission["bags"] = json!([{"name": "large", "format": "mcap"}]);
+    mission
 }
 
 #[test]
@@ -424,31 +426,4 @@ fn options_without_effect_on_a_figure_are_refused() {
     ] {
         assert!(figure(&example(), flags).is_err(), "{flags:?}");
     }
-}
-
-#[test]
-fn render_still_draws_figures_and_suggests_the_new_command() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |args: &[&str], name: &str| {
-        let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-            .current_dir(&folder)
-            .args(args)
-            .arg(example())
-            .args(["--bare", "--width", "181mm", "-o", name])
-            .output()
-            .unwrap();
-        assert!(out.status.success());
-        let said = String::from_utf8(out.stderr).unwrap();
-        (
-            std::fs::read_to_string(folder.path().join(name)).unwrap(),
-            said,
-        )
-    };
-    let (old, said) = run(&["render", "--figure", "map"], "a.svg");
-    assert!(
-        said.contains("`bagreel figure --kind map` draws the same"),
-        "{said}"
-    );
-    let (new, said) = run(&["figure", "--kind", "map"], "b.svg");
-    assert!(old == new && !said.contains("removed"), "{said}");
 }

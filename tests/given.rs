@@ -9,7 +9,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::support::cdr::Cdr;
-use crate::support::{ORIGIN, Recording, mcap};
+use crate::support::{ORIGIN, Recording, mcap, windows};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -87,9 +87,9 @@ fn services_and_actions_of_a_file_are_drawn_between_nodes_and_hidden_on_request(
     );
     let dot = done(
         folder,
-        "render r.mcap --topology t.yaml -p all -o - --format dot --dot-profile plain",
+        "render r.mcap --topology t.yaml -p all -o - --format dot",
     );
-    assert!(dot.contains("label=\"/plan\", shape=hexagon"), "{dot}");
+    assert!(dot.contains("label=\"/plan\", shape=box"), "{dot}");
     // Recorders leave services out, so their absence in the bag is not reported.
     let (_, _, said) = bagreel(folder, "info r.mcap --topology t.yaml -v");
     assert!(!said.contains("/plan"), "{said}");
@@ -270,7 +270,8 @@ fn metrics_of_a_subscriber_are_those_of_its_only_topic() {
     let folder = folder(&bag, &ros2());
     let json = done(folder.path(), "render r.mcap -p all -o - --format json");
     let mission: Value = serde_json::from_str(&json).unwrap();
-    let edges = mission["windows"][0]["subscribes"].as_array().unwrap();
+    let windows = windows::windows(&mission);
+    let edges = windows[0]["subscribes"].as_array().unwrap();
     let slam = edges
         .iter()
         .find(|e| e["node"] == "/slam" && e["topic"] == "/scan")
@@ -302,7 +303,7 @@ fn rolling_statistics_count_each_message_once() {
     let folder = folder(&bag, &ros2());
     let json = done(folder.path(), "render r.mcap -p 5 -o - --format json");
     let mission: Value = serde_json::from_str(&json).unwrap();
-    for window in mission["windows"].as_array().unwrap() {
+    for window in windows::windows(&mission) {
         let edges = window["subscribes"].as_array().unwrap();
         let slam = edges.iter().find(|e| e["node"] == "/slam").unwrap();
         let near =

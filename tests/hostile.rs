@@ -136,7 +136,7 @@ fn user_files_are_not_overwritten() {
             "-o",
             "g.csv",
         ],
-        &["render", COURIER, "--captions", "c.md", "-o", "c.md"],
+        &["render", COURIER, "--phases", "c.md", "-o", "c.md"],
         &[
             "render", COURIER, "--style", "s.toml", "-o", "s.toml", "--format", "json",
         ],
@@ -219,7 +219,7 @@ fn tables_without_an_extension_get_csv() {
     );
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
     let tables = [
-        "bags", "changes", "edges", "ledger", "nodes", "phases", "topics",
+        "bags", "changes", "edges", "events", "nodes", "phases", "topics",
     ];
     assert_eq!(names(dir.path()), tables.map(|t| format!("x.{t}.csv")));
 }

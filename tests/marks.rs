@@ -82,7 +82,7 @@ fn bags() -> Vec<PathBuf> {
 fn rendered(bag: &Path, flags: &[&str], name: &str) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command.args(["render", "--quiet"]).arg(bag).args(flags);
+    command.args(flags).arg("--quiet").arg(bag);
     let done = command
         .arg("-o")
         .arg(folder.path().join(name))
@@ -189,7 +189,7 @@ fn every_mark_of_a_figure_is_an_event_of_the_log() {
             ("steps", "181mm"),
         ] {
             let at = format!("{figure} at {width} of {}", bag.display());
-            let flags = ["--figure", figure, "--width", width];
+            let flags = ["figure", "--kind", figure, "--width", width];
             let Some(svg) = rendered(&bag, &flags, "figure.svg") else {
                 continue;
             };
@@ -219,7 +219,7 @@ fn every_headline_is_marked_in_the_row_of_its_element() {
         let log = Log::of(&bag);
         for rows in ["nodes", "topics"] {
             let at = format!("{rows} of {}", bag.display());
-            let flags = ["--figure", "lives", "--width", "181mm", "--rows", rows];
+            let flags = ["figure", "--width", "181mm", "--rows", rows];
             let Some(svg) = rendered(&bag, &flags, "figure.svg") else {
                 continue;
             };
@@ -252,7 +252,7 @@ fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
     };
     let (handed, rates) = (of("handed_over"), of("rate"));
     assert!(handed.len() >= 2 && rates.len() >= 3);
-    let svg = rendered(bag, &["--figure", "lives"], "figure.svg").unwrap();
+    let svg = rendered(bag, &["figure"], "figure.svg").unwrap();
     let with = |svg: &str, class: &str| -> BTreeSet<u64> {
         let own = marks(svg);
         own.into_iter()
@@ -262,10 +262,15 @@ fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
     };
     assert_eq!(with(&svg, "handover"), handed);
     assert!(rates.is_subset(&with(&svg, "letter")), "{rates:?}");
-    let frame = rendered(bag, &["--view", "graph", "--period", "60"], "frame{n}.svg").unwrap();
+    let frame = rendered(
+        bag,
+        &["render", "--view", "graph", "--period", "60"],
+        "frame{n}.svg",
+    )
+    .unwrap();
     assert!(with(&frame, "handover").is_subset(&handed));
     assert_eq!(with(&frame, "mark"), headlines.keys().copied().collect());
-    let html = rendered(bag, &["--period", "60"], "page.html").unwrap();
+    let html = rendered(bag, &["render", "--period", "60"], "page.html").unwrap();
     let data = page(&html);
     let takeovers = data["takeovers"].as_array().unwrap().iter();
     let takeovers: BTreeSet<u64> = takeovers
@@ -293,12 +298,16 @@ fn the_marks_of_frames_strips_and_pages_are_events_too() {
     for bag in bags() {
         let log = Log::of(&bag);
         let at = bag.display().to_string();
-        let frames = rendered(&bag, &["--period", "60"], "frame{n}.svg").unwrap();
+        let frames = rendered(&bag, &["render", "--period", "60"], "frame{n}.svg").unwrap();
         shown(&log, &frames, &at);
-        if let Some(strip) = rendered(&bag, &["--view", "graph", "--strip", "3x2"], "strip.svg") {
+        if let Some(strip) = rendered(
+            &bag,
+            &["render", "--view", "graph", "--strip", "3x2"],
+            "strip.svg",
+        ) {
             shown(&log, &strip, &at);
         }
-        let html = rendered(&bag, &["--period", "60"], "page.html").unwrap();
+        let html = rendered(&bag, &["render", "--period", "60"], "page.html").unwrap();
         let data = page(&html);
         let id = |value: &Value| value.as_u64().unwrap();
         let lists = |key: &str| data[key].as_array().unwrap().iter();

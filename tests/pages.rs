@@ -7,7 +7,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::support::browser;
+use crate::support::{browser, windows};
 
 /// Runs `bagreel render` on this mission and returns the folder with `x.` and each of the extensions.
 fn rendered(mission: &Value, extensions: &[&str]) -> TempDir {
@@ -68,7 +68,9 @@ fn running(names: &[&str], windows: usize) -> Value {
         })
     };
     let windows: Vec<Value> = (0..windows).map(window).collect();
-    json!({"schema": "bagreel.evolution/1", "bags": [{"name": "mission", "format": "mcap"}], "windows": windows})
+    let mut mission = windows::mission(windows);
+    mission["bags"] = json!([{"name": "mission", "format": "mcap"}]);
+    mission
 }
 
 const ROBOT: [&str; 12] = [
@@ -201,7 +203,7 @@ fn a_page_lists_infrastructure_as_words() {
         })
     };
     let windows: Vec<Value> = (0..3).map(window).collect();
-    let mission = json!({"schema": "bagreel.evolution/1", "bags": [{"name": "m", "format": "mcap"}], "windows": windows});
+    let mission = windows::mission(windows);
     let page = read(&rendered(&mission, &["html"]), "x.html");
     let drawing = |key: &str| {
         let rest = page.split_once(key).unwrap_or_else(|| panic!("no {key}")).1;
@@ -253,7 +255,7 @@ fn phases_named_by_the_user_are_shown_everywhere() {
     let folder = TempDir::new().unwrap();
     let names = folder.path().join("names");
     fs::write(&names, "0|setting out\n60|coming home\n").unwrap();
-    let more = ["--captions", names.to_str().unwrap()];
+    let more = ["--phases", names.to_str().unwrap()];
     let pages = rendered_with(&running(&ROBOT, 12), &["html", "svg", "md"], &more);
     for name in ["x.html", "x.svg", "x.md"] {
         let text = read(&pages, name);
@@ -359,7 +361,7 @@ fn a_page_has_the_exact_rate_of_each_window() {
     let names = graph["names"].as_array().unwrap();
     let text = |value: usize| graph["labels"][value].as_str().unwrap();
     let (mut compared, mut empty) = (0, 0);
-    for (w, window) in (0..).zip(mission["windows"].as_array().unwrap()) {
+    for (w, window) in (0..).zip(windows::windows(&mission)) {
         for topic in window["topics"].as_array().unwrap() {
             let place = names.iter().rposition(|name| *name == topic["name"]);
             let (Some(place), Some(hz)) = (place, topic["hz"].as_f64()) else {

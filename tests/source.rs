@@ -527,7 +527,7 @@ fn inapplicable_options_are_refused() {
     let folder = folder(&[("/out", STRING)], &["/n"], &[PACKAGE]);
     fs::write(
         folder.path().join("x.json"),
-        "{\"schema\": \"bagreel.evolution/1\", \"windows\": []}",
+        "{\"schema\": \"bagreel.mission/3\", \"windows\": []}",
     )
     .unwrap();
     for (words, says) in [

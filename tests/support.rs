@@ -10,6 +10,7 @@ pub mod pdf;
 pub mod rosbag1;
 pub mod sqlite3;
 pub mod tiny;
+pub mod windows;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -730,7 +730,7 @@ mod parquet {
         let args = ["render", WAREHOUSE, "-o", "x.csv", "-o", "x.parquet"];
         ends(dir.path(), &args, 0);
         for table in [
-            "edges", "topics", "nodes", "changes", "ledger", "phases", "bags",
+            "edges", "topics", "nodes", "changes", "events", "phases", "bags",
         ] {
             let expected = csv(&dir.path().join(format!("x.{table}.csv")));
             let rows = parquet_rows(&dir.path().join(format!("x.{table}.parquet")));

@@ -96,7 +96,6 @@ fn the_user_chooses_between_graph_and_topic_timeline() {
         &["--view", "board", "--orientation", "TB"][..],
         &["--view", "board", "--collapse", "/nav"],
         &["--view", "board", "--strip", "3x2"],
-        &["--view", "board", "--figure", "lives"],
     ] {
         let (_folder, done) = rendered("courier.mcap", flags, &["x.svg"]);
         assert_eq!(done.status.code(), Some(2), "{flags:?}");
@@ -130,12 +129,8 @@ fn a_picture_for_paper_fits_a_column_and_reports_illegible_text() {
     assert!(
         said(&done).contains(" pt, too small to read") || smallest(&text(&folder, "0.svg")) >= 7.95
     );
-    for other in [
-        &["--size", "800x600"][..],
-        &["--width", "88mm"],
-        &["--figure", "lives"],
-    ] {
-        let flags = [&["--for", "page"], other].concat();
+    for other in [["--size", "800x600"], ["--width", "88mm"]] {
+        let flags = [["--for", "page"], other].concat();
         let (_folder, done) = rendered("warehouse.bag", &flags, &["x.pdf"]);
         assert_eq!(done.status.code(), Some(2), "{other:?}");
     }

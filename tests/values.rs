@@ -3,11 +3,8 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-
-use crate::support::{ORIGIN, Recording, rosbag1};
+use std::process::Command;
 
 fn example(name: &str) -> PathBuf {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
@@ -29,11 +26,16 @@ const FORMATS: &[&str] = &[
     #[cfg(feature = "parquet")]
     "x.parquet",
 ];
-/// Every file that `bagreel render` writes for `input`, by name.
-fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, Vec<u8>> {
+/// Every file that a command writes for `input`, by name.
+fn files(
+    subcommand: &str,
+    input: &Path,
+    formats: &[&str],
+    options: &[&str],
+) -> BTreeMap<String, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command.arg("render").arg(input).arg("-q").args(options);
+    command.arg(subcommand).arg(input).arg("-q").args(options);
     for name in formats {
         command.arg("-o").arg(folder.path().join(name));
     }
@@ -50,184 +52,79 @@ fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, V
     files.collect()
 }
 
-/// A bag, how it is read, the files, how it is drawn, the form of its JSON.
-type Case = (
-    &'static str,
-    &'static [&'static str],
-    &'static [&'static str],
-    &'static [&'static str],
-    &'static str,
-);
-
 #[test]
 fn rendering_exported_json_gives_the_same_bytes() {
     const FRAMES: [&str; 5] = ["x.svg", "x.html", "x.md", "x.json", "x.png"];
     const TWENTY: [&str; 2] = ["--period", "20"];
-    let cases: [Case; 8] = [
-        ("courier.mcap", &[], FORMATS, &[], "windows"),
-        ("courier.mcap", &[], FORMATS, &[], "runs"),
-        ("warehouse.bag", &TWENTY, &FRAMES, &[], "windows"),
+    let cases: [Case; 7] = [
+        ("render", "courier.mcap", &[], FORMATS, &[]),
+        ("render", "warehouse.bag", &TWENTY, &FRAMES, &[]),
         (
+            "render",
             "warehouse.bag",
             &[],
             &["x{n}.svg"],
             &["--view", "board"],
-            "runs",
         ),
         (
+            "render",
             "warehouse.bag",
             &[],
             &["x.json", "x.csv"],
-            &["--filtered"],
-            "windows",
+            &["--hide", "quiet,leaf"],
         ),
+        ("figure", "warehouse.bag", &[], &["x.svg"], &[]),
         (
-            "warehouse.bag",
-            &[],
-            &["x.svg"],
-            &["--figure", "lives"],
-            "windows",
-        ),
-        (
+            "figure",
             "warehouse.bag",
             &[],
             &["x.pdf"],
-            &["--figure", "map"],
-            "windows",
+            &["--kind", "map"],
         ),
         (
+            "figure",
             "warehouse.bag",
             &[],
             &["x.svg"],
-            &["--figure", "steps"],
-            "runs",
+            &["--kind", "steps"],
         ),
     ];
-    for (bag, reading, formats, drawing, form) in cases {
+    for (command, bag, reading, formats, drawing) in cases {
         let bag = example(bag);
-        let first = files(&bag, formats, &[reading, drawing].concat());
-        let data = files(&bag, &["y.json"], &[reading, &["--json", form]].concat());
+        let first = files(command, &bag, formats, &[reading, drawing].concat());
+        let data = files("render", &bag, &["y.json"], reading);
         let folder = tempfile::tempdir().unwrap();
         let mission = folder.path().join("y.json");
         fs::write(&mission, &data["y.json"]).unwrap();
-        let second = files(&mission, formats, drawing);
+        let second = files(command, &mission, formats, drawing);
         assert!(first.keys().eq(second.keys()), "{bag:?}: other files");
         for (name, bytes) in &first {
             assert!(
                 second[name] == *bytes,
-                "{bag:?} {form} {drawing:?}: another {name}"
+                "{command} {bag:?} {drawing:?}: another {name}"
             );
         }
     }
 }
 
-/// A robot that publishes its activity on a topic.
-fn telling() -> Vec<u8> {
-    let mut bag = Recording::default();
-    let odometry = bag.publisher("/base", "/odom", "nav_msgs/Odometry");
-    bag.send(odometry, (0, 60_000), 100, &[1; 16]);
-    let state = bag.publisher("/executor", "/task", "std_msgs/String");
-    for (second, text) in [
-        (10, "driving"),
-        (20, "driving"),
-        (30, "picking"),
-        (45, "docking"),
-    ] {
-        let mut payload = u32::try_from(text.len()).unwrap().to_le_bytes().to_vec();
-        payload.extend(text.bytes());
-        let at = ORIGIN + second * 1_000_000_000;
-        bag.messages.push((state, at, payload));
-    }
-    bag.messages.sort_by_key(|message| message.1);
-    rosbag1::write(&bag, rosbag1::Pack::None, 1 << 16)
-}
+/// A command, a bag, how it is read, the files, how it is drawn.
+type Case = (
+    &'static str,
+    &'static str,
+    &'static [&'static str],
+    &'static [&'static str],
+    &'static [&'static str],
+);
 
-fn bagreel(arguments: &[&str], input: &[u8]) -> (bool, String, String) {
+fn bagreel(arguments: &[&str]) -> (bool, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command.args(arguments).stdin(Stdio::piped());
-    command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap();
-    let mut pipe = child.stdin.take().unwrap();
-    // A command that is refused early leaves its input unread.
-    let _ = pipe.write_all(input);
-    drop(pipe);
-    let done = child.wait_with_output().unwrap();
+    let done = command.args(arguments).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (
         done.status.success(),
         text(&done.stdout),
         text(&done.stderr),
     )
-}
-
-#[test]
-fn captions_are_read_from_a_pipe() {
-    let arguments = [
-        "render",
-        "-",
-        "--captions",
-        "/task",
-        "-o",
-        "-",
-        "--format",
-        "json",
-        "-q",
-    ];
-    let (is_done, text, error) = bagreel(&arguments, &telling());
-    assert!(is_done, "{error}");
-    let mission: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let phases = mission["phases"].as_array().unwrap();
-    let shown = phases.iter().skip(1).map(|phase| {
-        let start = phase["start_ns"].as_i64().unwrap();
-        let second = (start - ORIGIN) / 1_000_000_000;
-        (second, phase["name"].as_str().unwrap())
-    });
-    // A repeated caption is not a new phase, and the time before the first one is a phase of its own.
-    let shown: Vec<_> = shown.collect();
-    assert_eq!(shown, [(10, "driving"), (30, "picking"), (45, "docking")]);
-}
-
-#[test]
-fn invalid_captions_are_refused() {
-    let bag = telling();
-    let asked = |from: &str| {
-        bagreel(
-            &[
-                "render",
-                "-",
-                "--captions",
-                from,
-                "-o",
-                "-",
-                "--format",
-                "json",
-                "-q",
-            ],
-            &bag,
-        )
-    };
-    let (is_done, _, error) = asked("/odom");
-    assert!(
-        !is_done && error.contains("neither a file nor a topic"),
-        "{error}"
-    );
-    let folder = tempfile::tempdir().unwrap();
-    let json = folder.path().join("x.json").display().to_string();
-    assert!(bagreel(&["render", "-", "-o", &json, "-q"], &bag).0);
-    let (is_done, _, error) = bagreel(
-        &[
-            "render",
-            &json,
-            "--captions",
-            "/task",
-            "-o",
-            "-",
-            "--format",
-            "gif",
-        ],
-        b"",
-    );
-    assert!(!is_done && error.contains("is a mission's JSON"), "{error}");
 }
 
 /// The windows of a mission that is cut, in seconds after its start.
@@ -238,7 +135,7 @@ fn windows(arguments: &[&str]) -> Vec<(i64, i64)> {
         arguments,
     ]
     .concat();
-    let (is_done, text, error) = bagreel(&whole, b"");
+    let (is_done, text, error) = bagreel(&whole);
     assert!(is_done, "{error}");
     let mission: serde_json::Value = serde_json::from_str(&text).unwrap();
     let start = mission["start_ns"].as_i64().unwrap();
@@ -276,7 +173,7 @@ fn a_cut_is_refused_if_inapplicable() {
     let bag = example("courier.mcap").display().to_string();
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json").display().to_string();
-    assert!(bagreel(&["render", &bag, "-o", &json, "-q"], b"").0);
+    assert!(bagreel(&["render", &bag, "-o", &json, "-q"]).0);
     let refused: [&[&str]; 4] = [
         &[
             "render", &bag, "--cut", "phases", "--period", "5", "-o", "-", "--format", "json",
@@ -287,12 +184,9 @@ fn a_cut_is_refused_if_inapplicable() {
         &[
             "render", &json, "--cut", "phases", "-o", "-", "--format", "svg",
         ],
-        &[
-            "render", &bag, "--json", "runs", "-o", "-", "--format", "svg",
-        ],
     ];
     for arguments in refused {
-        let (is_done, _, error) = bagreel(arguments, b"");
+        let (is_done, _, error) = bagreel(arguments);
         assert!(!is_done && error.contains("--"), "{arguments:?}: {error}");
     }
 }

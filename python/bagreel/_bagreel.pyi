@@ -30,7 +30,7 @@ class Mission:
     """A mission: its windows with their graphs and changes."""
 
     def tables(self) -> dict[str, Table]:
-        """By name: edges, topics, nodes, changes, ledger, phases, bags."""
+        """By name: edges, topics, nodes, changes, events, phases, bags."""
     def to_json(self) -> str: ...
     @property
     def nodes(self) -> list[str]:

@@ -103,7 +103,7 @@ struct Mission(Read);
 
 #[pymethods]
 impl Mission {
-    /// Its tables by name: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
+    /// Its tables by name: `edges`, `topics`, `nodes`, `changes`, `events`, `phases`, `bags`.
     fn tables(&self, py: Python<'_>) -> PyResult<BTreeMap<&'static str, Table>> {
         let tables = py.detach(|| arrow::mission_batches(&self.0));
         let tables = tables.map_err(|e| raised(&e))?.into_iter();

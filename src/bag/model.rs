@@ -166,7 +166,7 @@ worded! {
 pub struct Report {
     /// The file's or folder's own name, without a path.
     pub name: String,
-    /// The format's name in JSON: `rosbag1`, `sqlite3`, `mcap`, `evolution`.
+    /// The format's name in JSON: `rosbag1`, `sqlite3`, `mcap`.
     pub format: String,
     /// Every compression seen, sorted: `none`, `bz2`, `lz4`, `zstd`.
     pub compression: Vec<String>,

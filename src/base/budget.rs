@@ -10,7 +10,7 @@ pub(crate) const WINDOWS: i64 = 100_000;
 /// The longest mission, in days: a hundred years, so that sums of three such lengths in nanoseconds do not overflow.
 pub(crate) const SPAN_DAYS: i64 = 36_525;
 
-/// The longest style, topology or captions file, in bytes: a hundred times the largest known.
+/// The longest style, topology or phases file, in bytes: a hundred times the largest known.
 pub(crate) const USER_TEXT: u64 = 16 << 20;
 
 /// The longest topology, in bytes: twenty times the largest graph known from `rqt_graph`. Parsing needs at most

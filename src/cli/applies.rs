@@ -67,17 +67,12 @@ impl Asked<'_> {
     }
 }
 
-/// Whether the output is a figure.
-pub(super) fn is_figure(args: &RenderArgs, output: &Output) -> bool {
-    args.figure.is_some() && output.format.whole != OneDrawing::Never
-}
-
 /// Whether the output is drawn; a report is text around its own chart.
 fn is_picture(output: &Output) -> bool {
     output.format.is_drawn && output.format.word != "md"
 }
 
-/// Whether the output contains the graph as data, complete unless `--filtered` is given.
+/// Whether the output contains the graph as data.
 fn is_data(output: &Output) -> bool {
     ["json", "csv", "parquet"].contains(&output.format.word)
 }
@@ -97,40 +92,31 @@ const RULES: &[AppliesTo] = &[
     },
     AppliesTo {
         options: "title",
-        takes: |asked, output| {
-            let is_plain =
-                output.format.word == "dot" && asked.args.sequence.dot_profile == "plain";
-            output.format.is_drawn || is_plain
-        },
-        what: "it applies to pictures, reports and `--dot-profile plain`",
+        takes: |_, output| output.format.is_drawn,
+        what: "it applies to pictures and reports",
     },
     AppliesTo {
         options: "bare",
-        takes: |asked, output| asked.is_window(output) || is_figure(asked.args, output),
-        what: "it applies to animations, pages, figures and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
+        takes: |asked, output| asked.is_window(output),
+        what: "it applies to animations, pages and single windows: `x.gif`, `x.pdf`, `x{n}.svg`",
     },
     AppliesTo {
-        options: "captions phases",
+        options: "phases",
         takes: |_, output| {
             output.format.is_drawn || ["json", "csv", "parquet"].contains(&output.format.word)
         },
         what: "it applies to pictures, pages, reports and data: `x.gif`, `x.html`, `x.json`",
     },
     AppliesTo {
-        options: "mode ns-filter topic-filter hide group collapse rqt-defaults",
-        takes: |asked, output| !is_data(output) || asked.args.view.filtered,
-        what: "data files contain the whole graph; `--filtered` writes what a picture would show",
-    },
-    AppliesTo {
-        options: "filtered",
-        takes: |_, output| is_data(output),
-        what: "it applies to data: json, csv, parquet; pictures are already filtered",
+        options: "group collapse",
+        takes: |_, output| !is_data(output),
+        what: "data contains every element by itself; it applies to pictures and graphs, such as `x.gif`, `x.dot`",
     },
     AppliesTo {
         options: "frame-ms",
         takes: |asked, output| {
             let is_animated = output.format.word == "svg" && !asked.is_window(output);
-            output.format.word == "gif" || is_animated && !is_figure(asked.args, output)
+            output.format.word == "gif" || is_animated
         },
         what: "it applies to animations: `x.gif`, `x.svg`",
     },
@@ -145,30 +131,14 @@ const RULES: &[AppliesTo] = &[
         what: "it applies to `x.gif`",
     },
     AppliesTo {
-        options: "dot-profile",
-        takes: |_, output| output.format.word == "dot",
-        what: "it applies to `x.dot`",
-    },
-    AppliesTo {
         options: "link",
         takes: |_, output| output.format.word == "md",
         what: "it applies to reports: `x.md`",
     },
-    AppliesTo {
-        options: "json",
-        takes: |_, output| output.format.word == "json",
-        what: "it applies to `x.json`",
-    },
-    AppliesTo {
-        options: "runs",
-        takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
-        what: "it applies to tables: `x.csv`",
-    },
 ];
 
 /// Options that ask for windows one after the other.
-const OF_FILMS: &str = "period step align cut frame-ms max-bytes strip figure \
-    captions phases format";
+const OF_FILMS: &str = "period step align cut frame-ms max-bytes strip phases format";
 
 /// Whether a mission without changes may become a single picture: no output is given, or it is a single picture, and no
 /// option requires an animation.
@@ -228,18 +198,6 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
         return given.refuse(OF_BAGS, &what, "give the bag itself");
     }
     Ok(())
-}
-
-/// Options that define windows.
-const OF_WINDOWS: &str = "period step align cut grace";
-
-/// The note for an option about windows given for `what`, which uses continuous time; `None` without one. It is not an
-/// error: scripts request the log and pictures with the same options.
-pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
-    let option = given.any(OF_WINDOWS)?;
-    Some(format!(
-        "`--{option}` does not affect {what}, which does not depend on windows"
-    ))
 }
 
 /// Refuses options of `diff` that do not apply if one of the two is an expectation.

@@ -12,7 +12,7 @@ use crate::draw::figure::{FigureKind, RowKind};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
-use crate::export::options::{self, FigureOptions, Profile};
+use crate::export::options::{self, FigureOptions};
 use crate::layout::Orientation;
 use crate::mission::{Places, read_json};
 use crate::pipeline::{Body, Phases};
@@ -96,13 +96,6 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> 
     Ok(options::SequenceOptions {
         frame_ms: args.frame_ms,
         max_bytes: args.max_bytes,
-        dot_profile: Profile::parse(&args.dot_profile)?,
-        json: match args.json.as_deref() {
-            Some("windows") => options::JsonForm::Windows,
-            Some(_) => options::JsonForm::Runs,
-            None => options::JsonForm::Auto,
-        },
-        has_runs: args.runs,
         strip: strip.transpose()?,
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..options::SequenceOptions::default()
@@ -165,39 +158,12 @@ pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Resul
     })
 }
 
-/// The figure in the options of `render`, which are those of `bagreel figure`.
-pub(super) fn old_figure(args: &RenderArgs) -> Result<Option<FigureOptions>> {
-    let form = &args.form;
-    let typed = [
-        ("--rows", form.rows.is_some()),
-        ("--steps", !form.steps.is_empty()),
-        ("--text", form.text.is_some()),
-    ];
-    match (&args.figure, typed.iter().find(|(_, is)| *is)) {
-        (Some(word), _) => {
-            let figure = figure(word, form, args.look.width)?;
-            let is_bare = args.look.bare;
-            Ok(Some(FigureOptions { is_bare, ..figure }))
-        }
-        (None, Some((flag, _))) => Err(Error::usage(
-            format!("`{flag}` is an option of figures"),
-            "`bagreel figure BAG -o fig.pdf` draws one",
-        )),
-        (None, None) => Ok(None),
-    }
-}
-
 /// The source of phases.
-pub(super) fn phases(word: &str, captions: Option<&str>) -> Result<Phases> {
-    match (word, captions) {
-        ("auto", None) => Ok(Phases::Found),
-        ("auto", Some(from)) => Ok(Phases::Captions(from.to_owned())),
-        ("none", None) => Ok(Phases::None),
-        (file, None) => Ok(Phases::File(file.into())),
-        (_, Some(_)) => Err(Error::usage(
-            "`--captions` and `--phases` both set the phases",
-            "use one of them",
-        )),
+pub(super) fn phases(word: &str) -> Phases {
+    match word {
+        "auto" => Phases::Found,
+        "none" => Phases::None,
+        file => Phases::File(file.into()),
     }
 }
 

@@ -28,23 +28,9 @@ pub(super) fn render(
     terminal: &mut Terminal,
 ) -> Result<u8, Error> {
     let job = job(args, given)?;
-    if let Some(kind) = &args.figure {
-        let kind = format!("`bagreel figure --kind {kind}`");
-        terminal.note(&format!(
-            "`render --figure` will be removed; {kind} draws the same"
-        ));
-    }
     applies::check_outputs(given, args, &job.outputs)?;
     crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
-    if job
-        .outputs
-        .iter()
-        .all(|output| applies::is_figure(args, output))
-        && let Some(note) = applies::about_windows(given, "a figure")
-    {
-        terminal.note(&note);
-    }
     make_room(&job, terminal);
     let done = crate::pipeline::render(&job, terminal)?;
     report(&done, terminal);
@@ -81,7 +67,7 @@ pub(super) fn figure(
 fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
     let time = TimeArgs::default();
     let reading = reading(&args.inputs, &time, args.range, &args.rate, &args.graph)?;
-    let reading = reading.with_phases(look::phases(&args.phases.phases, None)?);
+    let reading = reading.with_phases(look::phases(&args.phases.phases));
     let outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
             &default_output(&reading.inputs, "pdf"),
@@ -159,12 +145,10 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         &args.rate,
         &args.graph,
     )?;
-    let phases = look::phases(&args.phases.phases, args.look.captions.as_deref())?;
-    let mut reading = reading.with_phases(phases);
+    let mut reading = reading.with_phases(look::phases(&args.phases.phases));
     let outputs = match &args.outputs[..] {
         [] => {
-            let extension = if args.figure.is_some() { "pdf" } else { "gif" };
-            let name = default_output(&reading.inputs, extension);
+            let name = default_output(&reading.inputs, "gif");
             vec![Output::parse(&name, args.format.as_deref())?]
         }
         some => some
@@ -201,25 +185,19 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         },
         sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),
-            figure: look::old_figure(args)?,
             ..look::sequence(&args.sequence)?
         },
         kept: kept(args),
         outputs,
         still: still.transpose()?,
-        is_filtered: args.view.filtered,
         reading,
     })
 }
 
-/// The files that only a drawing reads. Built-in style names and caption topics are included, which is harmless.
+/// The files that only a drawing reads. Names of built-in styles are included, which is harmless.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
-    let named = [
-        Some(&look.style),
-        look.captions.as_ref(),
-        Some(&args.phases.phases),
-    ];
+    let named = [Some(&look.style), Some(&args.phases.phases)];
     let named = named.into_iter().flatten().map(PathBuf::from);
     let files = [&look.font, &look.layout_from].into_iter().flatten();
     let all = named.chain(files.cloned());

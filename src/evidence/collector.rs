@@ -37,23 +37,12 @@ pub struct CollectOptions {
     /// payloads; 0: none, and no payload is read for this. [`u64::MAX`]: all, even in bags whose payloads are
     /// not read otherwise.
     pub payload_bytes: u64,
-    /// The topic of strings whose texts are kept ([`Recorded::texts`]).
-    pub texts_of: Option<String>,
 }
 
 impl CollectOptions {
     /// Whether payloads are compared even if they are read for nothing else.
     fn compares_all(&self) -> bool {
         self.payload_bytes == u64::MAX
-    }
-
-    /// Whether the messages of a connection are texts to keep.
-    fn keeps_texts_of(&self, connection: &Connection) -> bool {
-        let is_text = matches!(
-            &*connection.type_name,
-            "std_msgs/String" | "std_msgs/msg/String"
-        );
-        is_text && self.texts_of.as_deref() == Some(connection.topic.as_str())
     }
 
     /// The wanted part of a connection's payloads, which are read whole or for their stamps.
@@ -79,7 +68,6 @@ impl Default for CollectOptions {
             why: Vec::new(),
             infer_stamps: false,
             payload_bytes: PAYLOAD_BYTES,
-            texts_of: None,
         }
     }
 }
@@ -90,10 +78,6 @@ impl Default for CollectOptions {
 /// compared unless requested: most of them are read by their index, an advantage that would be lost if every
 /// payload were read.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
-/// The most texts of a topic that are kept.
-const MOST_TEXTS: usize = 10_000;
-/// The most characters kept of each text.
-const LONGEST_TEXT: usize = 200;
 /// The cost of a payload besides its bytes, in bytes: its hash is kept.
 const PAYLOAD_ENTRY: u64 = 64;
 
@@ -108,8 +92,6 @@ struct StreamLayout {
     header: Option<FirstHeader>,
     /// The schema for parsing them, if they contain words or numbers that are compared.
     schema: Option<Arc<MessageSchema>>,
-    /// Whether they are texts that are kept.
-    is_text: bool,
 }
 
 /// A collector of bags, one after another.
@@ -125,7 +107,6 @@ pub struct Collector {
     numbers: BTreeMap<usize, Numbers>,
     /// The number of payload bytes compared so far.
     compared: u64,
-    texts: Vec<(Stamp, String)>,
     messages: Stamps,
     facts: Observations,
     notices: Notices,
@@ -182,7 +163,6 @@ impl Collector {
             options: self.options.clone(),
             streams: self.streams.clone(),
             numbers: self.numbers.clone(),
-            texts: self.texts.clone(),
             messages: self.messages.since(from).map_err(spool_error)?,
             facts: self.facts.copy().map_err(spool_error)?,
             notices: self.notices.clone(),
@@ -259,7 +239,6 @@ impl Collector {
             equal_stamps::collect(&mut context, header, message.data);
         }
         self.compare(place, message);
-        self.keep_text(place, message);
         let stream = &self.streams[place];
         let layout = &self.layouts[place];
         for (source, read) in &layout.readers {
@@ -278,19 +257,6 @@ impl Collector {
                 self.notices
                     .add(undecodable(stream, "some messages do not have its layout"));
             }
-        }
-    }
-
-    /// Keeps the text of a message, if those of its topic were requested.
-    fn keep_text(&mut self, place: usize, message: &Message<'_>) {
-        if !self.layouts[place].is_text || self.texts.len() >= MOST_TEXTS {
-            return;
-        }
-        let encoding = &self.streams[place].connection.encoding;
-        let mut cursor = PayloadCursor::new(encoding, message.data);
-        if let Ok(Ok(text)) = cursor.as_mut().map(PayloadCursor::string) {
-            let text = text.chars().take(LONGEST_TEXT).collect();
-            self.texts.push((message.time, text));
         }
     }
 
@@ -350,9 +316,7 @@ impl Collector {
         self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
-        self.texts.sort();
         let mut all = Recorded {
-            texts: self.texts,
             streams: self.streams,
             messages: self.messages,
             numbers: self.numbers,

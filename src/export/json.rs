@@ -13,7 +13,6 @@ pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<
     let json = Json {
         mission: sequence.data,
         places: sequence.places,
-        form: sequence.options.json,
     };
     one_file(target, "the data of all windows is one file", move |sink| {
         json.write(sink).map(|()| Vec::new())

@@ -2,12 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::base::error::{Error, Result};
-use crate::base::words::worded;
 pub use crate::draw::figure::FigureOptions;
 use crate::draw::figure::course::LifeLines;
 pub use crate::draw::strip::Choice;
-pub use crate::mission::JsonForm;
 
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,12 +24,6 @@ pub struct SequenceOptions {
     pub scale: f64,
     /// The size limit of an animation in bytes.
     pub max_bytes: Option<u64>,
-    /// The profile in which DOT is written.
-    pub dot_profile: Profile,
-    /// The form in which JSON is written.
-    pub json: JsonForm,
-    /// Whether tables of elements have a row per run of equal windows.
-    pub has_runs: bool,
     /// The windows of a film strip, if requested; it also replaces a sequence of drawings.
     pub strip: Option<Choice>,
     /// The figure, if requested; it replaces a strip.
@@ -53,9 +44,6 @@ impl Default for SequenceOptions {
             changes_only: false,
             scale: 1.0,
             max_bytes: None,
-            dot_profile: Profile::default(),
-            json: JsonForm::Auto,
-            has_runs: false,
             strip: None,
             figure: None,
             pairs: None,
@@ -69,28 +57,5 @@ impl SequenceOptions {
     /// Whether one drawing of the whole was requested, which replaces a sequence.
     pub fn is_one_drawing(&self) -> bool {
         self.strip.is_some() || self.figure.is_some()
-    }
-}
-
-worded! {
-    /// The profile of a DOT file.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Profile {
-        /// As `rqt_graph` saves it, with positions.
-        #[default]
-        Rqt = "rqt",
-        /// Without positions, with a title and colours, for `dot -Tpdf`.
-        Plain = "plain",
-    }
-}
-
-impl Profile {
-    /// The profile of this word.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word.
-    pub fn parse(word: &str) -> Result<Self> {
-        let what = || format!("`{word}` is not a profile of DOT");
-        Self::from_word(word).ok_or_else(|| Error::usage(what(), "profiles: rqt, plain"))
     }
 }

@@ -56,9 +56,8 @@ pub(crate) fn start<'a>(
     let target = target.clone();
     Ok(at_end(move || {
         let each = TABLES.iter().zip(files(&target, format.word()));
-        let has_runs = sequence.options.has_runs;
         let write = |(table, file): (&Table, Target)| {
-            let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, has_runs, row);
+            let rows = |row: RowTaker<'_>| (table.fill)(sequence.data, row);
             write(rows, (table.batch)(), &file, format)
         };
         // All of them are complete before the first one is renamed.
@@ -79,7 +78,7 @@ pub(crate) fn start<'a>(
 pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     let fill = |table: &Table| {
         let mut batch = (table.batch)();
-        (table.fill)(mission, false, &mut |row: &[TableCell<'_>]| batch.push(row));
+        (table.fill)(mission, &mut |row: &[TableCell<'_>]| batch.push(row));
         (table.word, batch)
     };
     TABLES.iter().map(fill).collect()

@@ -193,7 +193,7 @@ impl Element {
 
 impl Elements {
     /// Every element: nodes, topics, publications, subscriptions.
-    pub(crate) fn all(&self) -> impl Iterator<Item = Element> + use<> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = Element> + Clone + use<> {
         let many = [
             self.nodes.len(),
             self.topics.len(),

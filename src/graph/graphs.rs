@@ -12,7 +12,7 @@ pub(crate) use walk::ColumnWalk;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Element, ElementState, Elements, Graph, PerElement};
+use super::{Element, Elements, Graph, PerElement};
 use crate::base::time::Span;
 use crate::evidence::Confidence;
 
@@ -139,35 +139,20 @@ pub struct Iter<'a> {
     cursors: [Vec<ColumnCursor<'a>>; 4],
 }
 
-impl Iter<'_> {
-    /// The states of one kind of element, an index into [`Element::KINDS`], in the next window; to be run to the end, once
-    /// per kind and window. [`Self::pass`] ends the window.
-    pub(crate) fn of_kind(&mut self, kind: usize) -> impl Iterator<Item = ElementState> + '_ {
-        let (all, of) = (self.all, Element::KINDS[kind]);
-        let span = all.spans.get(self.next);
-        let rows = self.cursors[kind].iter_mut().enumerate();
-        rows.filter_map(move |(at, cursor)| {
-            let row = cursor.next()?;
-            Some(row.state(of(at), *span?, &all.lifecycles))
-        })
-    }
-
-    /// Goes to the next window, when all kinds of this one have been run.
-    pub(crate) fn pass(&mut self) {
-        self.next += 1;
-    }
-}
-
 impl Iterator for Iter<'_> {
     type Item = Graph;
 
     fn next(&mut self) -> Option<Graph> {
-        self.all.spans.get(self.next)?;
+        let span = *self.all.spans.get(self.next)?;
         let mut states = Vec::with_capacity(self.cursors.iter().map(Vec::len).sum());
-        for kind in 0..Element::KINDS.len() {
-            states.extend(self.of_kind(kind));
+        for (of, cursors) in Element::KINDS.into_iter().zip(&mut self.cursors) {
+            let rows = cursors.iter_mut().enumerate();
+            states.extend(rows.filter_map(|(at, cursor)| {
+                let row = cursor.next()?;
+                Some(row.state(of(at), span, &self.all.lifecycles))
+            }));
         }
-        self.pass();
+        self.next += 1;
         Some(Graph { states })
     }
 

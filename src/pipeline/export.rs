@@ -24,7 +24,7 @@ use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{Grouping, Mode, View, ViewOptions, filtered, nothing, unmatched, view};
+use crate::view::{Grouping, Mode, View, filtered, nothing, unmatched, view};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -43,8 +43,6 @@ pub struct Render {
     /// The output that replaces all others if the picture is not an animation: a mission in one window, or a
     /// topic timeline.
     pub still: Option<Output>,
-    /// Whether data files contain only the filtered graph.
-    pub is_filtered: bool,
 }
 
 impl Render {
@@ -60,7 +58,6 @@ impl Render {
             outputs,
             still: None,
             kept: Vec::new(),
-            is_filtered: false,
         })
     }
 }
@@ -192,7 +189,7 @@ fn drawing_of(job: &Render, mission: &Mission) -> Drawing {
     drawing.view.is_bundled = is_picture && drawing.view.mode == Mode::Nodes;
     drawing.page.title.get_or_insert_with(|| mission.title());
     if job.reading.phases.is_named() {
-        drawing.page.phases = captions(mission);
+        drawing.page.phases = phases(mission);
     }
     drawing
 }
@@ -232,7 +229,7 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         unplaced(View::default(), &drawing)
     };
     if is_timeline {
-        return show_timeline(job, mission, &drawing, (&view, &options), watch);
+        return show_timeline(job, mission, &drawing, &view, watch);
     }
     let elements = &mission.elements;
     if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
@@ -261,10 +258,10 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     let mut all = mission.notices.clone();
     all.extend(unmatched(&mission.elements, &drawing.view));
     all.extend(notices.iter().chain(remarks));
-    let viewed = job.is_filtered.then(|| filtered(&mission, &options));
+    let data = chosen(job, &mission, &mut all);
     let sequence = Sequence {
         mission: &mission,
-        data: viewed.as_ref().unwrap_or(&mission),
+        data: data.as_ref().unwrap_or(&mission),
         places: places.as_ref(),
         notices: &all,
         view: &view,
@@ -292,6 +289,23 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     })
 }
 
+/// The part of the mission that data files contain if the view's options choose elements, with a notice that says so.
+fn chosen(job: &Render, mission: &Mission, notices: &mut Notices) -> Option<Mission> {
+    let view = &job.drawing.view;
+    let is_data = |o: &Output| !o.format.is_viewed;
+    if !view.is_filter() || !job.outputs.iter().any(is_data) {
+        return None;
+    }
+    let part = filtered(mission, view);
+    let many = |all: &Mission| [all.elements.nodes.len(), all.elements.topics.len()];
+    let ([nodes, topics], [all_nodes, all_topics]) = (many(&part), many(mission));
+    let text = format!(
+        "data contains what the filters choose: {nodes} of {all_nodes} nodes, {topics} of {all_topics} topics"
+    );
+    notices.add(Notice::new(NoticeKind::Note, text));
+    Some(part)
+}
+
 fn write(job: &Render, sequence: &Sequence<'_>, watch: &mut dyn Watch) -> Result<Vec<Written>> {
     if let Some(warning) = long_job(job, sequence) {
         watch.note(&warning);
@@ -309,7 +323,7 @@ fn write(job: &Render, sequence: &Sequence<'_>, watch: &mut dyn Watch) -> Result
 }
 
 /// The name of the phase of every window: the last one that begins before its end.
-fn captions(mission: &Mission) -> Vec<String> {
+fn phases(mission: &Mission) -> Vec<String> {
     let phases = &mission.log.phases;
     let name = |end| {
         let next = phases.partition_point(|phase| phase.span.start < end);
@@ -363,7 +377,7 @@ fn show_timeline(
     job: &Render,
     mission: Mission,
     drawing: &Drawing,
-    (view, options): (&View, &ViewOptions),
+    view: &View,
     watch: &mut dyn Watch,
 ) -> Result<Rendered> {
     let mut all = mission.notices.clone();
@@ -387,7 +401,7 @@ fn show_timeline(
     let remarks = timeline.remarks().into_iter();
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = timeline.overview();
-    let viewed = job.is_filtered.then(|| filtered(&mission, options));
+    let data = chosen(job, &mission, &mut all);
     let lives = LifeLines::new(LivesFigure::new(&source, true));
     // Each topic has its own row.
     let mut each = drawing.clone();
@@ -395,7 +409,7 @@ fn show_timeline(
     let opened = unfolded::opened(&mission, &each, None, &job.outputs)?;
     let sequence = Sequence {
         mission: &mission,
-        data: viewed.as_ref().unwrap_or(&mission),
+        data: data.as_ref().unwrap_or(&mission),
         places: None,
         notices: &all,
         view,

@@ -1,4 +1,4 @@
-//! The phases of a mission: detected, named or defined by the user's file, or taken from captions.
+//! The phases of a mission: detected, or named or defined by the user's file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,8 +22,6 @@ pub enum Phases {
     None,
     /// A file: lines `0:38 navigation` define the start of a phase; lines without a time name the detected phases.
     File(PathBuf),
-    /// A file of `seconds|text` lines, or a string topic of the bags.
-    Captions(String),
 }
 
 impl Phases {
@@ -35,35 +33,25 @@ impl Phases {
         }
     }
 
-    /// The topic whose texts name them, if any.
-    pub(super) fn topic(&self) -> Option<&str> {
-        match self {
-            Self::Captions(from) if !Path::new(from).is_file() => Some(from),
-            _ => None,
-        }
-    }
-
     /// Whether the user named them.
     pub(super) fn is_named(&self) -> bool {
-        matches!(self, Self::File(_) | Self::Captions(_))
+        matches!(self, Self::File(_))
     }
 }
 
-/// The sources of phases: the history of the mission, the texts of the caption topic, and the phases of an earlier run.
+/// The sources of phases: the history of the mission, and the phases of an earlier run.
 pub(super) struct Basis<'a> {
     pub(super) elements: &'a Elements,
     pub(super) sending: &'a Sending,
     /// The time of the mission.
     pub(super) whole: Span,
-    pub(super) texts: &'a [(Stamp, String)],
     pub(super) earlier: Vec<Phase>,
 }
 
 /// The phases that `reading` asks for.
 ///
 /// # Errors
-/// [`Error::BadFile`] for a line that is not a phase, more names than phases, or times out of order; [`Error::Usage`]
-/// for missing captions.
+/// [`Error::BadFile`] for a line that is not a phase, more names than phases, or times out of order.
 pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> {
     match &reading.phases {
         Phases::None => Ok(Vec::new()),
@@ -72,7 +60,6 @@ pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> 
             let text = file::read_text(path, budget::USER_TEXT)?;
             from_file(basis, &text, path)
         }
-        Phases::Captions(from) => captions(&basis, from),
     }
 }
 
@@ -116,14 +103,14 @@ impl Basis<'_> {
 }
 
 /// One line: the start of a phase, if given, in nanoseconds after the mission's start, and its name.
-type CaptionLine = (Option<i64>, String);
+type PhaseLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     let hint = "write a phase per line: `0:38 navigation`, or only names for the detected phases";
     let bad = |line: usize, reason: String| Error::bad_file(path, line, reason, hint);
     let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
     let all = all.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
-    let lines: Vec<(usize, CaptionLine)> = all.map(|(n, l)| (n, line(l))).collect();
+    let lines: Vec<(usize, PhaseLine)> = all.map(|(n, l)| (n, line(l))).collect();
     let timed = lines.iter().filter(|(_, (at, _))| at.is_some()).count();
     if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
         return Err(bad(
@@ -161,76 +148,11 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     Ok(found)
 }
 
-fn line(text: &str) -> CaptionLine {
+fn line(text: &str) -> PhaseLine {
     let timed = text.split_once([' ', '|', '\t']);
     let timed = timed.and_then(|(at, name)| Some((parse_nanos(at)?, name)));
     match timed {
         Some((at, name)) => (Some(at), name.trim().to_owned()),
         None => (None, text.to_owned()),
-    }
-}
-
-/// Phases from captions: `from` is an existing file, else a topic of type `std_msgs/String`.
-fn captions(basis: &Basis<'_>, from: &str) -> Result<Vec<Phase>> {
-    let path = Path::new(from);
-    let start = basis.whole.start;
-    let mut begins = if path.is_file() {
-        let lines = captions_of_file(&file::read_text(path, budget::USER_TEXT)?, path)?;
-        let lines = lines.into_iter().map(|(at, text)| (start.plus(at), text));
-        lines.collect()
-    } else {
-        basis.texts.to_vec()
-    };
-    if begins.is_empty() {
-        return Err(Error::usage(
-            format!("`{from}` is neither a file nor a topic of `std_msgs/String`"),
-            "`--captions` takes a file of `seconds|text` lines or such a topic",
-        ));
-    }
-    begins.dedup_by(|later, before| later.1 == before.1);
-    Ok(basis.at(&begins))
-}
-
-/// Captions by nanoseconds after the mission's start, sorted. Empty lines and lines that begin with `#` are skipped.
-fn captions_of_file(text: &str, path: &Path) -> Result<Vec<(i64, String)>> {
-    let mut captions = Vec::new();
-    for (number, line) in text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'))
-    {
-        let caption = line
-            .split_once('|')
-            .and_then(|(at, text)| Some((parse_nanos(at)?, text.trim().to_owned())));
-        captions.push(caption.ok_or_else(|| {
-            let reason = format!("`{line}` is not a caption");
-            let hint = "write `seconds|text`, such as `90|picking`";
-            Error::bad_file(path, number + 1, reason, hint)
-        })?);
-    }
-    captions.sort_by_key(|(at, _)| *at);
-    Ok(captions)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn captions_of_a_file_are_sorted_by_time() {
-        let read = |text| captions_of_file(text, Path::new("c.txt"));
-        let captions = read("# phases\n90|picking\n\n0|start\n").unwrap();
-        assert_eq!(
-            captions,
-            [
-                (0, "start".to_owned()),
-                (90_000_000_000, "picking".to_owned())
-            ]
-        );
-        let error = read("0|a\nsoon|b\n").unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "`c.txt` line 2: `soon|b` is not a caption"
-        );
     }
 }

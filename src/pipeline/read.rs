@@ -105,10 +105,8 @@ impl Reading {
 
     /// The same reading with phases from another source.
     #[must_use]
-    pub fn with_phases(mut self, phases: Phases) -> Self {
-        self.collect.texts_of = phases.topic().map(str::to_owned);
-        self.phases = phases;
-        self
+    pub fn with_phases(self, phases: Phases) -> Self {
+        Self { phases, ..self }
     }
 }
 
@@ -182,9 +180,7 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
     let source = None;
     let division = &reading.division;
     let cut = division.cut.map(|_| "`--cut` divides the time of bags");
-    let topic = reading.phases.topic();
-    let topic = topic.map(|_| "`--captions` takes texts of a topic from bags");
-    match source.or(cut).or(topic) {
+    match source.or(cut) {
         None => Ok(()),
         Some(what) => Err(Error::usage(
             format!("{what}, but `{}` is a mission's JSON", path.display()),
@@ -257,7 +253,6 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         elements: &mission.elements,
         sending: &mission.sending,
         whole: mission.span,
-        texts: &[],
         earlier: std::mem::take(&mut mission.log.phases),
     };
     mission.log.phases = wanted(reading, basis)?;
@@ -380,7 +375,6 @@ fn log_of(history: &History, collected: &Collected, reading: &Reading) -> Result
         elements,
         sending: &history.sending,
         whole: collected.range,
-        texts: &collected.recorded.texts,
         earlier: Vec::new(),
     };
     let back = collected.recorded.falls.iter().map(|fall| Interruption {

@@ -22,6 +22,11 @@ struct FilterToken {
 }
 
 impl NameFilter {
+    /// Whether it accepts every name.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.includes.is_empty() && self.excludes.is_empty()
+    }
+
     /// The filter of this text.
     ///
     /// # Errors

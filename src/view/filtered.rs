@@ -1,4 +1,4 @@
-//! The viewed part of a mission as a separate mission, for `--filtered`.
+//! The viewed part of a mission as a separate mission, for data files.
 
 use super::items::Viewed;
 use super::state::shows_node;

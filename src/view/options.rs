@@ -210,6 +210,13 @@ pub struct ViewOptions {
 }
 
 impl ViewOptions {
+    /// Whether they choose elements, rather than only how these are drawn.
+    pub(crate) fn is_filter(&self) -> bool {
+        let plain = Self::default();
+        let is_named = !self.ns_filter.is_empty() || !self.topic_filter.is_empty();
+        is_named || self.mode != plain.mode || self.hide != plain.hide
+    }
+
     /// The settings of `rqt_graph`'s window when it opens. Its "Unreachable" is left out: a bag cannot add which node
     /// would not have answered.
     pub fn rqt_defaults() -> Self {

@@ -23,6 +23,9 @@ import touch
 import webdriver
 from webdriver import Browser
 
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
+from windows import split
+
 SHIFT, LEFT, RIGHT, END, HOME, ENTER, ESC, CTRL = "\ue008", "\ue012", "\ue014", "\ue010", "\ue011", "\ue007", "\ue00c", "\ue009"
 
 
@@ -395,7 +398,7 @@ def main(page, evolution, hostile_page, svg, folded_page, topic_timeline, report
         return
     path = pathlib.Path(page).resolve()
     text = path.read_text()
-    evolution = json.loads(pathlib.Path(evolution).read_text())
+    evolution = split(json.loads(pathlib.Path(evolution).read_text()))
     data = compare_data(text, evolution)
     url = lambda name: pathlib.Path(name).resolve().as_uri()
     with Browser() as b:

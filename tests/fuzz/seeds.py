@@ -30,7 +30,7 @@ SMALL = {
     b"        serialization_format: cdr\n        offered_qos_profiles: ''\n      message_count: 1\n",
     "definition": b"\x0estd_msgs/Header header\nstring[] names\nfloat64[3] xs\n===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\n"
     b"string frame_id\n\xff\x12\0\1\0\0" + bytes(64),
-    "mission": b'{"schema": "bagreel.evolution/1", "windows": []}',
+    "mission": b'{"schema": "bagreel.mission/3", "windows": []}',
 }
 
 

@@ -8,7 +8,7 @@ RQT_GRAPH_SRC    the `src` folder of a checkout of ros-visualization/rqt_graph (
 QT_DOTGRAPH_SRC  the `qt_dotgraph/src` folder of a checkout of ros-visualization/qt_gui_core
 
 Needs Python 3.9 and `pip install pydot`; no ROS and no display. Every case is a random graph with random settings. Its
-graph goes to rqt_graph's own `dotcode.py` and, as an evolution of one window, to `bagreel render x.json -o x.dot`. Ids,
+graph goes to rqt_graph's own `dotcode.py` and, as a mission of one window, to `bagreel render x.json -o x.dot`. Ids,
 labels, shapes, tool tips and URLs of nodes and topics, the cluster of each, the nesting of clusters, and
 the ends and labels of edges must be equal, but for the differences named in README.md, which are counted.
 
@@ -23,6 +23,9 @@ import subprocess
 import sys
 import tempfile
 import types
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / 'support'))
+import windows
 
 SETTINGS = {
     'mode': ['node_node', 'node_topic', 'node_topic_all'],
@@ -109,13 +112,13 @@ def theirs(rqt, nodes, edges, s):
         group_image_nodes=s['images'], hide_dynamic_reconfigure=s['params'])
 
 
-def evolution(nodes, edges):
-    """One window, with only the required keys of a mission."""
+def mission(nodes, edges):
+    """One window, with only the required keys of a mission and the counts of topics."""
     window = {'index': 0, 'start_ns': 0, 'end_ns': 10**10, 'nodes': [{'name': n} for n in nodes],
               'topics': [{'name': t} for t in sorted({t for _, t, _ in edges})],
               'publishes': [{'node': n, 'topic': t} for n, t, pub in edges if pub],
               'subscribes': [{'topic': t, 'node': n} for n, t, pub in edges if not pub]}
-    return {'schema': 'bagreel.evolution/1', 'windows': [window]}
+    return windows.join({'windows': [window]})
 
 
 def flags(s):
@@ -131,7 +134,7 @@ def flags(s):
 
 def ours(binary, folder, nodes, edges, s):
     source, target = folder / 'x.json', folder / 'x.dot'
-    source.write_text(json.dumps(evolution(nodes, edges)))
+    source.write_text(json.dumps(mission(nodes, edges)))
     target.unlink(missing_ok=True)
     command = [binary, 'render', str(source), '-o', str(target), '--fit', 'none', '--quiet'] + flags(s)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -241,7 +244,7 @@ def main():
                 print('case %d: %s\n  %s' % (case, ' '.join(flags(settings)), '\n  '.join(lines)))
             if args.keep:
                 args.keep.mkdir(parents=True, exist_ok=True)
-                (args.keep / ('%d.json' % case)).write_text(json.dumps(evolution(nodes, edges)))
+                (args.keep / ('%d.json' % case)).write_text(json.dumps(mission(nodes, edges)))
                 (args.keep / ('%d.rqt.dot' % case)).write_text(text)
                 (args.keep / ('%d.ours.dot' % case)).write_text(made)
     print('%d cases, seed %d: %d differ' % (args.cases, args.seed, wrong))

@@ -84,8 +84,8 @@ def missions_are_read():
     data = bagreel.to_dict(mission)
     assert len(mission) == len(data["windows"]) > 2 and data["events"], mission
     tables = mission.tables()
-    assert set(tables) == {"edges", "topics", "nodes", "changes", "ledger", "phases", "bags"}, tables
-    assert tables["ledger"].to_pyarrow().num_rows == len(data["events"])
+    assert set(tables) == {"edges", "topics", "nodes", "changes", "events", "phases", "bags"}, tables
+    assert tables["events"].to_pyarrow().num_rows == len(data["events"])
 
 
 def pictures_are_drawn():

@@ -48,7 +48,7 @@ pub(crate) struct FigureArgs {
     pub(crate) graph: GraphArgs,
 }
 
-/// The options of every kind of figure; hidden in `render`.
+/// The options of every kind of figure.
 #[derive(Debug, Default, Args)]
 pub(crate) struct FigureForm {
     /// What a row or box represents. [default: the finest that fits]

@@ -14,17 +14,15 @@ const HEADINGS: [(&str, &str); 7] = [
     ),
     (
         "Filter",
-        "mode ns_filter topic_filter hide group collapse expand rqt_defaults filtered all",
+        "mode ns_filter topic_filter hide group collapse expand rqt_defaults all",
     ),
     (
         "Picture",
-        "view kind style size for width fit orientation layout layout_from title rows steps text bare \
-         captions font figure",
+        "view kind style size for width fit orientation layout layout_from title rows steps text bare font",
     ),
     (
         "Output",
-        "outputs output format frame_ms strip max_bytes json runs dot_profile link \
-         fields parts undecidable explain",
+        "outputs output format frame_ms strip max_bytes link fields parts undecidable explain",
     ),
     ("Evidence", "topology source infer why"),
     ("Performance", "skip_existing jobs"),
@@ -165,7 +163,6 @@ impl Typed {
     pub(crate) fn documented() -> Command {
         let command = examples(Self::command(), FIRST);
         command.mut_subcommands(|command| {
-            let is_render = command.get_name() == "render";
             let known = SCREENS.iter().find(|known| known.0 == command.get_name());
             let command = examples(command, known.map_or("", |known| known.2));
             command.mut_args(|arg| {
@@ -176,9 +173,6 @@ impl Typed {
                     .get_value_names()
                     .is_some_and(|names| names.iter().any(|name| name.contains(['|', ','])));
                 let arg = arg.hide_possible_values(lists_values);
-                // `bagreel figure` has these; `render` accepts them for older scripts.
-                let is_hidden = arg.is_hide_set() || is_render && has("figure rows steps text");
-                let arg = arg.hide(is_hidden);
                 match heading {
                     Some((heading, _)) if !arg.is_positional() => arg.help_heading(*heading),
                     _ => arg,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::figure::{FigureForm, PhaseArgs, kinds};
+use super::figure::PhaseArgs;
 use super::values::{bytes, size, width};
 use super::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use crate::export::FORMATS;
@@ -33,14 +33,6 @@ pub(crate) struct RenderArgs {
     pub(crate) look: LookArgs,
     #[command(flatten)]
     pub(crate) sequence: SequenceArgs,
-    /// Draw a figure for a paper; replaced by `bagreel figure`.
-    #[arg(long, value_name = "KIND", hide = true, value_parser = kinds(), conflicts_with_all = [
-        "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
-        "expand", "rqt_defaults", "title",
-    ])]
-    pub(crate) figure: Option<String>,
-    #[command(flatten)]
-    pub(crate) form: FigureForm,
     #[command(flatten)]
     pub(crate) phases: PhaseArgs,
 }
@@ -48,7 +40,7 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
     /// Draw the graph, or a timeline of topics. [default: graph; board if most publishers are unknown]
-    #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
+    #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"])]
     pub(crate) view: Option<String>,
     /// Draw nodes only, with one line per pair and the topics on it, or nodes and topics.
     #[arg(long, value_name = "nodes|all", value_parser = ["nodes", "all"])]
@@ -74,9 +66,6 @@ pub(crate) struct ViewArgs {
     /// Draw what `rqt_graph` shows by default.
     #[arg(long)]
     pub(crate) rqt_defaults: bool,
-    /// Write the filtered graph instead of the full one to JSON and tables.
-    #[arg(long)]
-    pub(crate) filtered: bool,
 }
 
 #[derive(Debug, Args)]
@@ -89,7 +78,7 @@ pub(crate) struct LookArgs {
     pub(crate) size: Option<(u32, u32)>,
     /// Choose page and text size for a README (830 px), a slide (1280×720), or a paper's column (88 mm) or page (181 mm).
     #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
-        conflicts_with_all = ["size", "width", "figure", "strip", "layout_from"])]
+        conflicts_with_all = ["size", "width", "strip", "layout_from"])]
     pub(crate) purpose: Option<String>,
     /// Printed width of a PDF or SVG: `88mm`, `180mm`.
     #[arg(long, value_name = "MM", value_parser = width)]
@@ -112,9 +101,6 @@ pub(crate) struct LookArgs {
     /// Draw the graph without title, legend or timeline.
     #[arg(long)]
     pub(crate) bare: bool,
-    /// Captions to show: a file of `seconds|text` lines, or a string topic.
-    #[arg(long, value_name = "FILE|TOPIC")]
-    pub(crate) captions: Option<String>,
     /// Font file for characters that the bundled font lacks.
     #[arg(long, value_name = "FILE")]
     pub(crate) font: Option<PathBuf>,
@@ -131,15 +117,6 @@ pub(crate) struct SequenceArgs {
     /// Limit a GIF's size, such as `5MB`, by dropping resolution, then frames.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub(crate) max_bytes: Option<u64>,
-    /// Layout of JSON: every window in full, or every element once with its runs. [default: windows, above 2000 runs]
-    #[arg(long, value_name = "windows|runs", value_parser = ["windows", "runs"])]
-    pub(crate) json: Option<String>,
-    /// Write one table row per run of equal windows instead of one per window.
-    #[arg(long)]
-    pub(crate) runs: bool,
-    /// Write DOT with positions for `rqt_graph`, or plain for Graphviz.
-    #[arg(long, value_name = "rqt|plain", default_value = "rqt", value_parser = ["rqt", "plain"])]
-    pub(crate) dot_profile: String,
     /// Link to add to the report, such as `player=URL`.
     #[arg(long, value_name = "NAME=URL")]
     pub(crate) link: Vec<String>,

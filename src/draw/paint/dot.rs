@@ -1,13 +1,10 @@
-//! The viewed graph as DOT text: laid out, as `rqt_graph` saves and loads it, or plain, for Graphviz to lay out.
+//! The viewed graph as DOT text, laid out as `rqt_graph` saves and loads it; Graphviz draws it, too.
 //!
 //! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s
 //! `pydotfactory.py`; everything that is written can be loaded by `dot_to_qt.py`.
 
 mod names;
-mod plain;
 mod rqt;
-
-use std::fmt::Write as _;
 
 use crate::base::geometry::Size;
 use crate::base::words;
@@ -18,7 +15,7 @@ use crate::evidence::Evidence;
 use crate::graph::{ById, Element, Elements, Id as _, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Arrow, Item, ItemKind, Looks, Mark, SeenWindow, Shown, View};
+use crate::view::{Arrow, ItemKind, Looks, Mark, Shown, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -29,12 +26,7 @@ const HEIGHT: f64 = 36.0;
 /// The height of a line of text.
 const LINE: f64 = 15.0;
 
-/// The text of a profile after the bracket of a namespace, given by its index and the indent; and between the
-/// brackets of an item.
-type SpaceText<'a> = &'a dyn Fn(usize, &str) -> String;
-type ItemText<'a> = &'a dyn Fn(usize, &Item, &Shown) -> String;
-
-/// A view with the parts that all its DOT files share: unique ids and, for the profile `rqt`, one layout.
+/// A view with the parts that all its DOT files share: unique ids and one layout.
 #[derive(Clone, Debug)]
 pub(crate) struct DotView<'a> {
     elements: &'a Elements,
@@ -43,41 +35,25 @@ pub(crate) struct DotView<'a> {
     ids: names::DotIds,
     /// Sizes, with full names as labels.
     plan: Plan,
-    layout: Option<Layout>,
+    layout: Layout,
 }
 
 impl<'a> DotView<'a> {
-    /// Prepares a view; its colours for changes come from `style`.
-    pub(crate) fn new(mission: &'a Mission, view: &'a View, style: Style) -> Self {
-        Self {
-            elements: &mission.elements,
-            view,
-            style,
-            ids: names::DotIds::new(view),
-            plan: Plan::default(),
-            layout: None,
-        }
-    }
-
-    /// Lays everything out, with sizes by full names as in `qt_dotgraph`.
-    #[must_use]
-    pub(crate) fn laid_out(mut self, fonts: &Fonts) -> Self {
-        self.plan = plan(self.view, fonts);
+    /// Lays a view out, with sizes by full names as in `qt_dotgraph`; its colours for changes come from `style`.
+    pub(crate) fn new(mission: &'a Mission, view: &'a View, style: Style, fonts: &Fonts) -> Self {
+        let plan = plan(view, fonts);
         let options = layout::LayoutOptions {
             page: Size::new(1600.0, 900.0),
             orientation: Some(Orientation::LeftRight),
             ..layout::LayoutOptions::default()
         };
-        self.layout = Some(layout::lay_out(&self.plan, &options, layout::ENGINES[0].1));
-        self
-    }
-
-    /// One window, or the [`union`](crate::view::union::union()) of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
-    /// Only the latter shows the `title`.
-    pub(crate) fn write(&self, seen: &SeenWindow, title: &str) -> String {
-        match &self.layout {
-            Some(layout) => rqt::write(self, layout, seen),
-            None => plain::write(self, seen, title),
+        Self {
+            elements: &mission.elements,
+            view,
+            style,
+            ids: names::DotIds::new(view),
+            layout: layout::lay_out(&plan, &options, layout::ENGINES[0].1),
+            plan,
         }
     }
 
@@ -86,35 +62,6 @@ impl<'a> DotView<'a> {
         let known = members.iter().map(|what| self.elements.evidence(*what));
         let words: Vec<&str> = known.fold(Evidence::NONE, Evidence::and).words().collect();
         words.join(" ")
-    }
-
-    /// Writes the namespaces and items that are directly in a namespace, given by its index, with the
-    /// attributes of a profile. Namespaces nest 16 deep at most.
-    fn members(
-        &self,
-        out: &mut String,
-        seen: &SeenWindow,
-        (home, inhabited, indent): (Option<usize>, &[bool], &str),
-        profile: (SpaceText<'_>, ItemText<'_>),
-    ) {
-        for (at, space) in self.view.namespaces.iter().enumerate() {
-            if space.parent != home || !inhabited[at] {
-                continue;
-            }
-            let (id, text) = (&self.ids.namespaces[at], profile.0(at, indent));
-            let _ = writeln!(out, "{indent}subgraph {id} {{{text}");
-            let inside = (Some(at), inhabited, &*format!("{indent} "));
-            self.members(out, seen, inside, profile);
-            let _ = writeln!(out, "{indent}}}");
-        }
-        for shown in &seen.items {
-            let at = shown.id as usize;
-            let item = self.view.items.get(shown.item());
-            if let Some(item) = item.filter(|item| item.cluster == home) {
-                let (id, text) = (&self.ids.items[at], profile.1(at, item, shown));
-                let _ = writeln!(out, "{indent}{id} [{text}];");
-            }
-        }
     }
 
     /// The colour of a change; `None` for an unchanged element.

@@ -25,8 +25,6 @@ pub struct Recorded {
     /// The numbers in the headers of streams, by index, as far as they were read.
     pub(crate) numbers: BTreeMap<usize, Numbers>,
     pub(crate) facts: Observations,
-    /// The texts of the requested topic, sorted by time.
-    pub texts: Vec<(Stamp, String)>,
     /// Problems that did not stop the reading.
     pub notices: Notices,
     /// The points at which a recorder's clock went back, sorted by time.

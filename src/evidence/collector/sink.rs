@@ -65,8 +65,7 @@ impl Sink for BagSink<'_> {
         let header = equal_stamps::first_header(connection, &schema);
         let stamped = all.options.infer_stamps && header.is_some();
         let compared = all.options.payload_bytes > 0;
-        let is_text = all.options.keeps_texts_of(connection);
-        let want = all.options.want(!readers.is_empty() || is_text, stamped);
+        let want = all.options.want(!readers.is_empty(), stamped);
         if want == Want::Payload || stamped {
             all.read.insert(self.bag);
         }
@@ -82,7 +81,6 @@ impl Sink for BagSink<'_> {
             is_numbered: schema.numbers_headers(&connection.encoding),
             header,
             schema: echo::schema(&connection.type_name, &schema).filter(|_| compared),
-            is_text,
         });
         all.announced();
         want

@@ -11,12 +11,11 @@ use crate::mission::event_log::{Detail, Event, EventId, described};
 /// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
-/// A table: its name in the file's name, an empty batch, and the function that fills it, by runs of equal windows if
-/// requested and applicable.
+/// A table: its name in the file's name, an empty batch, and the function that fills it.
 pub(super) struct Table {
     pub(super) word: &'static str,
     pub(super) batch: fn() -> Batch,
-    pub(super) fill: fn(&Mission, bool, RowTaker<'_>),
+    pub(super) fill: fn(&Mission, RowTaker<'_>),
 }
 
 type Column<R> = ColumnOf<Mission, R>;
@@ -26,22 +25,22 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "edges",
         batch: || Batch::with(EDGES),
-        fill: |all, runs, row| elements(all, Element::is_edge, runs, (EDGES, row)),
+        fill: |all, row| elements(all, Element::is_edge, EDGES, row),
     },
     Table {
         word: "topics",
         batch: || Batch::with(TOPICS),
-        fill: |all, runs, row| elements(all, Element::is_topic, runs, (TOPICS, row)),
+        fill: |all, row| elements(all, Element::is_topic, TOPICS, row),
     },
     Table {
         word: "nodes",
         batch: || Batch::with(NODES),
-        fill: |all, runs, row| elements(all, Element::is_node, runs, (NODES, row)),
+        fill: |all, row| elements(all, Element::is_node, NODES, row),
     },
     Table {
         word: "changes",
         batch: || Batch::with(CHANGES),
-        fill: |all, _, row| {
+        fill: |all, row| {
             for (at, window) in all.windows.iter().enumerate() {
                 let changes = window.changes.iter();
                 changes.for_each(|one| put(all, CHANGES, &WindowChange::new(at, one), row));
@@ -49,22 +48,22 @@ pub(super) const TABLES: &[Table] = &[
         },
     },
     Table {
-        word: "ledger",
-        batch: || Batch::with(LEDGER),
-        fill: |all, _, row| {
+        word: "events",
+        batch: || Batch::with(EVENTS),
+        fill: |all, row| {
             let ids = all.log.events.ids();
-            ids.for_each(|id| put(all, LEDGER, &id, row));
+            ids.for_each(|id| put(all, EVENTS, &id, row));
         },
     },
     Table {
         word: "phases",
         batch: || Batch::with(PHASES),
-        fill: |all, _, row| (0..all.log.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
+        fill: |all, row| (0..all.log.phases.len()).for_each(|at| put(all, PHASES, &at, row)),
     },
     Table {
         word: "bags",
         batch: || Batch::with(BAGS),
-        fill: |all, _, row| (0..all.bags.len()).for_each(|at| put(all, BAGS, &at, row)),
+        fill: |all, row| (0..all.bags.len()).for_each(|at| put(all, BAGS, &at, row)),
     },
 ];
 
@@ -135,10 +134,10 @@ element_columns! {
 fn elements(
     all: &Mission,
     is_kind: fn(&Element) -> bool,
-    has_runs: bool,
-    (columns, row): (&[Column<Seen>], RowTaker<'_>),
+    columns: &[Column<Seen>],
+    row: RowTaker<'_>,
 ) {
-    each(all, is_kind, has_runs, &mut |one| {
+    each(all, is_kind, &mut |one| {
         put(all, columns, one, row);
     });
 }
@@ -199,7 +198,7 @@ const CHANGES: &[Column<WindowChange>] = columns! {
     "to_value" Text |all, one| values(all, &one.detail).1;
 };
 
-const LEDGER: &[Column<EventId>] = columns! {
+const EVENTS: &[Column<EventId>] = columns! {
     "entry" I64 |_, id| TableCell::count(id.0);
     "kind" Text |all, id| TableCell::text(event(all, *id).kind.word());
     "what" Text |all, id| what(event(all, *id).what);

@@ -1,4 +1,4 @@
-//! JSON that people can read and `diff` can compare: one element of a list to a line, objects on one line.
+//! JSON that people can read and `diff` can compare: a line for each key of an element, an event or a window.
 
 use std::io::{self, Write};
 
@@ -6,35 +6,30 @@ use serde_json::ser::Formatter;
 
 use crate::base::words::visible_json;
 
-/// A formatter that breaks lines down to a depth; everything deeper stays on its line.
+/// The depth down to which lines are broken: 1 the mission's keys, 2 its elements and windows, 3 their keys.
+const DEEPEST: usize = 3;
+
+/// A formatter that breaks lines down to [`DEEPEST`]; everything deeper stays on its line.
 #[derive(Debug, Default)]
 pub(crate) struct LineFormatter {
     depth: usize,
-    deepest: usize,
 }
 
 impl LineFormatter {
-    /// A formatter that breaks lines to this depth: 1 the mission's keys, 2 its windows, 3 their keys, 4 the elements
-    /// in their lists.
-    pub(crate) fn down_to(deepest: usize) -> Self {
-        Self { depth: 0, deepest }
-    }
-
     fn open<W: ?Sized + Write>(&mut self, writer: &mut W, bracket: &[u8]) -> io::Result<()> {
         self.depth += 1;
         writer.write_all(bracket)
     }
 
     fn item<W: ?Sized + Write>(&self, writer: &mut W, first: bool) -> io::Result<()> {
-        match (first, self.depth <= self.deepest) {
+        match (first, self.depth <= DEEPEST) {
             (true, true) => self.new_line(writer),
             (false, true) => {
                 writer.write_all(b",")?;
                 self.new_line(writer)
             }
             (true, false) => Ok(()),
-            (false, false) if self.deepest < 4 => writer.write_all(b","),
-            (false, false) => writer.write_all(b", "),
+            (false, false) => writer.write_all(b","),
         }
     }
 

@@ -1,15 +1,12 @@
-//! The keys of a mission's JSON as it is read; all are optional except names and times.
+//! The keys of a mission's JSON as it is read; all are optional except names, windows and times.
 
 use serde::{Deserialize, Serialize};
 
-pub(super) use super::elements::{
-    ElementJson, NodeJson, PublishJson, SubscribeJson, Text, TopicJson,
-};
+use super::elements::{ElementJson, Text};
 use super::events::{EventJson, InterruptionRow, PhaseRow};
-use super::sending::OldSendingJson;
 use crate::mission::Places;
 
-#[derive(Default, Deserialize)]
+#[derive(Deserialize)]
 pub(crate) struct Raw {
     pub(crate) schema: String,
     #[serde(default)]
@@ -22,20 +19,7 @@ pub(crate) struct Raw {
     pub(crate) windows: Vec<RawWindow>,
     #[serde(default)]
     pub(crate) elements: Vec<ElementJson<'static>>,
-    // The elements up to schema 2, by kind.
-    #[serde(default)]
-    pub(crate) nodes: Vec<NodeJson<'static>>,
-    #[serde(default)]
-    pub(crate) topics: Vec<TopicJson<'static>>,
-    #[serde(default)]
-    pub(crate) publishes: Vec<PublishJson<'static>>,
-    #[serde(default)]
-    pub(crate) subscribes: Vec<PublishJson<'static>>,
-    pub(crate) sending: Option<OldSendingJson<'static>>,
-    pub(crate) form: Option<String>,
     pub(crate) events: Option<Vec<EventJson<'static>>>,
-    /// The events up to schema 2.
-    pub(crate) ledger: Option<Vec<EventJson<'static>>>,
     #[serde(default)]
     pub(crate) interruptions: Vec<InterruptionRow>,
     #[serde(default)]
@@ -66,18 +50,10 @@ pub(crate) struct NoticeJson<'a> {
     pub(crate) text: String,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Deserialize)]
 pub(crate) struct RawWindow {
     pub(crate) start_ns: i64,
     pub(crate) end_ns: i64,
     pub(crate) partial: Option<bool>,
     pub(crate) messages: Option<u64>,
-    #[serde(default)]
-    pub(crate) nodes: Vec<NodeJson<'static>>,
-    #[serde(default)]
-    pub(crate) topics: Vec<TopicJson<'static>>,
-    #[serde(default)]
-    pub(crate) publishes: Vec<PublishJson<'static>>,
-    #[serde(default)]
-    pub(crate) subscribes: Vec<PublishJson<'static>>,
 }

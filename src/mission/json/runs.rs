@@ -1,8 +1,7 @@
-//! The JSON form of a mission with very many windows: each element once, with the windows in which it exists and its
-//! states in them as columns.
+//! The windows in which an element exists, with its states and numbers in them as columns: with every window in full,
+//! the file of a long mission would be larger than its bag.
 //!
 //! ```text
-//! "form": "runs",
 //! "windows": [{"index": 0, "start_ns": …, "end_ns": …, "messages": …, "changes": […]}, …],
 //! "elements": [{"what": "topic", "name": "/scan", "types": […], …, "in": {"windows": [[0, 99], [120, 35999]],
 //!   "state": [["active", 35979]], "degree": [["measured", 35979]], "count": [9, [10, 700], 11, …], …}}, …]

@@ -8,13 +8,13 @@
 //!
 //! The stretches of a topic are those of all unknown senders together. Flags are 1 for messages at even
 //! intervals, plus 2 if the stretch begins where the previous one ends. `pauses` are the longest intervals
-//! between two messages. Up to schema 2 these were separate lists in `sending`.
+//! between two messages.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{PublishJson, Text, TopicJson, spans};
+use super::elements::{EdgeJson, TopicJson, spans};
 use crate::base::time::Stamp;
 use crate::graph::history::{Sender, Sending, Stretch};
 use crate::graph::{ById, Elements, NodeId, TopicId};
@@ -30,28 +30,6 @@ pub(crate) struct SendingJson {
     latched: bool,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     stretches: Vec<StretchJson>,
-}
-
-/// The sending of a mission up to schema 2.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct OldSendingJson<'a> {
-    senders: Vec<SenderJson<'a>>,
-    pauses: Vec<PausesJson<'a>>,
-}
-
-#[derive(Deserialize)]
-struct SenderJson<'a> {
-    topic: Text<'a>,
-    node: Option<Text<'a>>,
-    #[serde(flatten)]
-    sending: SendingJson,
-}
-
-#[derive(Deserialize)]
-struct PausesJson<'a> {
-    topic: Text<'a>,
-    spans: Vec<[i64; 2]>,
 }
 
 /// The senders by topic and node; `None` means all unknown ones.
@@ -73,34 +51,22 @@ impl From<Option<&Sender>> for SendingJson {
     }
 }
 
-/// The sending of a mission with these names. Senders and topics that are in no window are ignored.
+/// The sending of a mission with these elements.
 ///
 /// # Errors
 /// The mistake in the stretches.
-pub(super) fn sending(
-    old: Option<OldSendingJson<'_>>,
-    topics: &[TopicJson<'_>],
-    publishes: &[PublishJson<'_>],
+pub(super) fn sending<'a>(
+    topics: impl Iterator<Item = &'a TopicJson<'static>> + Clone,
+    publishes: impl Iterator<Item = &'a EdgeJson<'static>>,
     elements: &Elements,
 ) -> Result<Sending, String> {
-    let old = old.unwrap_or_default();
-    let unnamed = topics.iter().map(|one| (&one.name, None, &one.sending));
-    let named = publishes
-        .iter()
-        .map(|one| (&one.topic, Some(&one.node), &one.edge.sending));
-    let earlier = old
-        .senders
-        .iter()
-        .map(|one| (&one.topic, one.node.as_ref(), &one.sending));
+    let unnamed = topics.clone().map(|one| (&one.name, None, &one.sending));
+    let named = publishes.map(|one| (&one.topic, Some(&one.node), &one.sending));
     let mut all: BTreeMap<(TopicId, Option<NodeId>), Sender> = BTreeMap::new();
-    for (name, node, sent) in unnamed.chain(named).chain(earlier) {
-        let node = node.map(|name| elements.node(name));
-        let (Some(topic), None | Some(Some(_))) = (elements.topic(name), node) else {
+    for (name, node, sent) in unnamed.chain(named) {
+        let Some(topic) = elements.topic(name).filter(|_| !sent.stretches.is_empty()) else {
             continue;
         };
-        if sent.stretches.is_empty() {
-            continue;
-        }
         let stretches: Vec<Stretch> = sent.stretches.iter().copied().map(stretch).collect();
         let is_whole = |s: &Stretch| s.first <= s.last && s.count > 0 && s.period >= 0;
         let ascend = |pair: &[Stretch]| pair[0].last <= pair[1].first;
@@ -109,21 +75,19 @@ pub(super) fn sending(
         }
         let sender = Sender {
             topic,
-            node: node.flatten(),
+            node: node.and_then(|name| elements.node(name)),
             is_latched: sent.latched,
             stretches,
         };
         all.insert((topic, sender.node), sender);
     }
     let mut pauses = ById::default();
-    let own = topics.iter().filter(|one| !one.pauses.is_empty());
-    let own = own.map(|one| (&one.name, &one.pauses));
-    for (name, found) in own.chain(old.pauses.iter().map(|one| (&one.topic, &one.spans))) {
-        if let Some(topic) = elements.topic(name) {
+    for one in topics.filter(|one| !one.pauses.is_empty()) {
+        if let Some(topic) = elements.topic(&one.name) {
             if pauses.is_empty() {
                 pauses = ById::like(&elements.topics, Vec::new());
             }
-            pauses[topic] = spans(found);
+            pauses[topic] = spans(&one.pauses);
         }
     }
     Ok(Sending {

@@ -1,4 +1,4 @@
-//! The profile `rqt`: a graph as `rqt_graph` saves it, with all positions, so that it can load the file.
+//! A graph as `rqt_graph` saves it, with all positions, so that it can load the file.
 //!
 //! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and does
 //! not draw elements without a position. It fails on edge labels without `lp`, widths that are not whole
@@ -11,7 +11,7 @@ use super::names::{escape_name, quoted};
 use super::{DotView, label, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
 use crate::graph::{Element, Id as _};
-use crate::layout::{Layout, Route};
+use crate::layout::Route;
 use crate::view::{Arrow, ArrowKind, Item, ItemId, ItemKind, Mark, SeenWindow, Shown};
 
 /// The length of an arrow's head in points, as Graphviz draws it.
@@ -20,37 +20,56 @@ const HEAD: f64 = 10.0;
 const MARGIN: f64 = 8.0;
 const POINTS_PER_INCH: f64 = 72.0;
 
-pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, seen: &SeenWindow) -> String {
-    let writer = RqtWriter { drawing, layout };
-    let size = layout.size;
-    let bb = format!("0,0,{},{}", number(size.w), number(size.h));
-    let mut out = format!(
-        "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
-    );
-    let space = |at: usize, _: &str| {
-        let name = &drawing.view.namespaces[at].name;
-        format!(" graph [{}];", writer.cluster(at, name))
-    };
-    let item = |at: usize, item: &Item, shown: &Shown| writer.item(item, layout.boxes[at], shown);
-    let whole = (None, &*drawing.view.inhabited(seen), " ");
-    drawing.members(&mut out, seen, whole, (&space, &item));
-    for shown in &seen.arrows {
-        writer.arrow(&mut out, shown);
+impl DotView<'_> {
+    /// One window, or the [`union`](crate::view::union::union()) of all.
+    pub(crate) fn write(&self, seen: &SeenWindow) -> String {
+        let size = self.layout.size;
+        let bb = format!("0,0,{},{}", number(size.w), number(size.h));
+        let mut out = format!(
+            "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
+        );
+        let inhabited = self.view.inhabited(seen);
+        self.members(&mut out, seen, &inhabited, None, " ");
+        for shown in &seen.arrows {
+            self.arrow(&mut out, shown);
+        }
+        out.push_str("}\n");
+        out
     }
-    out.push_str("}\n");
-    out
-}
 
-struct RqtWriter<'a> {
-    drawing: &'a DotView<'a>,
-    layout: &'a Layout,
-}
+    /// Writes the namespaces and items that are directly in a namespace, given by its index. Namespaces nest 16 deep at
+    /// most.
+    fn members(
+        &self,
+        out: &mut String,
+        seen: &SeenWindow,
+        inhabited: &[bool],
+        home: Option<usize>,
+        indent: &str,
+    ) {
+        for (at, space) in self.view.namespaces.iter().enumerate() {
+            if space.parent != home || !inhabited[at] {
+                continue;
+            }
+            let (id, text) = (&self.ids.namespaces[at], self.cluster(at, &space.name));
+            let _ = writeln!(out, "{indent}subgraph {id} {{ graph [{text}];");
+            self.members(out, seen, inhabited, Some(at), &format!("{indent} "));
+            let _ = writeln!(out, "{indent}}}");
+        }
+        for shown in &seen.items {
+            let at = shown.id as usize;
+            let item = self.view.items.get(shown.item());
+            if let Some(item) = item.filter(|item| item.cluster == home) {
+                let (id, place) = (&self.ids.items[at], self.layout.boxes[at]);
+                let text = self.item(item, place, shown);
+                let _ = writeln!(out, "{indent}{id} [{text}];");
+            }
+        }
+    }
 
-impl RqtWriter<'_> {
     fn cluster(&self, at: usize, name: &str) -> String {
         let place = self.layout.clusters.get(at).copied().unwrap_or_default();
         let title = self
-            .drawing
             .plan
             .clusters
             .get(at)
@@ -84,7 +103,7 @@ impl RqtWriter<'_> {
             quoted(&url),
             escape_name(&url),
         );
-        if let Some(colour) = self.drawing.colour(shown) {
+        if let Some(colour) = self.colour(shown) {
             let _ = write!(out, ", color=\"{colour}\"");
         }
         self.extras(&mut out, shown, &item.members);
@@ -93,13 +112,12 @@ impl RqtWriter<'_> {
 
     fn arrow(&self, out: &mut String, shown: &Shown) {
         let at = shown.arrow();
-        let (Some(arrow), Some(route)) = (
-            self.drawing.view.arrows.get(at),
-            self.layout.routes.get(at.at()),
-        ) else {
+        let (Some(arrow), Some(route)) =
+            (self.view.arrows.get(at), self.layout.routes.get(at.at()))
+        else {
             return;
         };
-        let ids = &self.drawing.ids.items;
+        let ids = &self.ids.items;
         let (Some(from), Some(to)) = (ids.get(arrow.from.at()), ids.get(arrow.to.at())) else {
             return;
         };
@@ -117,7 +135,7 @@ impl RqtWriter<'_> {
         if let ArrowKind::Direct(topic) = &arrow.kind {
             let _ = write!(out, ", URL=\"{}\"", escape_name(&format!("topic:{topic}")));
         }
-        if let Some(colour) = self.drawing.colour(shown) {
+        if let Some(colour) = self.colour(shown) {
             let _ = write!(out, ", color=\"{colour}\"");
         }
         let _ = write!(out, ", edgetooltip={}", quoted(&self.tooltip(arrow, shown)));
@@ -129,7 +147,7 @@ impl RqtWriter<'_> {
     fn extras(&self, out: &mut String, shown: &Shown, members: &[Element]) {
         let (state, confidence) = (shown.state.word(), shown.confidence.word());
         let _ = write!(out, ", state={state}, degree={confidence}");
-        let evidence = self.drawing.evidence(members);
+        let evidence = self.evidence(members);
         if !evidence.is_empty() {
             let _ = write!(out, ", evidence={}", quoted(&evidence));
         }
@@ -147,7 +165,7 @@ impl RqtWriter<'_> {
     /// The tooltip in the style of `rqt_graph`: a line per value. Qt interprets it as rich text.
     fn tooltip(&self, arrow: &Arrow, shown: &Shown) -> String {
         let name = |id: ItemId| {
-            let item = self.drawing.view.items.get(id);
+            let item = self.view.items.get(id);
             rich(item.map_or("", |item| item.name.as_ref()))
         };
         let (from, to) = (name(arrow.from), name(arrow.to));
@@ -174,7 +192,7 @@ impl RqtWriter<'_> {
         if let (Some(count), true) = (shown.count, shown.mark != Some(Mark::Removed)) {
             let _ = write!(out, "\nmessages: {count}");
         }
-        let evidence = self.drawing.evidence(&arrow.members);
+        let evidence = self.evidence(&arrow.members);
         if !evidence.is_empty() {
             let _ = write!(out, "\nevidence: {evidence}");
         }
@@ -183,7 +201,7 @@ impl RqtWriter<'_> {
 
     /// The quality of service of a single topic.
     fn qos(&self, members: &[Element]) -> Option<String> {
-        let all = self.drawing.elements;
+        let all = self.elements;
         let (Some(_), Some(topic)) = all.ends(*members.first()?) else {
             return None;
         };
@@ -269,8 +287,8 @@ mod tests {
         let mission = mission(windows);
         let (view, _) = view(&mission, options);
         let style = Style::builtin("light").unwrap();
-        let drawing = DotView::new(&mission, &view, style).laid_out(&Fonts::bundled());
-        drawing.write(&view.seen(view.frames.len() - 1), "")
+        let drawing = DotView::new(&mission, &view, style, &Fonts::bundled());
+        drawing.write(&view.seen(view.frames.len() - 1))
     }
 
     /// The line that begins with this, without indent.
