@@ -7,7 +7,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::lines::groups;
-use crate::support::shared;
+use crate::support::{shared, windows};
 
 /// The mission as JSON, and a picture of each of its windows.
 fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
@@ -26,7 +26,8 @@ fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
         .unwrap();
     assert!(done.status.success(), "{done:?}");
     let mission = std::fs::read_to_string(out("mission.json")).unwrap();
-    let mission: Value = serde_json::from_str(&mission).unwrap();
+    let mut mission: Value = serde_json::from_str(&mission).unwrap();
+    mission["windows"] = windows::windows(&mission).into();
     let files = std::fs::read_dir(folder.path()).unwrap();
     let mut files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
     files.retain(|path| path.extension().is_some_and(|end| end == "svg"));

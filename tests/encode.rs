@@ -252,7 +252,7 @@ fn an_interrupted_run_leaves_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let output =
         |name: &str| Output::parse(&folder.path().join(name).to_string_lossy(), None).unwrap();
-    let outputs = [output("a.gif"), output("b{n}.png"), output("d.json")];
+    let outputs = [output("a.gif"), output("b.pdf"), output("d.json")];
     let at_once = &mut |_: usize, _: usize| ControlFlow::Break(());
     let result = run(&outputs, SequenceOptions::default(), at_once);
     assert!(matches!(result, Err(Error::Interrupted)));

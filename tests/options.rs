@@ -199,7 +199,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("info", "r.bag", "--why /chta", "hint: the nearest name is `/chat`"),
     ("info", "r.bag", "--why /chat /chta", "no node or topic `/chta`"),
     ("extract", "r.bag --fields -o out/t", "--topic-filter /chta", "hint: the nearest name is `/chat`"),
-    ("render", "r.bag -o out/x.json", "--title Hello", "hint: it applies to pictures, reports"),
+    ("render", "r.bag -o out/x.json", "--title Hello", "hint: it applies to pictures and reports"),
     ("render", "r.bag -o out/x.html", "--bare", "hint: it applies to animations, pages and"),
     ("render", "r.bag -o out/x.json", "--group none", "hint: data contains every element by itself"),
     ("render", "r.bag -o out/x.csv", "--collapse /ns", "hint: data contains every element by itself"),

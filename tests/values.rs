@@ -174,7 +174,7 @@ fn a_cut_is_refused_if_inapplicable() {
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("x.json").display().to_string();
     assert!(bagreel(&["render", &bag, "-o", &json, "-q"]).0);
-    let refused: [&[&str]; 4] = [
+    let refused: [&[&str]; 3] = [
         &[
             "render", &bag, "--cut", "phases", "--period", "5", "-o", "-", "--format", "json",
         ],

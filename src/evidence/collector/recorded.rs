@@ -99,7 +99,6 @@ impl Recorded {
         let has_messages = |at: &usize| self.messages.count(self.streams[*at].times) > 0;
         self.facts.headers.retain(|at, _| has_messages(at));
         self.numbers.values_mut().for_each(|own| own.clip(span));
-        self.texts.retain(|(time, _)| span.contains(*time));
         Ok(removed)
     }
 
