@@ -7,13 +7,13 @@ use crate::architecture;
 use crate::options;
 
 /// Lines of `src` that are neither blank nor comment nor test.
-const MOST_LINES: usize = 74_592;
+const MOST_LINES: usize = 73_984;
 /// Entries of the dependency sections in `Cargo.toml`, optional ones included, those of tests not.
 const MOST_DEPENDENCIES: usize = 50;
 /// Options in the help of all commands; one that three commands have counts three times.
-const MOST_OPTIONS: usize = 138;
+const MOST_OPTIONS: usize = 133;
 /// Options in the help of `render`.
-const MOST_OPTIONS_OF_RENDER: usize = 46;
+const MOST_OPTIONS_OF_RENDER: usize = 41;
 
 /// The code lines of a file: an inner module of tests ends it.
 fn lines(path: &PathBuf) -> usize {
