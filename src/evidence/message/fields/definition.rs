@@ -85,9 +85,10 @@ impl Definition {
         let is_header = kind == "Header";
         if wanted.package.is_empty() {
             // `Header` alone refers to that of `std_msgs`, in ROS 1 always.
-            wanted.package = match is_header && !is_cdr {
-                true => HEADERS.to_owned(),
-                false => self.messages[from].package.clone(),
+            wanted.package = if is_header && !is_cdr {
+                HEADERS.to_owned()
+            } else {
+                self.messages[from].package.clone()
             };
         }
         let found = self.first(|_, m| m.is_called(&wanted));

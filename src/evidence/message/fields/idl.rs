@@ -103,10 +103,10 @@ fn structures(tokens: &mut dyn Iterator<Item = &str>) -> Result<Vec<MessageField
         statement.clear();
     }
     let is_whole = statement.is_empty() && modules.is_empty() && !is_inside;
-    match found.is_empty() {
+    match &found[..] {
         _ if !is_whole => Err("its definition in IDL ends early".to_owned()),
-        true => Err("its definition in IDL has no `struct`".to_owned()),
-        false => Ok(found),
+        [] => Err("its definition in IDL has no `struct`".to_owned()),
+        _ => Ok(found),
     }
 }
 
