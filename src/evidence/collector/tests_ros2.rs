@@ -255,7 +255,7 @@ fn discovery_names_nodes_with_either_length_of_identifier() {
 }
 
 #[test]
-fn service_events_prove_their_topic() {
+fn service_events_prove_their_topic_and_their_service() {
     let message = Payload::cdr()
         .byte(1)
         .time()
@@ -264,7 +264,14 @@ fn service_events_prove_their_topic() {
         .u32(0)
         .u32(0);
     let all = observations("/add/_service_event", "a/srv/Add_Event", None, &message);
-    assert_eq!(all, ["Topic /add/_service_event"]);
+    assert_eq!(
+        all,
+        [
+            "Topic /add",
+            "Topic /add/_service_event",
+            "Type /add a/srv/Add"
+        ]
+    );
 }
 
 #[test]

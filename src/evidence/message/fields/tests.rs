@@ -384,7 +384,7 @@ fn sections_are_read_in_their_own_form() {
                 .collect::<Vec<_>>()
         })
     };
-    assert_eq!(names("a/srv/Go_Request").unwrap(), ["to.kind", "to.x[]"]);
+    assert_eq!(names("a/srv/Go_Request").unwrap(), ["to.kind", "to.x"]);
     assert_eq!(names("a/srv/Go_Response").unwrap(), ["why"]);
     let event = names("a/srv/Go_Event").unwrap();
     assert_eq!(
