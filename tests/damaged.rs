@@ -577,10 +577,7 @@ fn a_record_longer_than_its_chunk_stops_the_second_reader() {
     });
     bytes[message + 3] = 0x7f;
     let (_dir, path) = placed("x.mcap", &bytes);
-    let options = OpenOptions {
-        verify: true,
-        ..OpenOptions::default()
-    };
+    let options = OpenOptions { verify: true };
     let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
     assert!(!report.complete && kept.stamps.len() < truth, "{report:?}");
 }
@@ -611,10 +608,7 @@ fn the_head_of_a_record_beyond_its_chunk_stops_the_second_reader() {
     bytes.splice(end..end, [0x80, 0, 0, 0, 0]);
     bytes.splice(end + 5..end + 5, [0; 20]);
     let (_dir, path) = placed("x.mcap", &bytes);
-    let options = OpenOptions {
-        verify: true,
-        ..OpenOptions::default()
-    };
+    let options = OpenOptions { verify: true };
     let (report, _) = read_as(&path, Want::Payload, None, &options).unwrap();
     assert!(!report.complete, "{report:?}");
 }

@@ -343,7 +343,7 @@ fn existing_tables_are_kept_unless_the_bag_is_newer() {
     let bag = fs::read(dir.path().join("bags/a.bag")).unwrap();
     fs::write(dir.path().join("bags/foreign.bag"), bag).unwrap();
     let part = dir.path().join("bags/day/r_2024-05-03-14-08-22_1.bag");
-    let later = SystemTime::now() + Duration::from_secs(60);
+    let later = SystemTime::now() + Duration::from_mins(1);
     File::options()
         .append(true)
         .open(part)

@@ -93,6 +93,7 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("extract", "r.bag -o out/x.csv", "--start 20"),
     ("extract", "r.bag -o out/x.csv", "--end 20"),
     ("tables", "r.bag", "--output out"),
+    #[cfg(feature = "parquet")]
     ("tables", "r.bag -o out", "--format parquet"),
     ("tables", "r.bag -o out", "--period 7s"),
     ("tables", "r.bag -o out", "--align bag"),

@@ -144,10 +144,7 @@ fn the_second_reader_agrees() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         let (_dir, path) = placed(&name, &bytes);
-        let options = OpenOptions {
-            verify: true,
-            ..OpenOptions::default()
-        };
+        let options = OpenOptions { verify: true };
         let (report, second) = read_as(&path, Want::Payload, None, &options).unwrap();
         let (_, first) = read(&path, Want::Payload).unwrap();
         assert_eq!(
@@ -556,13 +553,7 @@ fn damage_never_causes_panics_hangs_or_invented_messages() {
         let rounds = if name.contains(".db3") { 15 } else { 60 };
         for round in 0..rounds {
             let (_dir, path) = placed(&name, &damage(&bytes, &mut dice));
-            for options in [
-                OpenOptions::default(),
-                OpenOptions {
-                    verify: true,
-                    ..OpenOptions::default()
-                },
-            ] {
+            for options in [OpenOptions::default(), OpenOptions { verify: true }] {
                 if let Ok((_, kept)) = read_as(&path, Want::Payload, None, &options) {
                     let most = recording.messages.len() * 3;
                     assert!(
@@ -605,13 +596,7 @@ fn wrong_numbers_are_tolerated_or_reported() {
     }
     for bytes in cases {
         let (_dir, path) = placed("x.bag", &bytes);
-        for options in [
-            OpenOptions::default(),
-            OpenOptions {
-                verify: true,
-                ..OpenOptions::default()
-            },
-        ] {
+        for options in [OpenOptions::default(), OpenOptions { verify: true }] {
             let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
             let all = kept.stamps.len() == recording.messages.len();
             assert!(

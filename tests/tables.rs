@@ -640,6 +640,7 @@ fn a_build_without_parquet_names_those_with_it() {
             "extract", WAREHOUSE, "-o", "x", "--fields", "--format", "parquet",
         ],
         &["info", WAREHOUSE, "--format", "parquet"],
+        &["tables", WAREHOUSE, "-o", "x", "--format", "parquet"],
     ] {
         let said = ends(dir.path(), args, 2);
         assert!(

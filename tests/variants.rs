@@ -471,10 +471,7 @@ fn every_combination_of_optional_parts_is_read_in_full() {
         assert!(report.complete, "{at}: {:?}", kept.notices);
         assert_whole(&kept, *content, &at);
         indexed += usize::from(report.tier == Tier::Index && !content.times.is_empty());
-        let options = OpenOptions {
-            verify: true,
-            ..OpenOptions::default()
-        };
+        let options = OpenOptions { verify: true };
         let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
         assert!(report.complete, "{at}: {:?}", report.tier_reason);
         assert_whole(&kept, *content, &at);

@@ -66,6 +66,7 @@ pub(super) fn events(
 }
 
 /// The requested form of a log.
+#[derive(Clone, Copy)]
 struct LogOf {
     format: LogFormat,
     options: LogOptions,

@@ -43,8 +43,9 @@ fn summary(done: &Tabled) -> String {
         usize::try_from(done.messages).unwrap_or(usize::MAX),
         "message",
     );
-    match of.is_empty() {
-        true => format!("{tables} of {messages}"),
-        false => format!("{tables} of {messages} ({})", of.join(", ")),
+    if of.is_empty() {
+        format!("{tables} of {messages}")
+    } else {
+        format!("{tables} of {messages} ({})", of.join(", "))
     }
 }

@@ -23,10 +23,7 @@ pub(super) struct Collected {
 
 /// Reads every bag once; with `verify` by the second, independent reader.
 pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Collected> {
-    let options = OpenOptions {
-        verify,
-        ..OpenOptions::default()
-    };
+    let options = OpenOptions { verify };
     let (inputs, twice) = each_once(&reading.inputs)?;
     let whole: u64 = inputs.iter().filter_map(bag::size_on_disk).sum();
     check_named(reading, &inputs)?;

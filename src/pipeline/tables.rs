@@ -101,7 +101,7 @@ pub fn tables(job: &Tables, watch: &mut dyn Watch) -> Result<Tabled> {
         let (mut done, mut outcome) = (Tabled::default(), Ok(()));
         for (at, one) in (1..).zip(from) {
             watch.progress(at, bags.len() as u64);
-            outcome = outcome.and(one.map(|one| done.add(one)));
+            outcome = outcome.and(one.map(|one| done.add(&one)));
             if watch.stopped() {
                 outcome = Err(Error::Interrupted);
             }
@@ -112,7 +112,7 @@ pub fn tables(job: &Tables, watch: &mut dyn Watch) -> Result<Tabled> {
 }
 
 impl Tabled {
-    fn add(&mut self, other: Self) {
+    fn add(&mut self, other: &Self) {
         self.files += other.files;
         self.kept += other.kept;
         self.unreadable += other.unreadable;

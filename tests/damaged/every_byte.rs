@@ -186,10 +186,7 @@ fn foreign_records_in_a_chunk_are_reported_by_both_readers() {
         bytes[at - 1] = 10;
     }
     for verify in [false, true] {
-        let options = OpenOptions {
-            verify,
-            ..OpenOptions::default()
-        };
+        let options = OpenOptions { verify };
         let (_dir, path) = placed("x.bag", &bytes);
         let (report, kept) = read_as(&path, Want::Stamps, None, &options).unwrap();
         assert_eq!(kept.stamps.len(), truth - lost, "{:?}", kept.notices);
