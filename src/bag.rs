@@ -115,7 +115,7 @@ pub(crate) fn follow(input: &Input) -> Result<Box<dyn Growing>> {
             Some(Input::Path(newest))
         }
         Input::Path(path) => closed(path).map(Input::Path),
-        _ => None,
+        Input::Stdin => None,
     };
     let input = within.as_ref().unwrap_or(input);
     match input {

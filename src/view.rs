@@ -277,11 +277,6 @@ impl Arrow {
         format!("{}{service}", self.kind.word())
     }
 
-    /// The number that determines its thickness: messages or kilobytes per second.
-    pub(crate) fn flow(&self, shown: &Shown) -> Option<f64> {
-        shown.steady_hz
-    }
-
     /// The topic that an arrow from node to node carries, or the topics of a bundle in a window (`/scan +5`), those
     /// with the highest rate first; `None` for one from or to a topic.
     pub fn carries(&self, shown: &Shown) -> Option<String> {

@@ -195,7 +195,10 @@ mod tests {
             ..bag(&[(0, 5)])
         };
         let late = at_0(900, 2 * GAP_NS);
-        assert_eq!(all(&[late.clone()]).span.unwrap().start, Stamp(1));
+        assert_eq!(
+            all(std::slice::from_ref(&late)).span.unwrap().start,
+            Stamp(1)
+        );
         assert_eq!(
             all(&[late.clone(), bag(&[(0, 9)])]).span.unwrap().start,
             Stamp(1)

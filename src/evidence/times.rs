@@ -248,9 +248,10 @@ impl Stamps {
         let mut many = 0;
         for block in blocks.filter(|block| block.first < span.end && span.start <= block.last) {
             let is_inside = |(time, _): &&(Stamp, u32)| span.contains(*time);
-            many += match span.contains(block.first) && span.contains(block.last) {
-                true => u64::from(block.count),
-                false => self.load(block)?.iter().filter(is_inside).count() as u64,
+            many += if span.contains(block.first) && span.contains(block.last) {
+                u64::from(block.count)
+            } else {
+                self.load(block)?.iter().filter(is_inside).count() as u64
             };
         }
         Ok(many)

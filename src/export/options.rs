@@ -8,10 +8,6 @@ pub use crate::draw::strip::Choice;
 
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "choices that do not depend on each other"
-)]
 pub struct SequenceOptions {
     /// The time for which a window is shown, in milliseconds, ≥ 20.
     pub frame_ms: u32,

@@ -117,7 +117,7 @@ impl LookClass {
             confidence: shown.confidence,
             mark: shown.mark,
             is_starved: shown.is_starved,
-            step: arrow.map_or(0, |arrow| width_step(arrow.flow(shown))),
+            step: arrow.map_or(0, |_| width_step(shown.steady_hz)),
         }
     }
 

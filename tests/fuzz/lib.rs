@@ -78,7 +78,7 @@ impl Sink for Nothing {
 /// Reads an input with all payloads.
 pub fn read_bag(path: &Path, verify: bool) {
     let input = Input::Path(path.to_owned());
-    if let Ok(mut reader) = bag::open(&input, &OpenOptions { verify, ..OpenOptions::default() }) {
+    if let Ok(mut reader) = bag::open(&input, &OpenOptions { verify }) {
         let _ = reader.span();
         let mut nothing = Nothing::default();
         if reader.read(None, &mut nothing).is_ok() {
@@ -93,7 +93,7 @@ fn count(bytes: &[u8], verify: bool) -> Option<(u64, bool)> {
     let mut counted = None;
     as_file("x", bytes, |path| {
         let input = Input::Path(path.to_owned());
-        let Ok(mut reader) = bag::open(&input, &OpenOptions { verify, ..OpenOptions::default() }) else {
+        let Ok(mut reader) = bag::open(&input, &OpenOptions { verify }) else {
             return;
         };
         let mut nothing = Nothing::default();

@@ -228,7 +228,7 @@ impl Arrows<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> (Group, Group) {
-        let look = options::of_arrow(self.style, &arrow.kind, shown, arrow.flow(shown));
+        let look = options::of_arrow(self.style, &arrow.kind, shown, shown.steady_hz);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
         let mut group = Group {

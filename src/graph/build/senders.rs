@@ -158,34 +158,42 @@ impl SenderTimes {
     }
 }
 
+/// The streams of one sender together.
+struct Together {
+    latched: bool,
+    /// The first and the last moment of its recordings that are not empty.
+    recording: Option<(Stamp, Stamp)>,
+}
+
 /// The index of each stream's sender, and the senders without times yet.
 fn places(
     streams: &[&Stream],
     recordings: &[Option<(Stamp, Stamp)>],
 ) -> (Vec<usize>, Vec<SenderTimes>) {
-    let mut latched: BTreeMap<Option<Name>, (bool, Option<(Stamp, Stamp)>)> = BTreeMap::new();
+    let mut senders: BTreeMap<Option<Name>, Together> = BTreeMap::new();
     for stream in streams {
-        let (is_latched, all) = latched.entry(sender(stream)).or_insert((true, None));
-        *is_latched &= stream.latched;
+        let together = senders.entry(sender(stream)).or_insert(Together {
+            latched: true,
+            recording: None,
+        });
+        together.latched &= stream.latched;
         if let Some(own) = recordings[stream.bag] {
-            let all = all.get_or_insert(own);
+            let all = together.recording.get_or_insert(own);
             *all = (all.0.min(own.0), all.1.max(own.1));
         }
     }
-    let places: BTreeMap<Option<Name>, usize> = latched.keys().copied().zip(0..).collect();
+    let places: BTreeMap<Option<Name>, usize> = senders.keys().copied().zip(0..).collect();
     let places = streams
         .iter()
         .map(|stream| places[&sender(stream)])
         .collect();
-    let received = latched
-        .iter()
-        .map(|(node, (latched, recording))| SenderTimes {
-            node: *node,
-            latched: *latched,
-            recording: recording.unwrap_or((Stamp::MIN, Stamp::MAX)),
-            times: Vec::new(),
-            every: 1,
-            passed: 0,
-        });
+    let received = senders.iter().map(|(node, together)| SenderTimes {
+        node: *node,
+        latched: together.latched,
+        recording: together.recording.unwrap_or((Stamp::MIN, Stamp::MAX)),
+        times: Vec::new(),
+        every: 1,
+        passed: 0,
+    });
     (places, received.collect())
 }
