@@ -178,10 +178,10 @@ fn summed(bag: &Recording) -> Info {
     ))))
 }
 
-/// The rate of a topic, rounded.
-fn hz(info: &Info, name: &str) -> Option<i64> {
+/// The rate of a topic with one decimal.
+fn hz(info: &Info, name: &str) -> Option<String> {
     let topic = info.topics.iter().find(|topic| topic.name == name).unwrap();
-    topic.hz.map(|hz| (hz * 10.0).round() as i64)
+    topic.hz.map(|hz| format!("{hz:.1}"))
 }
 
 #[test]
@@ -201,9 +201,12 @@ fn a_rate_is_that_from_the_first_message_to_the_last() {
     let info = summed(&bag);
     assert_eq!(
         (hz(&info, "/chatter"), hz(&info, "/other")),
-        (Some(100), Some(100))
+        (Some("10.0".into()), Some("10.0".into()))
     );
-    assert_eq!((hz(&info, "/once"), hz(&info, "/rosout")), (None, Some(2)));
+    assert_eq!(
+        (hz(&info, "/once"), hz(&info, "/rosout")),
+        (None, Some("0.2".into()))
+    );
 }
 
 #[test]

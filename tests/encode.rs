@@ -181,11 +181,11 @@ fn every_animation_has_the_frames_of_the_images() {
     );
     let gif = gif_frames(&folder.path().join("a.gif"));
     assert_eq!(gif.len(), 8);
-    for k in 0..8 {
+    for (k, frame) in gif.iter().enumerate() {
         let still = png(&folder.path().join(format!("p{k}.png")));
         assert_eq!(still, png(&folder.path().join(format!("w{k}.webp"))));
-        assert!(psnr(&still, &gif[k].1) > 50.0);
-        assert_eq!(gif[k].0, 1000);
+        assert!(psnr(&still, &frame.1) > 50.0);
+        assert_eq!(frame.0, 1000);
     }
     let drawings = names(&folder.path().join("s"));
     assert_eq!(

@@ -513,11 +513,14 @@ impl Tape {
 /// What the recorder logs of each topic.
 const TAKES: &[u8] = b"Subscribing to ";
 
+/// How a recording is changed, in words and as a function, and the fewest subscriptions that are still found.
+type Changed<'a> = (&'static str, &'a dyn Fn(&mut Tape), usize);
+
 /// Every subscription in a window, with whether it is stated; except those of recorders and players.
 fn subscriptions(built: &Built) -> BTreeMap<Vec<String>, bool> {
     let all = &built.elements;
     let mut found: BTreeMap<Vec<String>, bool> = BTreeMap::new();
-    for (id, state) in built.graphs.iter().flat_map(|graph| graph.subscribes()) {
+    for (id, state) in built.graphs.iter().flat_map(bagreel::Graph::subscribes) {
         let edge = &all.subscribes[id];
         let [node, topic] = [
             all.nodes[edge.node].name.as_str(),
@@ -562,8 +565,7 @@ fn lists_of_topics_are_read_with_care_unless_everything_was_recorded() {
             connection.publisher = Some("/play_1795170682045".into());
         }
     };
-    // How the recording was changed, and the fewest subscriptions that are still found.
-    let cases: [(&str, &dyn Fn(&mut Tape), usize); 9] = [
+    let cases: [Changed<'_>; 9] = [
         ("whole", &|_| (), 69),
         ("begun after 100 s", &|tape| after(tape, 100), 60),
         ("begun after 200 s", &|tape| after(tape, 200), 35),
@@ -679,7 +681,7 @@ fn a_recording_converted_to_ros2_keeps_the_evidence_of_its_log() {
     for (_, _, data) in &mut tape.messages {
         *data = converted(data);
     }
-    for connection in tape.connections.iter_mut() {
+    for connection in &mut tape.connections {
         connection.encoding = Encoding::Cdr;
         connection.type_name = connection.type_name.replace("s/", "s/msg/").into();
         connection.definition = None;

@@ -63,10 +63,12 @@ pub fn windows(mission: &Value) -> Vec<Value> {
 /// The keys that an element has in each window.
 const COLUMNS: [&str; 6] = ["state", "degree", "count", "bytes", "hz", "lifecycle"];
 
+/// An element: the keys that it has in every window, and its rows with their windows.
+type Rows = (Map<String, Value>, Vec<(usize, Value)>);
+
 /// The mission of such windows, all of whose elements are listed.
 pub fn mission(mut windows: Vec<Value>) -> Value {
-    let mut elements: BTreeMap<(usize, String), (Map<String, Value>, Vec<(usize, Value)>)> =
-        BTreeMap::new();
+    let mut elements: BTreeMap<(usize, String), Rows> = BTreeMap::new();
     for (at, window) in windows.iter_mut().enumerate() {
         for (kind, (what, list)) in LISTS.into_iter().enumerate() {
             let rows = window.as_object_mut().unwrap().remove(list);
