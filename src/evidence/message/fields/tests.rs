@@ -398,7 +398,7 @@ fn sections_are_read_in_their_own_form() {
     );
     assert_eq!(
         event[4..],
-        ["request[].to.kind", "request[].to.x[]", "response[].why"]
+        ["request.to.kind", "request.to.x", "response.why"]
     );
     // The parts of a service may be empty, in CDR one byte each.
     let empty = connection(
