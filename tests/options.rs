@@ -214,6 +214,8 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("extract", "own.db3 --fields -o out", "--msg-path bags", "contains no file of messages"),
     ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
     ("tables", "r.bag -o out/t", "--format gif", "`gif` is not a format of tables"),
+    #[cfg(not(feature = "parquet"))]
+    ("tables", "r.bag -o out/t", "--format parquet", "hint: packages and the Python wheel do"),
     ("diff", "r.bag s.mcap", "--style dark", "hint: it applies to pictures"),
     ("diff", "r.bag s.mcap", "--size 300x200", "hint: it applies to pictures"),
     ("diff", "r.bag s.mcap", "--source ws", "hint: add a picture"),

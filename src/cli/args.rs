@@ -148,7 +148,7 @@ pub(super) struct ExtractArgs {
     /// Output file, `.csv` or `.parquet`, or `-` for standard output; with `--fields`, a folder.
     #[arg(long, short, value_name = "FILE|FOLDER")]
     pub(super) output: String,
-    /// Output format, if the name has no known extension. [default with `--fields`: parquet]
+    /// Output format, if the name has no known extension. [default with `--fields`: csv]
     #[arg(long, value_name = "csv|parquet")]
     pub(super) format: Option<String>,
     /// Decode messages into a table per topic with a column per field.

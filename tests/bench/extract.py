@@ -1,6 +1,6 @@
 """Compares `bagreel extract` with pip `rosbags`: every value of every message, and the time of both.
 
-Usage: extract.py BAGREEL BAG…, in an environment with `rosbags` and `pyarrow`. Times are medians of processor time in
+Usage: extract.py BAGREEL BAG…, with the feature `parquet`, in an environment with `rosbags` and `pyarrow`. Times are medians of processor time in
 processes of their own, ours with the Parquet files written; theirs without what the interpreter takes to begin. Three
 jobs: the table of messages (theirs as a sorted list), every message decoded (theirs not kept), and the same tables of
 fields written by pyarrow. Ends with 1 if a value differs.
@@ -141,7 +141,7 @@ def compare_index(binary, bag, folder):
 
 
 def compare_fields(binary, bag, folder):
-    done = subprocess.run([binary, "--quiet", "extract", bag, "-o", folder / "t", "--fields"], check=False)
+    done = subprocess.run([binary, "--quiet", "extract", bag, "-o", folder / "t", "--fields", "--format", "parquet"], check=False)
     assert done.returncode in (0, 3), done
     theirs, lost = theirs_fields(bag)
     ours = ours_fields(folder / "t")
@@ -184,7 +184,7 @@ def ratios(binary, bag, folder):
     empty = seconds([*own, "--nothing"])
     theirs = [seconds([*own, *job]) - empty for job in (["--index", bag], ["--decode", bag], ["--tables", bag, folder / "p"])]
     index = seconds([binary, "extract", bag, "-o", folder / "m.parquet"])
-    fields = seconds([binary, "extract", bag, "-o", folder / "t", "--fields"])
+    fields = seconds([binary, "extract", bag, "-o", folder / "t", "--fields", "--format", "parquet"])
     return zip(theirs, (index, fields, fields), strict=True)
 
 
