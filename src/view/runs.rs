@@ -242,9 +242,10 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
             if shown.mark == Some(Mark::Removed) {
                 continue;
             }
-            let hz = shown.written_rate().map(|(hz, count)| {
+            let (hz, count) = shown.written_rate();
+            let hz = (hz.is_some() || count.is_some_and(|n| n > 0)).then(|| {
                 let rows: Vec<_> = shown.topics.iter().map(TopicRow::key).collect();
-                (hz.to_bits(), count, shown.each, rows)
+                (hz.map(f64::to_bits), count, shown.each, rows)
             });
             if hz != last_hz || (life.rates.0.is_empty() && arrow.is_some()) {
                 last_hz.clone_from(&hz);
@@ -380,7 +381,7 @@ mod tests {
             ..View::default()
         };
         let label = |shown: &Shown, _: Option<&Arrow>| {
-            format!("{:.1}", shown.written_rate().map_or(0.0, |rate| rate.0))
+            format!("{:.1}", shown.written_rate().0.unwrap_or(0.0))
         };
         let runs = ViewRuns::of(&view, label);
         let text = |list: &Runs<u32>, w| &*runs.labels[list.at(w).unwrap_or(0) as usize];

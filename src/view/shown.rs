@@ -162,9 +162,12 @@ impl Shown {
         }
     }
 
-    /// The rate that is written, and its number of messages, if known.
-    pub(crate) fn written_rate(&self) -> Option<(f64, Option<u64>)> {
-        self.held.or(self.hz.map(|hz| (hz, self.count)))
+    /// The rate that is written, and its number of messages, as far as they are known.
+    pub(crate) fn written_rate(&self) -> (Option<f64>, Option<u64>) {
+        match self.held {
+            Some((hz, count)) => (Some(hz), count),
+            None => (self.hz, self.count),
+        }
     }
 
     /// Whether it ended in the window.

@@ -69,26 +69,28 @@ pub(crate) fn inside(counts: &Counts) -> String {
 
 /// The rate that is written, with no more digits than its number of messages justifies; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
-    let (hz, count) = shown.written_rate()?;
+    let (hz, count) = shown.written_rate();
     measured(shown, hz, count)
 }
 
 /// The rate of an element that sent this many messages.
-fn measured(shown: &Shown, hz: f64, count: Option<u64>) -> Option<String> {
+fn measured(shown: &Shown, hz: Option<f64>, count: Option<u64>) -> Option<String> {
     if shown.each < 2 {
-        return rate_in_window(Some(hz), count);
+        return rate_in_window(hz, count);
     }
-    let hz = Some(hz).filter(|hz| *hz > 0.0)?;
+    let hz = hz.filter(|hz| *hz > 0.0)?;
     Some(rate(hz / shown.each as f64) + " each")
 }
 
-/// A rate with no more digits than this many messages justify; `None` for none.
+/// A rate with no more digits than this many messages justify, or the number of messages without a rate: `1 msg`. `None` for
+/// none.
 pub(crate) fn rate_in_window(hz: Option<f64>, count: Option<u64>) -> Option<String> {
-    let hz = hz.filter(|hz| *hz > 0.0)?;
-    Some(match count {
-        Some(count) if count > 0 => rate_of(count, count as f64 / hz),
-        _ => rate(hz),
-    })
+    let count = count.filter(|count| *count > 0);
+    match (hz.filter(|hz| *hz > 0.0), count) {
+        (Some(hz), Some(count)) => Some(rate_of(count, count as f64 / hz)),
+        (Some(hz), None) => Some(rate(hz)),
+        (None, count) => count.map(|count| rate_of(count, 0.0)),
+    }
 }
 
 /// The facts about an element in this window: `active, measured, 50 Hz`.
@@ -102,7 +104,7 @@ pub(crate) fn facts(shown: &Shown) -> String {
     }
     match shown.rates {
         Some((from, to)) => parts.push(rate_change(from, to)),
-        None => parts.extend(shown.hz.and_then(|hz| measured(shown, hz, shown.count))),
+        None => parts.extend(measured(shown, shown.hz, shown.count)),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
         parts.push(count(usize::try_from(n).unwrap_or(usize::MAX), "message"));

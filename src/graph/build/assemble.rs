@@ -5,7 +5,7 @@ use std::io;
 
 use super::history::{History, Record};
 use super::measures::WindowMeasures;
-use super::rates::{Sums, rates};
+use super::rates::{Arrivals, Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
 use crate::base::error::Result;
@@ -15,8 +15,7 @@ use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::Name;
 use crate::graph::{
-    ById, Column, ColumnCursor, ColumnWriter, Element, Graphs, GraphsWriter, Measures, NodeId,
-    Number, Row, State, TopicId, per_second,
+    ById, Column, ColumnCursor, ColumnWriter, Element, Graphs, GraphsWriter, Measures, NodeId, Number, Row, State, TopicId, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -73,10 +72,41 @@ struct GraphAssembly<'a> {
     grace: usize,
     findings: &'a Findings,
     history: &'a History,
-    /// The number of messages of each known publisher on each topic, in windows with any.
+    /// The messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
-    /// The number of messages of each known publisher per window.
-    sent: BTreeMap<Name, Vec<u64>>,
+    /// The messages of each known publisher per window.
+    sent: BTreeMap<Name, Vec<Sent>>,
+}
+
+/// The messages of a node in one window.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sent {
+    count: u64,
+    /// Those of topics that it sends throughout the window.
+    throughout: u64,
+    /// The rate of the other topics.
+    others_hz: Option<f64>,
+}
+
+impl Sent {
+    fn add(&mut self, arrivals: &Arrivals, window: Span) {
+        self.count = self.count.saturating_add(arrivals.count);
+        if arrivals.fills_window() {
+            self.throughout = self.throughout.saturating_add(arrivals.count);
+        } else if let Some(hz) = arrivals.hz(window) {
+            self.others_hz = Some(self.others_hz.unwrap_or(0.0) + hz);
+        }
+    }
+
+    /// The sum of the rates of its topics; 0 in a window without messages.
+    fn hz(&self, window: Span) -> Option<f64> {
+        let is_known = self.throughout > 0 || self.count == 0;
+        let hz = per_second(self.throughout, window).filter(|_| is_known);
+        match (hz, self.others_hz) {
+            (Some(a), Some(b)) => Some(a + b),
+            (a, b) => a.or(b),
+        }
+    }
 }
 
 impl GraphAssembly<'_> {
@@ -85,7 +115,10 @@ impl GraphAssembly<'_> {
         let history = self.history;
         for (topic, streams) in &history.streams {
             let sums = rates(recorded, streams, &self.windows)?;
-            self.count(*topic, streams, &sums);
+            for sum in &sums {
+                self.messages[sum.window] += sum.arrivals.count;
+            }
+            self.count(recorded, *topic, streams, &sums)?;
             if let Some(id) = history.topic_ids.get(topic) {
                 self.topic(*id, Some(&sums));
             }
@@ -98,32 +131,48 @@ impl GraphAssembly<'_> {
         Ok(())
     }
 
-    /// Adds up the messages of each publisher.
-    fn count(&mut self, topic: Name, streams: &[usize], sums: &[Sums]) {
-        for sum in sums {
-            self.messages[sum.window] += sum.count;
-        }
-        let of = |stream: &usize| sender(&self.findings.streams[*stream]);
-        let mut places: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
-        for (place, node) in streams.iter().map(of).enumerate() {
-            if let Some(node) = node {
-                places.entry(node).or_default().push(place);
+    /// Adds up the messages of each publisher of a topic with these sums.
+    fn count(
+        &mut self,
+        recorded: &Recorded,
+        topic: Name,
+        streams: &[usize],
+        sums: &[Sums],
+    ) -> io::Result<()> {
+        let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        for stream in streams {
+            if let Some(node) = sender(&self.findings.streams[*stream]) {
+                of.entry(node).or_default().push(*stream);
             }
         }
-        for (node, places) in places {
+        for (node, own) in of {
+            let read;
+            let own = if own.len() == streams.len() {
+                sums
+            } else {
+                read = rates(recorded, &own, &self.windows)?;
+                &read
+            };
             let many = self.windows.len();
-            let sent = self.sent.entry(node).or_insert_with(|| vec![0; many]);
+            let sent = self
+                .sent
+                .entry(node)
+                .or_insert_with(|| vec![Sent::default(); many]);
             let mut column = ColumnWriter::default();
-            for sum in sums {
-                let of = |all: &Vec<u64>| places.iter().map(|place| all[*place]).sum();
-                let count: u64 = of(&sum.streams);
-                sent[sum.window] += count;
-                if count > 0 {
-                    column.push(sum.window, counted(count, count == sum.count, sum, of));
-                }
+            for sum in own {
+                let window = self.windows.0[sum.window];
+                sent[sum.window].add(&sum.arrivals, window);
+                let row = Row {
+                    count: Some(sum.arrivals.count),
+                    bytes: sum.bytes,
+                    jitter: Number::of(sum.jitter_s),
+                    ..Row::new(State::Active, Confidence::Measured)
+                };
+                column.push(sum.window, row.with_hz(sum.arrivals.hz(window), window));
             }
             self.published.insert((node, topic), column.finish());
         }
+        Ok(())
     }
 
     fn topic(&mut self, id: TopicId, sums: Option<&[Sums]>) {
@@ -143,7 +192,7 @@ impl GraphAssembly<'_> {
                 self.confidence(what, record, *window),
             );
             let row = Row {
-                count: Some(sum.map_or(0, |sum| sum.count)),
+                count: Some(sum.map_or(0, |sum| sum.arrivals.count)),
                 bytes: bytes(sum, sums.is_some()),
                 median: Number::of(sum.and_then(|sum| sum.median_period_s)),
                 gap: Number::of(sum.and_then(|sum| sum.max_gap_s)),
@@ -152,7 +201,13 @@ impl GraphAssembly<'_> {
                     ..self.measures.of(what, at)
                 })
             };
-            rows.push(at, row);
+            rows.push(
+                at,
+                match sum {
+                    Some(sum) => row.with_hz(sum.arrivals.hz(*window), *window),
+                    None => row,
+                },
+            );
         }
         self.graphs.element(what, rows);
     }
@@ -174,14 +229,20 @@ impl GraphAssembly<'_> {
                     // A node's count only stands for its rate.
                     count: sent
                         .filter(|_| per_second(0, *window).is_some())
-                        .map(|of| of[at]),
+                        .map(|of| of[at].count),
                     lifecycle: lifecycle.map_or(0, |word| self.graphs.lifecycle(&word)),
                     ..Row::new(
                         record.state(*window, false),
                         self.confidence(what, record, *window),
                     )
                 };
-                rows.push(at, row);
+                rows.push(
+                    at,
+                    match sent {
+                        Some(of) => row.with_hz(of[at].hz(*window), *window),
+                        None => row,
+                    },
+                );
             }
             self.graphs.element(what, rows);
         }
@@ -214,6 +275,7 @@ impl GraphAssembly<'_> {
                 let row = Row {
                     count: count.or(delivered),
                     bytes: own.and_then(|row| row.bytes).or(bytes),
+                    rate: own.and_then(|row| row.rate),
                     ..Row::new(state, self.confidence(what, record, *window))
                 };
                 let measures = Measures {
@@ -281,16 +343,6 @@ impl GraphAssembly<'_> {
             };
             run.start < window.end && window.start < end
         })
-    }
-}
-
-/// The messages of one publisher of a topic, with their bytes, and with the topic's jitter if all are its own.
-fn counted(count: u64, is_sole: bool, sum: &Sums, of: impl Fn(&Vec<u64>) -> u64) -> Row {
-    Row {
-        count: Some(count),
-        bytes: sum.stream_bytes.as_ref().map(of),
-        jitter: Number::of(sum.jitter_s.filter(|_| is_sole)),
-        ..Row::new(State::Active, Confidence::Measured)
     }
 }
 

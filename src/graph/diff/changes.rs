@@ -111,8 +111,7 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// The change of a rate, if it is one. The rate of an element that appeared or vanished within a window
-    /// is measured over the part in which it existed, so that one change is not reported twice.
+    /// The change of a rate, if it is one.
     fn rate(
         &self,
         what: Element,
@@ -120,14 +119,10 @@ impl<'a> Changes<'a> {
         spans: (Span, Span),
     ) -> Option<Change> {
         let (from_hz, to_hz) = (hz.0?, hz.1?);
-        let (before, after) = (self.present(what, spans.0), self.present(what, spans.1));
-        let secs = before.min(after);
-        let over = |hz: f64, span: Span, part: f64| {
-            hz * (span.nanos() as f64 / 1e9) / part.max(f64::MIN_POSITIVE)
-        };
-        let (from, to) = (over(from_hz, spans.0, before), over(to_hz, spans.1, after));
-        let shows = (to_hz - from_hz).abs() > self.threshold * from_hz;
-        (shows && rate_differs(from, to, secs, self.threshold)).then_some(Change::Rate {
+        let secs = self
+            .present(what, spans.0)
+            .min(self.present(what, spans.1));
+        rate_differs(from_hz, to_hz, secs, self.threshold).then_some(Change::Rate {
             what,
             from_hz,
             to_hz,

@@ -83,6 +83,16 @@ impl Row {
         }
     }
 
+    /// With this rate in a window `span`.
+    pub(crate) fn with_hz(self, hz: Option<f64>, span: Span) -> Self {
+        let row = Self { rate: None, ..self };
+        let follows = row.hz(span).map(f64::to_bits) == hz.map(f64::to_bits);
+        Self {
+            rate: (!follows).then(|| Number::of(hz)),
+            ..row
+        }
+    }
+
     /// Further measurements of the window.
     pub(crate) fn measures(&self) -> Measures {
         Measures {
@@ -118,11 +128,7 @@ impl Row {
             gap: Number::of(state.max_gap_s),
             ..Self::new(state.state, state.confidence).with_measures(&state.measures)
         };
-        let follows = row.hz(span).map(f64::to_bits) == state.hz.map(f64::to_bits);
-        Self {
-            rate: (!follows).then(|| Number::of(state.hz)),
-            ..row
-        }
+        row.with_hz(state.hz, span)
     }
 
     /// The state of an element in the window `span`.
