@@ -29,7 +29,7 @@ fn read_bytes(name: &str, bytes: &[u8]) -> (Report, Kept) {
 }
 
 /// Runs the command; returns its exit code and output, results first.
-fn bagreel(args: &[&str]) -> (Option<i32>, String) {
+pub(crate) fn bagreel(args: &[&str]) -> (Option<i32>, String) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
     said(&run.args(args).output().unwrap())
 }

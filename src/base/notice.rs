@@ -84,8 +84,11 @@ impl Notices {
         Self::default()
     }
 
-    /// Adds a notice, or increases the count of an equal one; one choice for several recordings is still one.
+    /// Adds a notice, unless it happened zero times, or increases the count of an equal one; one choice for several recordings is still one.
     pub fn add(&mut self, notice: Notice) {
+        if notice.count == 0 {
+            return;
+        }
         let full = self.0.len() >= NOTICES;
         let key = (notice.kind, notice.text);
         let key = if full && !self.0.contains_key(&key) {
