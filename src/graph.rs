@@ -230,16 +230,16 @@ pub(crate) fn per_second(count: u64, window: Span) -> Option<f64> {
 
 /// The shortest time that has a rate of its own, in nanoseconds: what many nodes send within milliseconds at their start is no
 /// rate.
-const SHORTEST_SENDING_NS: i64 = 100_000_000;
+const SHORTEST_SENDING_NS: i64 = 50_000_000;
 
 /// The rate of `count` messages from the first of them to the last, in messages per second; `None` for fewer than two, and
-/// below 0.1 s.
+/// below 0.05 s.
 pub(crate) fn mean_rate(count: u64, (first, last): (Stamp, Stamp)) -> Option<f64> {
     rate_between(count.checked_sub(1)?, Span::new(first, last), i64::MAX)
 }
 
 /// The rate of so many intervals between messages, which take the time `sending` of a window of `window` nanoseconds, in
-/// messages per second; `None` without intervals, and below 0.1 s in a longer window.
+/// messages per second; `None` without intervals, and below 0.05 s in a longer window.
 pub(crate) fn rate_between(intervals: u64, sending: Span, window: i64) -> Option<f64> {
     let is_long = sending.nanos() >= SHORTEST_SENDING_NS.min(window);
     per_second(intervals, sending).filter(|_| is_long && intervals > 0)

@@ -51,7 +51,7 @@ fn short() -> Recording {
 }
 
 /// A MCAP file of a few chunks, with and without a summary.
-fn unsummed(compression: Option<::mcap::Compression>) -> Vec<u8> {
+fn unsummed(compression: Option<mcap::Packed>) -> Vec<u8> {
     let options = mcap::Options {
         summary: false,
         compression,
@@ -91,11 +91,11 @@ fn chunked() -> Vec<(&'static str, Vec<u8>)> {
         ("none.mcap", mcap::write(&recording, &options(None))),
         (
             "zstd.mcap",
-            mcap::write(&recording, &options(Some(::mcap::Compression::Zstd))),
+            mcap::write(&recording, &options(Some(mcap::Packed::Zstd))),
         ),
         ("front_none.mcap", unsummed(None)),
-        ("front_zstd.mcap", unsummed(Some(::mcap::Compression::Zstd))),
-        ("front_lz4.mcap", unsummed(Some(::mcap::Compression::Lz4))),
+        ("front_zstd.mcap", unsummed(Some(mcap::Packed::Zstd))),
+        ("front_lz4.mcap", unsummed(Some(mcap::Packed::Lz4))),
     ]
 }
 
@@ -256,7 +256,7 @@ fn a_chunk_listed_at_a_wrong_position_is_reported_once() {
 
 #[test]
 fn messages_lost_from_a_chunk_are_counted_by_its_index() {
-    let bytes = unsummed(Some(::mcap::Compression::Zstd));
+    let bytes = unsummed(Some(mcap::Packed::Zstd));
     let truth = short().messages.len();
     // The first one describes the connections.
     let mut chunks = bytes.windows(4).enumerate().filter(|(_, w)| w == b"zstd");
@@ -311,7 +311,7 @@ fn a_record_of_a_wrong_kind_does_not_end_the_file() {
 #[test]
 fn messages_of_a_destroyed_chunk_are_counted_by_its_index() {
     let truth = short().messages.len();
-    for bytes in [unsummed(None), unsummed(Some(::mcap::Compression::Zstd))] {
+    for bytes in [unsummed(None), unsummed(Some(mcap::Packed::Zstd))] {
         let bytes = &bytes;
         let is_chunk = |at: &usize| {
             let number =
@@ -335,7 +335,7 @@ fn messages_of_a_destroyed_chunk_are_counted_by_its_index() {
 
 #[test]
 fn reading_an_mcap_file_continues_after_damage() {
-    let bytes = unsummed(Some(::mcap::Compression::Lz4));
+    let bytes = unsummed(Some(mcap::Packed::Lz4));
     let truth = short().messages.len();
     let second = bytes
         .windows(3)

@@ -30,8 +30,8 @@ fn everywhere(recording: &Recording) -> Vec<(String, Vec<u8>)> {
     for profile in ["ros1", "ros2"] {
         for compression in [
             None,
-            Some(::mcap::Compression::Zstd),
-            Some(::mcap::Compression::Lz4),
+            Some(mcap::Packed::Zstd),
+            Some(mcap::Packed::Lz4),
         ] {
             let name = format!("{profile}_{compression:?}.mcap");
             let options = mcap::Options {

@@ -246,8 +246,8 @@ mod tests {
         let window = Span::new(Stamp(0), Stamp(10_000_000_000));
         let lengths = Lengths::new(counts.iter().map(|_| window));
         let looks = stable(&Looks::of(shown.iter().map(Some)), &lengths);
-        let rate = |at| looks.at(at)?.written_rate();
-        (0..counts.len()).filter_map(rate).map(|r| r.0).collect()
+        let rate = |at| looks.at(at)?.written_rate().0;
+        (0..counts.len()).filter_map(rate).collect()
     }
 
     #[test]

@@ -120,7 +120,7 @@ impl Shape {
         let to = BufWriter::new(File::create(bag).unwrap());
         let options = mcap::WriteOptions::new()
             .profile("ros1")
-            .compression(Some(mcap::Compression::Zstd));
+            .compression(Some(mcap::Compression::Lz4));
         let mut to = options.create(to).unwrap();
         let schema = to.add_schema("std_msgs/Empty", "ros1msg", b"").unwrap();
         let mut channel = |topic: usize| {

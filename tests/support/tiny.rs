@@ -38,8 +38,8 @@ pub fn bags() -> Vec<(&'static str, Vec<u8>)> {
         };
         mcap::write(&recording, &options)
     };
-    let zstd = Some(::mcap::Compression::Zstd);
-    let lz4 = Some(::mcap::Compression::Lz4);
+    let zstd = Some(mcap::Packed::Zstd);
+    let lz4 = Some(mcap::Packed::Lz4);
     vec![
         ("none.bag", bag(Pack::None)),
         ("bz2.bag", bag(Pack::Bz2)),

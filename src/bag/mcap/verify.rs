@@ -2,9 +2,11 @@
 
 use std::io::{self, Read};
 
-use mcap::parse_record;
+use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, McapResult, parse_record};
+use zstd::stream::raw::{Decoder, InBuffer, Operation as _, OutBuffer};
 
 use super::{Described, Mcap, records};
 use crate::bag::chunked::{Grammar as _, NoRecord, SecondFinds, pass, walk};
@@ -29,6 +31,9 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
         .with_validate_summary_section_crc(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
+    Zstd::new()
+        .and_then(|zstd| reader.add_decompressor(zstd))
+        .map_err(|e| e.to_string())?;
     let mut found = SecondFinds::new(sink);
     let result = records_of(&mut reader, &mut from, &mut found);
     found.flush();
@@ -106,6 +111,42 @@ fn record(kind: u8, data: &[u8], found: &mut SecondFinds<'_, Mcap>) -> Result<()
         _ => {}
     }
     Ok(())
+}
+
+/// Zstandard for the crate, whose own decompressor would compile everything that the C library offers.
+struct Zstd(Decoder<'static>);
+
+impl Zstd {
+    fn new() -> McapResult<Self> {
+        Decoder::new().map(Self).map_err(failed)
+    }
+}
+
+impl Decompressor for Zstd {
+    fn next_read_size(&self) -> usize {
+        0
+    }
+
+    fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
+        let (mut from, mut to) = (InBuffer::around(src), OutBuffer::around(dst));
+        self.0.run(&mut from, &mut to).map_err(failed)?;
+        Ok(DecompressResult {
+            consumed: from.pos(),
+            wrote: to.pos(),
+        })
+    }
+
+    fn reset(&mut self) -> McapResult<()> {
+        self.0.reinit().map_err(failed)
+    }
+
+    fn name(&self) -> &'static str {
+        "zstd"
+    }
+}
+
+fn failed(error: io::Error) -> McapError {
+    McapError::DecompressionError(error.to_string())
 }
 
 fn read_some(from: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
