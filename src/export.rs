@@ -1,8 +1,6 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
 
 mod animated_svg;
-#[cfg(feature = "arrow")]
-pub(crate) mod arrow;
 pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;

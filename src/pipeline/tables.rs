@@ -1,7 +1,5 @@
 //! Counts the messages of many bags, several at a time: a table per recording.
 
-#[cfg(feature = "arrow")]
-pub mod arrow;
 mod count;
 
 use std::collections::BTreeSet;
@@ -23,8 +21,7 @@ use crate::export::check::make_folder;
 use crate::export::sink::write_file;
 use crate::export::tables::{TableFormat, writer};
 use crate::export::target::{Target, resolved};
-pub use count::Counting;
-use count::count;
+pub use count::{Counted, Counting, count};
 
 /// The whole job of `bagreel tables`.
 #[derive(Clone, Debug, Default)]
