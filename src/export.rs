@@ -1,8 +1,6 @@
 //! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
 
 mod animated_svg;
-#[cfg(feature = "arrow")]
-pub(crate) mod arrow;
 pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;
@@ -33,7 +31,7 @@ use crate::base::error::{Error, Result};
 use self::still::StillKind;
 pub(crate) use encoder::Pack;
 pub use encoder::Written;
-use encoder::{DATA, IMAGE, PICTURE};
+use encoder::{DATA, GRAPH, IMAGE, LOOK, PICTURE, WORDS};
 pub use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Packet};
 pub(crate) use encoder::{Single, single};
 pub(crate) use encoder::{Started, at_end, one_file, one_text, text_per_window};
@@ -48,7 +46,7 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "gif",
         what: "the animation",
         start: gif::start,
-        is_limited: true,
+        takes: &[LOOK, WORDS, "bare frame-ms max-bytes"],
         ..PICTURE
     },
     OutputFormat {
@@ -56,7 +54,8 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "a drawing per window with `{n}`, otherwise an animation",
         start: start_svg,
         whole: OneDrawing::Asked,
-        ..PICTURE
+        takes_together: "frame-ms strip",
+        ..IMAGE
     },
     OutputFormat {
         word: "png",
@@ -74,15 +73,13 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "dot",
         what: "a graph that `rqt_graph` loads",
         start: dot::start,
-        is_viewed: true,
-        ..DATA
+        ..GRAPH
     },
     OutputFormat {
         word: "mmd",
         what: "a Mermaid flow chart",
         start: mermaid::encoder::start,
-        is_viewed: true,
-        ..DATA
+        ..GRAPH
     },
     #[cfg(feature = "pdf")]
     OutputFormat {
@@ -90,14 +87,16 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "vectors, one page per window",
         start: pdf::start,
         whole: OneDrawing::Asked,
-        ..PICTURE
+        takes: &[LOOK, WORDS, "width bare"],
+        ..IMAGE
     },
     OutputFormat {
         word: "tex",
         what: "LaTeX lines that include a figure, with a caption",
         start: tex::start,
         whole: OneDrawing::Asked,
-        ..PICTURE
+        takes_alone: "",
+        ..IMAGE
     },
     OutputFormat {
         word: "html",
@@ -111,6 +110,7 @@ pub const FORMATS: &[OutputFormat] = &[
         what: "a report for a pull request or a job summary",
         start: report::encoder::start,
         is_unfolded: true,
+        takes: &[WORDS, "link"],
         ..PICTURE
     },
     OutputFormat {

@@ -1,4 +1,4 @@
-//! The modules that the project's tests, benchmarks and fuzz targets use besides the public API. They are not
+//! The modules that the project's tests, benchmarks, fuzz targets and Python wheel use besides the public API. They are not
 //! stable.
 
 /// See `src/base.rs`.
@@ -68,6 +68,16 @@ pub mod export {
         DrawnFrame, Encoder, FORMATS, Needs, OneDrawing, Output, OutputFormat, Packet, Written,
         options, run, sequence,
     };
+}
+
+/// Tables in columns, from which the Python wheel makes Arrow arrays.
+#[cfg(feature = "render")]
+pub mod tables {
+    pub use crate::base::table::{
+        Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, WordColumn,
+    };
+    pub use crate::export::tables::of_mission;
+    pub use crate::pipeline::{Counted, count};
 }
 
 /// See `src/pipeline.rs`.

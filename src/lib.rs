@@ -168,9 +168,6 @@ pub mod values {
     };
 }
 
-#[cfg(feature = "arrow")]
-pub use pipeline::arrow;
-
 pub mod commands {
     //! The jobs of the other commands: the summary, the log, the table of messages, the survey of a folder, the counts of
     //! many bags, the check against an expectations file and the writing of one, the comparison of two missions.

@@ -48,10 +48,8 @@ pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 #[cfg(feature = "render")]
 pub use survey::{Survey, is_survey, survey, survey_file};
-#[cfg(feature = "arrow")]
-pub use tables::arrow;
 #[cfg(feature = "render")]
-pub use tables::{Counting, Tabled, Tables, tables};
+pub use tables::{Counted, Counting, Tabled, Tables, count, tables};
 #[cfg(feature = "cli")]
 pub(crate) use {export::check as check_outputs, read::mission_file, survey::each};
 

@@ -58,7 +58,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "arrow", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "still", "tex"],
+        &["animated_svg", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "still", "tex"],
         &["report", "run", "tables"],
     ]),
     ("gate", &[
@@ -127,9 +127,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ("chrono", &["base"]),
     // Mathematical functions, like the standard library's.
     ("libm", &[]),
-    // Listed only for their features, so that tests rebuild nothing.
-    ("getrandom", &[]),
-    ("once_cell", &[]),
+    // Listed only for its features, so that tests rebuild nothing.
     ("regex_syntax", &[]),
 ];
 

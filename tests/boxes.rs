@@ -17,7 +17,7 @@ fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
     command
         .arg("render")
         .arg(bag.as_ref())
-        .args(["--view", "graph"]);
+        .args(["--mode", "all"]);
     let outputs = [out("mission.json"), out("{n}.svg")];
     let done = command
         .args(arguments)

@@ -42,10 +42,6 @@ fn run(dir: &Path, command: &str) -> (Option<i32>, String) {
         .args(["-c", command])
         .current_dir(dir)
         .env("PATH", path)
-        .env(
-            "PLAYER",
-            "https://github.com/acme/robot/actions/runs/1/artifacts/2",
-        )
         .env("GITHUB_STEP_SUMMARY", dir.join("summary.md"))
         .output()
         .unwrap();

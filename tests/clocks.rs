@@ -12,6 +12,7 @@ use bagreel::internals::mission::event_log::Kind;
 use bagreel::{Reading, read};
 
 use crate::support::rosbag1::{Pack, write};
+use crate::support::snapshot::assert_snapshot;
 use crate::support::{Publisher, Recording};
 
 const SECOND: i64 = 1_000_000_000;
@@ -262,7 +263,7 @@ fn clock_faults_are_attributed_to_the_recorder() {
         ),
     ];
     let lines = all.iter().map(|(name, recordings)| shown(name, recordings));
-    insta::assert_snapshot!("clocks", lines.collect::<String>());
+    assert_snapshot("clocks.txt", &lines.collect::<String>());
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn rendered(bag: &str, period: &str, folder: &Path) -> String {
     command
         .arg("render")
         .arg(input)
-        .args(["--view", "graph", "--period", period]);
+        .args(["--mode", "all", "--period", period]);
     for name in ["x.json", "x{n}.svg", "x{n}.mmd", "x.html", "x.md"] {
         command.arg("-o").arg(folder.join(name));
     }
@@ -258,7 +258,7 @@ fn strip(bag: &str, period: &str, expected: &[BTreeSet<u64>], folder: &Path) {
     command
         .arg("render")
         .arg(input)
-        .args(["-q", "--view", "graph", "--period", period]);
+        .args(["-q", "--mode", "all", "--period", period]);
     let done = command
         .args(["--strip", "4x3", "-o"])
         .arg(&to)

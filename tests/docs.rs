@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use bagreel::internals::evidence::SOURCES;
 use bagreel::internals::export::FORMATS;
 
-use crate::support::browser;
+use crate::support::{browser, snapshot};
 
 const README: &str = include_str!("../README.md");
 
@@ -189,12 +189,12 @@ fn every_command_of_readme_and_docs_runs() {
 /// The number of bytes that all pictures of the docs may have.
 const MOST_BYTES: u64 = 3_000_000;
 
-/// `INSTA_UPDATE=always` rewrites the pictures. Pixels are only reproducible on one kind of processor.
+/// `SNAPSHOTS=new` rewrites the pictures. Pixels are only reproducible on one kind of processor.
 #[test]
 fn gallery_shows_what_its_commands_draw() {
     let (gallery, dir) = (chapter("gallery.md"), folder());
     let images = root().join("docs/src/images");
-    let is_new = std::env::var("INSTA_UPDATE").is_ok_and(|word| word == "always");
+    let is_new = snapshot::is_new();
     let (mut shown, mut stale) = (0, Vec::new());
     for part in gallery.split("](images/").skip(1) {
         let (name, rest) = part.split_once(')').unwrap();
@@ -221,7 +221,7 @@ fn gallery_shows_what_its_commands_draw() {
     assert_eq!(
         stale,
         Vec::<&str>::new(),
-        "draw them anew with INSTA_UPDATE=always"
+        "draw them anew with SNAPSHOTS=new"
     );
     assert_eq!(shown, 20);
     let files = fs::read_dir(images).unwrap();
@@ -443,6 +443,6 @@ fn docs_describe_every_option() {
         .filter(|option| !["--help", "--version"].contains(&option.as_str()))
         .filter(|option| !docs.contains(option.as_str()))
         .collect();
-    assert!(options.len() > 60, "{options:?}");
+    assert!(options.len() > 50, "{options:?}");
     assert!(missing.is_empty(), "the docs do not describe {missing:?}");
 }

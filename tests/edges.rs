@@ -60,7 +60,7 @@ fn recorded(bag: &Recording, options: CollectOptions) -> Recorded {
 fn concluded(bag: &Recording, options: CollectOptions) -> (Built, Vec<EvidenceLine>) {
     let recorded = recorded(bag, options);
     let span = recorded.span.unwrap();
-    let built = graph::build(&recorded, &[span], &conclude::ConcludeOptions::default(), 0).unwrap();
+    let built = graph::build(&recorded, &[span], &conclude::ConcludeOptions::default()).unwrap();
     let lines = built.lines.clone();
     (built, lines)
 }
@@ -713,7 +713,7 @@ fn shown(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
         topology,
         ..conclude::ConcludeOptions::default()
     };
-    graph::build(&recorded, &windows, &options, 0).unwrap()
+    graph::build(&recorded, &windows, &options).unwrap()
 }
 
 fn entry(element: NamedElement, to_s: Option<i64>) -> TopologyEntry {
@@ -786,7 +786,7 @@ fn topology_files_and_headers_are_listed_as_evidence() {
         topology,
         ..conclude::ConcludeOptions::default()
     };
-    let built = graph::build(&recorded, &[whole], &options, 0).unwrap();
+    let built = graph::build(&recorded, &[whole], &options).unwrap();
     let sources: BTreeSet<_> = built.lines.into_iter().map(|piece| piece.source).collect();
     assert_eq!(sources, ["connection", "topology"].into());
 }
@@ -939,7 +939,7 @@ fn launched(element: NamedElement, node: &str) -> (Vec<bool>, Vec<String>) {
         },
         ..conclude::ConcludeOptions::default()
     };
-    let built = graph::build(&recorded, &windows, &options, 0).unwrap();
+    let built = graph::build(&recorded, &windows, &options).unwrap();
     let names: Vec<String> = built
         .elements
         .nodes

@@ -58,7 +58,7 @@ fn built(collector: Collector) -> (Built, Vec<Span>) {
     let windows = windows(recorded.span.unwrap(), 10 * SECOND);
     let options = conclude::ConcludeOptions::default();
     (
-        graph::build(&recorded, &windows, &options, 0).unwrap(),
+        graph::build(&recorded, &windows, &options).unwrap(),
         windows,
     )
 }

@@ -264,7 +264,7 @@ fn lifetimes_rates_and_hand_overs_agree_in_all_pictures() {
     assert!(rates.is_subset(&with(&svg, "letter")), "{rates:?}");
     let frame = rendered(
         bag,
-        &["render", "--view", "graph", "--period", "60"],
+        &["render", "--mode", "all", "--period", "60"],
         "frame{n}.svg",
     )
     .unwrap();
@@ -302,7 +302,7 @@ fn the_marks_of_frames_strips_and_pages_are_events_too() {
         shown(&log, &frames, &at);
         if let Some(strip) = rendered(
             &bag,
-            &["render", "--view", "graph", "--strip", "3x2"],
+            &["render", "--mode", "all", "--strip", "3x2"],
             "strip.svg",
         ) {
             shown(&log, &strip, &at);

@@ -128,7 +128,7 @@ fn the_page_in_a_browser_shows_the_mission() {
     let pages = rendered(&mission, &["html", "svg", "json", "md"]);
     let hostile = rendered(&running(&HOSTILE, 12), &["html"]);
     let folded = rendered_with(&mission, &["html"], &["--collapse", "/nav,/sensors"]);
-    let timeline = rendered_with(&mission, &["html"], &["--view", "board"]);
+    let timeline = rendered_with(&mission, &["html"], &["--mode", "topics"]);
     let file = |folder: &TempDir, name: &str| folder.path().join(name);
     let files = [
         file(&pages, "x.html"),
@@ -274,7 +274,7 @@ fn divided(more: &[&str]) -> (Value, Value, String) {
         .arg("render")
         .arg(bag)
         .args(more)
-        .args(["--view", "graph", "--quiet"])
+        .args(["--mode", "all", "--quiet"])
         .args(
             ["x.html", "x.json", "x{n}.svg"]
                 .iter()

@@ -76,7 +76,7 @@ fn strip(bag: &Path, period: &str, window: usize) -> (Vec<String>, String) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("{n}.svg");
     let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
-        .args(["render", "-q", "--view", "graph", "--period", period, "-o"])
+        .args(["render", "-q", "--mode", "all", "--period", period, "-o"])
         .args([&file, bag])
         .output()
         .unwrap();

@@ -1,6 +1,6 @@
 //! Snapshot tests of pictures: the SVG text of every style, and the pixels of a few frames.
 //!
-//! `INSTA_UPDATE=always cargo test --release --test tests pictures` accepts the current pictures; check them first. If
+//! `SNAPSHOTS=new cargo test --release --test tests pictures` accepts the current pictures; check them first. If
 //! pixels differ, `target/pictures/` shows expected, difference and actual side by side.
 
 use std::path::{Path, PathBuf};
@@ -10,6 +10,8 @@ use bagreel::internals::draw::style::BUILTIN;
 use bagreel::values::{Length, Period};
 use bagreel::{Output, Reading, Render, Style, render};
 use image::RgbaImage;
+
+use crate::support::snapshot::{assert_snapshot, is_new};
 
 /// Missions, with the period (a mission in JSON has its own) and the window with the most features.
 const MISSIONS: &[(&str, &str, usize)] = &[
@@ -74,7 +76,7 @@ fn pictures_of_every_style_match_their_snapshots() {
                 Size::new(1280.0, 720.0),
             );
             let svg = std::fs::read_to_string(file).unwrap();
-            insta::assert_snapshot!(format!("{}_{style}", word(mission.0)), svg);
+            assert_snapshot(&format!("{}_{style}.svg", word(mission.0)), &svg);
         }
     }
 }
@@ -100,7 +102,7 @@ fn pixels_match_the_reference_pictures() {
 /// Compares with the reference picture, or replaces it.
 fn compare(name: &str, actual: &RgbaImage) {
     let reference = root().join(format!("tests/data/pictures/{name}.png"));
-    if std::env::var("INSTA_UPDATE").is_ok_and(|v| v == "always") {
+    if is_new() {
         actual.save(reference).unwrap();
         return;
     }

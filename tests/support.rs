@@ -8,6 +8,7 @@ pub mod mcap;
 pub mod mission;
 pub mod pdf;
 pub mod rosbag1;
+pub mod snapshot;
 pub mod sqlite3;
 pub mod tiny;
 pub mod windows;

@@ -258,7 +258,7 @@ fn results_fit_the_terminal() {
             "check C --expect expected.yaml",
             "check --explain topic-gap",
             "render W -o x.svg",
-            "render C -o x.svg --view board --collapse /nav",
+            "render C -o x.svg --mode topics --collapse /nav",
         ] {
             let on = if line.starts_with("render") {
                 On::Errors
@@ -355,7 +355,7 @@ fn long_messages_are_broken_between_words() {
         wide.split_whitespace().collect::<Vec<_>>()
     );
     let args = [
-        "render", COURIER, "-o", "x.svg", "--view", "graph", "--hide", "services",
+        "render", COURIER, "-o", "x.svg", "--mode", "all", "--hide", "services",
     ];
     let written = typed(folder.path(), &args, On::Errors, 50, false);
     let lines = screen(&written, 1000);
@@ -563,17 +563,16 @@ fn names_without_a_match_are_reported_with_the_nearest() {
         ("--collapse", "/robt1", "`/robot1`"),
         ("--topic-filter", "/scam", "matches no topic; "),
         ("--ns-filter", "/.*,-/map_servr", "`/map_server`"),
-        ("--expand", "/robot11", "`/robot1`"),
+        (
+            "--collapse",
+            "-/robot11",
+            "`--collapse -/robot11` matches no name",
+        ),
     ] {
-        let output = if option == "--expand" {
-            "x.svg"
-        } else {
-            "x.dot"
-        };
         let run = Command::new(env!("CARGO_BIN_EXE_bagreel"))
             .current_dir(folder.path())
             .args([
-                "render", WAREHOUSE, "--period", "all", "-o", output, option, value,
+                "render", WAREHOUSE, "--period", "all", "-o", "x.dot", option, value,
             ])
             .output()
             .unwrap();

@@ -56,7 +56,7 @@ fn a_mission_without_known_publishers_is_a_topic_timeline() {
         ],
     );
     assert!(done.status.success(), "{}", said(&done));
-    assert!(said(&done).contains("`--view graph`"), "{}", said(&done));
+    assert!(said(&done).contains("`--mode all`"), "{}", said(&done));
     let frames: Vec<String> = (0..6).map(|n| text(&folder, &format!("{n}.svg"))).collect();
     for svg in &frames {
         assert!(svg.contains(">cmd_vel</text>") && svg.contains("geometry_msgs/msg/Twist"));
@@ -82,7 +82,7 @@ fn a_mission_without_known_publishers_is_a_topic_timeline() {
 
 #[test]
 fn the_user_chooses_between_graph_and_topic_timeline() {
-    let (folder, done) = rendered("courier.mcap", &["--view", "graph"], &["{n}.svg"]);
+    let (folder, done) = rendered("courier.mcap", &["--mode", "all"], &["{n}.svg"]);
     assert!(done.status.success());
     assert!(!said(&done).contains("board"));
     assert!(
@@ -93,9 +93,9 @@ fn the_user_chooses_between_graph_and_topic_timeline() {
     let (_folder, done) = rendered("courier.mcap", &["--orientation", "TB"], &["{n}.svg"]);
     assert!(done.status.success() && !said(&done).contains("board"));
     for flags in [
-        &["--view", "board", "--orientation", "TB"][..],
-        &["--view", "board", "--collapse", "/nav"],
-        &["--view", "board", "--strip", "3x2"],
+        &["--mode", "topics", "--orientation", "TB"][..],
+        &["--mode", "topics", "--collapse", "/nav"],
+        &["--mode", "topics", "--strip", "3x2"],
     ] {
         let (_folder, done) = rendered("courier.mcap", flags, &["x.svg"]);
         assert_eq!(done.status.code(), Some(2), "{flags:?}");

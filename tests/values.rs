@@ -64,7 +64,7 @@ fn rendering_exported_json_gives_the_same_bytes() {
             "warehouse.bag",
             &[],
             &["x{n}.svg"],
-            &["--view", "board"],
+            &["--mode", "topics"],
         ),
         (
             "render",

@@ -80,18 +80,15 @@ def render(
     align: str | None = None,
     cut: str | None = None,
     rate_change: float | None = None,
-    grace: int | None = None,
     topology: Iterable[str | os.PathLike[str]] = (),
     source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
-    view: str | None = None,
     mode: str | None = None,
     ns_filter: str | None = None,
     topic_filter: str | None = None,
     hide: str | None = None,
     group: str | None = None,
     collapse: Iterable[str] = (),
-    expand: Iterable[str] = (),
     rqt_defaults: bool = False,
     style: str | os.PathLike[str] | None = None,
     size: str | None = None,
@@ -114,7 +111,7 @@ def render(
     ones. Returns the files, of which a notebook shows the first. Raises `BagreelError` with the command's message.
     """
     offset, ns, topology = list(offset), list(ns), list(topology)
-    collapse, expand, link = list(collapse), list(expand), list(link)
+    collapse, link = list(collapse), list(link)
     options = given(locals(), "bags", "outputs")
     outputs = texts(outputs)
     run("render", bags, output=outputs, **options)
@@ -140,7 +137,6 @@ def figure(
     topic_filter: str | None = None,
     offset: Iterable[str] = (),
     ns: Iterable[str] = (),
-    verify: bool = False,
     topology: Iterable[str | os.PathLike[str]] = (),
     source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
@@ -171,7 +167,7 @@ def show(
     period: str | None = None,
     start: str | None = None,
     end: str | None = None,
-    view: str | None = None,
+    mode: str | None = None,
     style: str | None = None,
     ns_filter: str | None = None,
     topic_filter: str | None = None,
@@ -236,19 +232,17 @@ def check(
     expect: str | os.PathLike[str],
     *,
     undecidable: Literal["allow", "error"] = "allow",
-    period: str | None = None,
     start: str | None = None,
     end: str | None = None,
     topology: Iterable[str | os.PathLike[str]] = (),
     source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
-    link: Iterable[str] = (),
 ) -> Check:
     """Checks a mission against an expectation: `assert bagreel.check("run.bag", "graph.yaml").ok`.
 
     Raises `BagreelError` if the bag or the expectation cannot be read.
     """
-    topology, link = list(topology), list(link)
+    topology = list(topology)
     options = given(locals(), "bags")
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
         text, markdown = Path(folder) / "check.txt", Path(folder) / "check.md"
@@ -264,10 +258,8 @@ def diff(
     rate_change: float | None = None,
     start: str | None = None,
     end: str | None = None,
-    topology: Iterable[str | os.PathLike[str]] = (),
 ) -> Diff:
     """The differences between two missions; `outputs` are reports and pictures to write, as with `bagreel diff -o`."""
-    topology = list(topology)
     options = given(locals(), "first", "second", "outputs")
     with tempfile.TemporaryDirectory(prefix="bagreel-") as folder:
         text, markdown = Path(folder) / "diff.txt", Path(folder) / "diff.md"

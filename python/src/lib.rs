@@ -1,13 +1,14 @@
 //! The functions exported to Python; slow work runs without the interpreter's lock.
 
+mod arrow;
 mod table;
 
 use std::collections::BTreeMap;
 use std::ffi::{CString, OsString};
 
-use bagreel::arrow;
 use bagreel::bag::Input;
 use bagreel::commands::{Counting, LogFormat, LogOptions, log};
+use bagreel::internals::tables::{count, of_mission};
 use bagreel::values::{Align, Length, Period};
 use bagreel::{Error, Mission as Read, Reading};
 use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
@@ -65,7 +66,7 @@ fn tables(py: Python<'_>, uris: Vec<String>, period: &str, align: &str) -> PyRes
     };
     let inputs: Vec<Input> = uris.iter().map(Input::parse).collect();
     let name = uris.first().map_or("", String::as_str);
-    let counts = py.detach(|| arrow::counts(name, &inputs, &counting));
+    let counts = py.detach(|| count(name, &inputs, &counting));
     let counts = counts.map_err(|e| raised(&e))?;
     for notice in counts.notices.iter().filter(|notice| notice.kind.is_loss()) {
         let text = format!("{name}: {}", notice.text).replace('\0', "\\0");
@@ -73,7 +74,7 @@ fn tables(py: Python<'_>, uris: Vec<String>, period: &str, align: &str) -> PyRes
         // The warning belongs to the caller of the function in Python.
         PyErr::warn(py, &category, &CString::new(text)?, 2)?;
     }
-    Ok(Table(counts.rows))
+    Table::new(counts.rows)
 }
 
 /// Reads bags, or a mission's JSON, as one mission.
@@ -105,9 +106,10 @@ struct Mission(Read);
 impl Mission {
     /// Its tables by name: `edges`, `topics`, `nodes`, `changes`, `events`, `phases`, `bags`.
     fn tables(&self, py: Python<'_>) -> PyResult<BTreeMap<&'static str, Table>> {
-        let tables = py.detach(|| arrow::mission_batches(&self.0));
-        let tables = tables.map_err(|e| raised(&e))?.into_iter();
-        Ok(tables.map(|(word, batch)| (word, Table(batch))).collect())
+        let tables = py.detach(|| of_mission(&self.0)).into_iter();
+        tables
+            .map(|(word, batch)| Ok((word, Table::new(batch)?)))
+            .collect()
     }
 
     /// The mission as JSON, equal to the output of `render -o x.json`.

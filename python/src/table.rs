@@ -7,10 +7,12 @@ use std::ffi::CStr;
 use arrow_array::ffi::{FFI_ArrowSchema, to_ffi};
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array as _, RecordBatch, RecordBatchIterator, StructArray};
+use bagreel::internals::tables::Batch;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyTuple};
 
 use super::BagreelError;
+use super::arrow::record_batch;
 
 const SCHEMA: &CStr = c"arrow_schema";
 const ARRAY: &CStr = c"arrow_array";
@@ -19,9 +21,16 @@ const STREAM: &CStr = c"arrow_array_stream";
 /// An Arrow record batch. `pyarrow.record_batch(table)`, `polars.DataFrame(table)` and DuckDB accept it
 /// directly.
 #[pyclass(frozen, module = "bagreel")]
-pub(crate) struct Table(pub(crate) RecordBatch);
+pub(crate) struct Table(RecordBatch);
 
-fn arrow(error: impl std::fmt::Display) -> PyErr {
+impl Table {
+    /// A table of these rows.
+    pub(crate) fn new(rows: Batch) -> PyResult<Self> {
+        record_batch(rows).map(Self).map_err(failed)
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> PyErr {
     BagreelError::new_err(format!("no Arrow table can be made: {error}"))
 }
 
@@ -43,7 +52,7 @@ impl Table {
     }
 
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
-        let schema = FFI_ArrowSchema::try_from(self.0.schema().as_ref()).map_err(arrow)?;
+        let schema = FFI_ArrowSchema::try_from(self.0.schema().as_ref()).map_err(failed)?;
         PyCapsule::new_with_value(py, schema, SCHEMA)
     }
 
@@ -56,7 +65,7 @@ impl Table {
         // Consumers cast types by themselves.
         let _ = requested_schema;
         let data = StructArray::from(self.0.clone()).to_data();
-        let (array, schema) = to_ffi(&data).map_err(arrow)?;
+        let (array, schema) = to_ffi(&data).map_err(failed)?;
         let schema = PyCapsule::new_with_value(py, schema, SCHEMA)?;
         let array = PyCapsule::new_with_value(py, array, ARRAY)?;
         PyTuple::new(py, [schema, array])

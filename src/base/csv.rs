@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
+use super::cast::to_f32;
 use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, span};
 use super::words::visible;
 
@@ -79,19 +80,14 @@ fn field(column: &TableColumn, level: usize, at: usize, to: &mut Vec<u8>) -> io:
 
 fn value(column: &TableColumn, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
     match &column.values {
-        ColumnValues::Flag(v) => write!(to, "{}", v[at]),
-        ColumnValues::I8(v) => write!(to, "{}", v[at]),
-        ColumnValues::U8(v) => write!(to, "{}", v[at]),
-        ColumnValues::I16(v) => write!(to, "{}", v[at]),
-        ColumnValues::U16(v) => write!(to, "{}", v[at]),
-        ColumnValues::I32(v) => write!(to, "{}", v[at]),
-        ColumnValues::U32(v) => write!(to, "{}", v[at]),
-        ColumnValues::I64(v) => write!(to, "{}", v[at]),
-        ColumnValues::U64(v) => write!(to, "{}", v[at]),
-        ColumnValues::F32(v) if v[at].is_finite() => write!(to, "{:?}", v[at]),
-        ColumnValues::F32(v) => odd(f64::from(v[at]), in_list, to),
-        ColumnValues::F64(v) if v[at].is_finite() => number(v[at], to),
-        ColumnValues::F64(v) => odd(v[at], in_list, to),
+        ColumnValues::Wholes(v) => match column.kind {
+            ColumnKind::FLAG => write!(to, "{}", v[at] != 0),
+            ColumnKind::U64 => write!(to, "{}", v[at].cast_unsigned()),
+            _ => write!(to, "{}", v[at]),
+        },
+        ColumnValues::Floats(v) if !v[at].is_finite() => odd(v[at], in_list, to),
+        ColumnValues::Floats(v) if column.kind == ColumnKind::F64 => number(v[at], to),
+        ColumnValues::Floats(v) => write!(to, "{:?}", to_f32(v[at])),
         ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => bytes(v.get(at), to),
         // Columns without unknown values are message fields.
         ColumnValues::Texts(v) => text(v.get(at), in_list, column.valid.is_none(), to),
@@ -236,10 +232,10 @@ mod tests {
 
     #[test]
     fn cells_are_quoted_if_necessary() {
-        let mut batch = Batch::new(&[
-            ("a", ColumnKind::Text),
-            ("b", ColumnKind::Text),
-            ("c", ColumnKind::F64),
+        let mut batch = Batch::of([
+            TableColumn::known("a", ColumnKind::Text),
+            TableColumn::known("b", ColumnKind::Text),
+            TableColumn::known("c", ColumnKind::F64),
         ]);
         batch.push(&[
             TableCell::text("x,y"),

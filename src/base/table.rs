@@ -6,46 +6,72 @@ use super::time::Stamp;
 
 /// The type of the values in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ColumnKind {
-    /// True or false.
-    Flag,
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
+pub enum ColumnKind {
+    /// A whole number of 8 to 64 bits; of 1 bit, false or true.
+    Whole {
+        /// Its size in bits.
+        bits: u8,
+        /// Whether it may be negative.
+        is_signed: bool,
+    },
+    /// A floating-point number.
+    Float {
+        /// Its size in bits, 32 or 64.
+        bits: u8,
+    },
+    /// A [`Stamp`].
+    Time,
     /// Text in UTF-8.
     Text,
     /// Bytes of any meaning.
     Bytes,
-    /// A [`Stamp`].
-    Time,
+}
+
+impl ColumnKind {
+    /// False or true.
+    pub const FLAG: Self = Self::whole(1, false);
+    /// The whole numbers of most columns.
+    pub const I64: Self = Self::whole(64, true);
+    /// The largest numbers of message fields.
+    pub(crate) const U64: Self = Self::whole(64, false);
+    /// The floating-point numbers of most columns.
+    pub const F64: Self = Self::Float { bits: 64 };
+
+    pub(crate) const fn whole(bits: u8, is_signed: bool) -> Self {
+        Self::Whole { bits, is_signed }
+    }
+
+    /// The size of a number in bytes; 0 for other kinds.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::Whole { bits, .. } | Self::Float { bits } => usize::from(bits.div_ceil(8)),
+            Self::Time | Self::Text | Self::Bytes => 0,
+        }
+    }
 }
 
 /// A column: its name, its kind, and its cell in the row of an `R` that belongs to a `C`.
-pub(crate) type ColumnOf<C, R> = (
-    &'static str,
-    ColumnKind,
-    for<'a> fn(&'a C, &'a R) -> TableCell<'a>,
-);
+pub(crate) struct ColumnOf<C, R> {
+    pub(crate) name: &'static str,
+    pub(crate) kind: ColumnKind,
+    pub(crate) cell: for<'a> fn(&'a C, &'a R) -> TableCell<'a>,
+}
 
 /// Columns as [`ColumnOf`], a line each.
 macro_rules! columns {
-    ($($name:literal $kind:ident $cell:expr;)*) => { &[$(($name, ColumnKind::$kind, $cell)),*] };
+    ($($name:literal $kind:ident $cell:expr;)*) => {
+        &[$(ColumnOf { name: $name, kind: ColumnKind::$kind, cell: $cell }),*]
+    };
 }
 pub(crate) use columns;
 
 /// Texts, or strings of bytes, one after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct TextColumn {
-    pub(crate) bytes: Vec<u8>,
+pub struct TextColumn {
+    /// All of them.
+    pub bytes: Vec<u8>,
     /// The end of each text.
-    pub(crate) ends: Vec<i32>,
+    pub ends: Vec<i32>,
 }
 
 impl TextColumn {
@@ -69,9 +95,11 @@ impl TextColumn {
 
 /// Dictionary-encoded texts: each is stored by its number among the distinct ones.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct WordColumn {
-    pub(crate) words: TextColumn,
-    pub(crate) numbers: Vec<u32>,
+pub struct WordColumn {
+    /// The distinct texts.
+    pub words: TextColumn,
+    /// The number of each text.
+    pub numbers: Vec<u32>,
 }
 
 impl WordColumn {
@@ -83,54 +111,31 @@ impl WordColumn {
 
 /// The values of a column; for a column of lists, their elements.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ColumnValues {
-    Flag(Vec<bool>),
-    I8(Vec<i8>),
-    U8(Vec<u8>),
-    I16(Vec<i16>),
-    U16(Vec<u16>),
-    I32(Vec<i32>),
-    U32(Vec<u32>),
-    /// Numbers, and stamps in nanoseconds.
-    I64(Vec<i64>),
-    U64(Vec<u64>),
-    F32(Vec<f32>),
-    F64(Vec<f64>),
+pub enum ColumnValues {
+    /// Whole numbers, 0 or 1 for a flag, those of 64 bits without sign as the same bits with one; stamps in
+    /// nanoseconds.
+    Wholes(Vec<i64>),
+    /// Floating-point numbers.
+    Floats(Vec<f64>),
+    /// Texts or bytes.
     Texts(TextColumn),
+    /// Texts that recur.
     Words(WordColumn),
 }
 
 impl ColumnValues {
     fn new(kind: ColumnKind) -> Self {
         match kind {
-            ColumnKind::Flag => Self::Flag(Vec::new()),
-            ColumnKind::I8 => Self::I8(Vec::new()),
-            ColumnKind::U8 => Self::U8(Vec::new()),
-            ColumnKind::I16 => Self::I16(Vec::new()),
-            ColumnKind::U16 => Self::U16(Vec::new()),
-            ColumnKind::I32 => Self::I32(Vec::new()),
-            ColumnKind::U32 => Self::U32(Vec::new()),
-            ColumnKind::I64 | ColumnKind::Time => Self::I64(Vec::new()),
-            ColumnKind::U64 => Self::U64(Vec::new()),
-            ColumnKind::F32 => Self::F32(Vec::new()),
-            ColumnKind::F64 => Self::F64(Vec::new()),
+            ColumnKind::Whole { .. } | ColumnKind::Time => Self::Wholes(Vec::new()),
+            ColumnKind::Float { .. } => Self::Floats(Vec::new()),
             ColumnKind::Text | ColumnKind::Bytes => Self::Texts(TextColumn::default()),
         }
     }
 
     fn truncate(&mut self, len: usize) {
         match self {
-            Self::Flag(v) => v.truncate(len),
-            Self::I8(v) => v.truncate(len),
-            Self::U8(v) => v.truncate(len),
-            Self::I16(v) => v.truncate(len),
-            Self::U16(v) => v.truncate(len),
-            Self::I32(v) => v.truncate(len),
-            Self::U32(v) => v.truncate(len),
-            Self::F32(v) => v.truncate(len),
-            Self::I64(v) => v.truncate(len),
-            Self::U64(v) => v.truncate(len),
-            Self::F64(v) => v.truncate(len),
+            Self::Wholes(v) => v.truncate(len),
+            Self::Floats(v) => v.truncate(len),
             Self::Texts(v) => v.truncate(len),
             Self::Words(v) => v.numbers.truncate(len),
         }
@@ -139,17 +144,8 @@ impl ColumnValues {
     /// Adds a placeholder for an unknown value.
     fn push_blank(&mut self) {
         match self {
-            Self::Flag(v) => v.push(false),
-            Self::I8(v) => v.push(0),
-            Self::U8(v) => v.push(0),
-            Self::I16(v) => v.push(0),
-            Self::U16(v) => v.push(0),
-            Self::I32(v) => v.push(0),
-            Self::U32(v) => v.push(0),
-            Self::F32(v) => v.push(0.0),
-            Self::I64(v) => v.push(0),
-            Self::U64(v) => v.push(0),
-            Self::F64(v) => v.push(0.0),
+            Self::Wholes(v) => v.push(0),
+            Self::Floats(v) => v.push(0.0),
             Self::Texts(v) => v.push(b""),
             Self::Words(v) => v.numbers.push(0),
         }
@@ -158,15 +154,18 @@ impl ColumnValues {
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct TableColumn {
-    pub(crate) name: Cow<'static, str>,
-    pub(crate) kind: ColumnKind,
-    pub(crate) values: ColumnValues,
+pub struct TableColumn {
+    /// Its name, in snake case except for message fields.
+    pub name: Cow<'static, str>,
+    /// The type of its values.
+    pub kind: ColumnKind,
+    /// Its values.
+    pub values: ColumnValues,
     /// The end of each list among the lists of the next level, or among the values; the rows' own lists first. Empty
     /// for a column of single values.
     pub(crate) lists: Vec<Vec<i32>>,
     /// Whether each row has a value; `None` for a column in which all rows have one.
-    pub(crate) valid: Option<Vec<bool>>,
+    pub valid: Option<Vec<bool>>,
 }
 
 impl TableColumn {
@@ -230,11 +229,11 @@ impl TableColumn {
     pub(crate) fn push(&mut self, cell: &TableCell<'_>) {
         let mut is_known = true;
         match (&mut self.values, cell) {
-            (ColumnValues::Flag(to), TableCell::Flag(value)) => to.push(*value),
-            (ColumnValues::I64(to), TableCell::Int(value) | TableCell::Time(Stamp(value))) => {
+            (ColumnValues::Wholes(to), TableCell::Flag(value)) => to.push((*value).into()),
+            (ColumnValues::Wholes(to), TableCell::Int(value) | TableCell::Time(Stamp(value))) => {
                 to.push(*value);
             }
-            (ColumnValues::F64(to), TableCell::Float(value)) if value.is_finite() => {
+            (ColumnValues::Floats(to), TableCell::Float(value)) if value.is_finite() => {
                 to.push(*value);
             }
             (ColumnValues::Texts(to), TableCell::Text(value)) => to.push(value.as_bytes()),
@@ -283,21 +282,14 @@ impl<'a> TableCell<'a> {
 
 /// Rows of a table, in columns.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Batch {
-    pub(crate) columns: Vec<TableColumn>,
-    pub(crate) rows: usize,
+pub struct Batch {
+    /// The columns, all of the same length.
+    pub columns: Vec<TableColumn>,
+    /// The number of rows.
+    pub rows: usize,
 }
 
 impl Batch {
-    /// A batch without rows, with columns of these names and kinds.
-    pub(crate) fn new(columns: &[(&'static str, ColumnKind)]) -> Self {
-        Self::of(
-            columns
-                .iter()
-                .map(|(name, kind)| TableColumn::known(*name, *kind)),
-        )
-    }
-
     /// A batch without rows, with these columns.
     pub(crate) fn of(columns: impl IntoIterator<Item = TableColumn>) -> Self {
         Self {
@@ -308,18 +300,19 @@ impl Batch {
 
     /// A batch without rows, with these columns.
     pub(crate) fn with<C, R>(columns: &[ColumnOf<C, R>]) -> Self {
-        Self::of(
-            columns
-                .iter()
-                .map(|(name, kind, _)| TableColumn::known(*name, *kind)),
-        )
+        let known = |column: &ColumnOf<C, R>| TableColumn::known(column.name, column.kind);
+        Self::of(columns.iter().map(known))
     }
 
     /// The rows of a whole table that belongs to `all`.
-    pub(crate) fn filled<C, R>(columns: &[ColumnOf<C, R>], all: &C, rows: &[R]) -> Self {
+    pub(crate) fn filled<'a, C, R: 'a>(
+        columns: &[ColumnOf<C, R>],
+        all: &C,
+        rows: impl IntoIterator<Item = &'a R>,
+    ) -> Self {
         let mut table = Self::with(columns);
         for row in rows {
-            let cells = columns.iter().map(|(.., cell)| cell(all, row));
+            let cells = columns.iter().map(|column| (column.cell)(all, row));
             table.push(&cells.collect::<Vec<_>>());
         }
         table
@@ -371,7 +364,7 @@ mod tests {
             TableColumn::full("b", ColumnKind::Text, 1),
         ]);
         let add = |batch: &mut Batch, texts: &[&str]| {
-            if let ColumnValues::I64(to) = &mut batch.columns[0].values {
+            if let ColumnValues::Wholes(to) = &mut batch.columns[0].values {
                 to.push(1);
             }
             if let ColumnValues::Texts(to) = &mut batch.columns[1].values {
@@ -392,7 +385,7 @@ mod tests {
 
     #[test]
     fn a_cell_of_another_kind_is_unknown() {
-        let mut batch = Batch::new(&[("a", ColumnKind::F64)]);
+        let mut batch = Batch::of([TableColumn::known("a", ColumnKind::F64)]);
         batch.push(&[TableCell::Float(f64::NAN)]);
         batch.push(&[TableCell::Int(1)]);
         batch.push(&[TableCell::Float(2.0)]);

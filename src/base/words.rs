@@ -7,6 +7,12 @@ use std::borrow::Cow;
 use chrono::DateTime;
 
 /// An enum without values whose variants have a word each: on the command line, in JSON, for people.
+/// A value with a word for the command line.
+pub(crate) trait Worded: Copy {
+    /// Its word.
+    fn word(&self) -> &'static str;
+}
+
 macro_rules! worded {
     (
         $(#[$about:meta])*
@@ -34,6 +40,12 @@ macro_rules! worded {
             /// The one of this word.
             $vis fn from_word(word: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|one| one.word() == word)
+            }
+        }
+
+        impl $crate::base::words::Worded for $name {
+            fn word(&self) -> &'static str {
+                Self::word(*self)
             }
         }
     };

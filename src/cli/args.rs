@@ -14,10 +14,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::base::error::Error;
 use crate::base::time::{Moment, Period};
+use crate::base::words::worded;
 use crate::export::tables::TableFormat;
 use crate::graph::diff::RATE_CHANGE;
-use crate::graph::window::{Align, Cut, Length};
-use values::{align, cut, length, moment, namespace, offset, period, share};
+use crate::graph::window::{Align, Cut, Division, Length};
+use crate::mission::events::LogFormat;
+use values::{length, moment, namespace, offset, one_of, period, share};
 
 /// The version, and in packages the commit that they were built from: `0.1.0 (1a2b3c4d5e 2026-11-23)`.
 const VERSION: &str = match option_env!("BAGREEL_VERSION") {
@@ -106,6 +108,8 @@ pub(super) enum Command {
 pub(super) struct InfoArgs {
     #[command(flatten)]
     pub(super) inputs: Inputs,
+    #[command(flatten)]
+    pub(super) again: VerifyArgs,
     /// Output format.
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: InfoFormat,
@@ -121,8 +125,8 @@ pub(super) struct EventsArgs {
     #[command(flatten)]
     pub(super) inputs: Inputs,
     /// Output format.
-    #[arg(long, value_enum, default_value_t)]
-    pub(super) format: EventsFormat,
+    #[arg(long, value_name = "WORD", default_value = "text", value_parser = one_of(LogFormat::ALL))]
+    pub(super) format: LogFormat,
     /// List below each event the topics and connections that it affects.
     #[arg(long)]
     pub(super) parts: bool,
@@ -149,8 +153,8 @@ pub(super) struct ExtractArgs {
     #[arg(long, short, value_name = "FILE|FOLDER")]
     pub(super) output: String,
     /// Output format, if the name has no known extension. [default with `--fields`: csv]
-    #[arg(long, value_name = "csv|parquet")]
-    pub(super) format: Option<String>,
+    #[arg(long, value_name = "csv|parquet", value_parser = one_of(TableFormat::ALL))]
+    pub(super) format: Option<TableFormat>,
     /// Decode messages into a table per topic with a column per field.
     #[arg(long)]
     pub(super) fields: bool,
@@ -194,17 +198,6 @@ impl InfoFormat {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "lower")]
-pub(super) enum EventsFormat {
-    #[default]
-    Text,
-    Csv,
-    Ndjson,
-    Json,
-    Markdown,
-}
-
 #[derive(Debug, Default, Args)]
 pub(super) struct Inputs {
     /// Bags (`.bag`, `.bag.active`, `.db3`, `.mcap`, a rosbag2 folder, `-` for standard input) or a mission's `.json`;
@@ -214,12 +207,26 @@ pub(super) struct Inputs {
     /// Put the names of a bag in a namespace: `robot2.bag=/robot2`; once per bag.
     #[arg(long, value_name = "BAG=NAMESPACE", value_parser = namespace)]
     pub(super) ns: Vec<(PathBuf, String)>,
-    /// Read everything again with a second, independent reader and compare.
-    #[arg(long)]
-    pub(super) verify: bool,
     /// Correct the clock of the computer that recorded a bag: `robot2.bag=+0.35s`; once per bag.
     #[arg(long, value_name = "BAG=TIME", value_parser = offset)]
     pub(super) offset: Vec<(PathBuf, i64)>,
+}
+
+impl Inputs {
+    /// Inputs without corrections.
+    pub(super) fn of(bags: &[PathBuf]) -> Self {
+        Self {
+            bags: bags.to_vec(),
+            ..Self::default()
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct VerifyArgs {
+    /// Read everything again with a second, independent reader and compare.
+    #[arg(long)]
+    pub(super) verify: bool,
 }
 
 /// The part of a recording.
@@ -233,7 +240,19 @@ pub(super) struct RangeArgs {
     pub(super) end: Option<Moment>,
 }
 
-#[derive(Debug, Default, Args)]
+impl RangeArgs {
+    /// This part in windows of this length.
+    pub(super) fn in_windows(self, length: Option<Length>) -> Division {
+        Division {
+            length: length.unwrap_or(Length::Auto),
+            start: self.start,
+            end: self.end,
+            ..Division::default()
+        }
+    }
+}
+
+#[derive(Debug, Args)]
 pub(super) struct TimeArgs {
     /// Length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s, shorter for bags below
     /// five minutes, longer above ten hours]
@@ -243,14 +262,24 @@ pub(super) struct TimeArgs {
     #[arg(long, value_parser = period)]
     pub(super) step: Option<Period>,
     /// Align windows with the first message (`bag`) or with whole periods of UTC (`clock`).
-    #[arg(long, value_parser = align, value_name = "bag|clock", default_value = "bag")]
+    #[arg(long, value_parser = one_of(Align::ALL), value_name = "bag|clock", default_value = "bag")]
     pub(super) align: Align,
     /// Make one window per phase or per reconfiguration instead of per period.
-    #[arg(long, value_parser = cut, value_name = "phases|changes", conflicts_with_all = ["period", "step", "align"])]
+    #[arg(long, value_parser = one_of(Cut::ALL), value_name = "phases|changes", conflicts_with_all = ["period", "step", "align"])]
     pub(super) cut: Option<Cut>,
-    /// Number of silent windows before an element counts as gone.
-    #[arg(long, value_name = "WINDOWS", default_value_t = 0)]
-    pub(super) grace: u32,
+    #[command(flatten)]
+    pub(super) range: RangeArgs,
+}
+
+impl TimeArgs {
+    pub(super) fn division(&self) -> Division {
+        Division {
+            step: self.step,
+            align: self.align,
+            cut: self.cut,
+            ..self.range.in_windows(self.period)
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -258,14 +287,6 @@ pub(super) struct RateArgs {
     /// Report rates that change by more than this fraction.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(super) rate_change: f64,
-}
-
-impl Default for RateArgs {
-    fn default() -> Self {
-        Self {
-            rate_change: RATE_CHANGE,
-        }
-    }
 }
 
 #[derive(Clone, Debug, Default, Args)]
@@ -279,6 +300,19 @@ pub(super) struct GraphArgs {
     pub(super) source: Option<PathBuf>,
     /// Also infer subscriptions from equal header stamps, from equal payloads in bags above 64 MB, or unnamed nodes
     /// from source code.
-    #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
-    pub(super) infer: Vec<String>,
+    #[arg(long, value_name = "stamps,payloads,source", value_parser = one_of(Inference::ALL), value_delimiter = ',')]
+    pub(super) infer: Vec<Inference>,
+}
+
+worded! {
+    /// What is inferred on request.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(super) enum Inference {
+        /// Subscriptions, from equal header stamps.
+        Stamps = "stamps",
+        /// Subscriptions, from equal payloads in large bags.
+        Payloads = "payloads",
+        /// Unnamed nodes, from source code.
+        Source = "source",
+    }
 }

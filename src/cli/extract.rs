@@ -61,12 +61,14 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
 /// The requested format, by name or file extension.
 fn format(args: &ExtractArgs, target: &Target) -> Result<TableFormat, Error> {
     match (&args.format, target.extension()) {
-        (Some(word), _) => TableFormat::parse(word),
+        (Some(format), _) => format.built(),
         (None, _) if args.fields => Ok(TableFormat::Csv),
-        (None, Some(word)) => TableFormat::parse(&word),
-        (None, None) => Err(Error::usage(
-            format!("`{}` has no known extension", args.output),
-            "choose one with `--format`: csv, parquet",
-        )),
+        (None, word) => match word.as_deref().and_then(TableFormat::from_word) {
+            Some(format) => format.built(),
+            None => Err(Error::usage(
+                format!("`{}` has no known extension", args.output),
+                "choose one with `--format`: csv, parquet",
+            )),
+        },
     }
 }

@@ -2,22 +2,21 @@
 
 use std::path::Path;
 
-use super::args::follow::{FollowArgs, FollowFormat};
-use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
-use super::reading::reading;
+use super::args::follow::FollowArgs;
 use super::render;
 use super::show::NO_EVENTS;
 use super::terminal::Terminal;
 use super::{DONE, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
+use crate::base::time::Period;
 use crate::base::{budget, file};
 use crate::export::Output;
 use crate::gate::{Expectation, FORMATS, judge};
 use crate::graph::window::Length;
 use crate::mission::events::LogFormat;
-use crate::pipeline::Render;
 use crate::pipeline::follow::{Feed, FindingFeed, Follow};
+use crate::pipeline::{Reading, Render};
 
 /// The number of newest messages in which events are detected: less than a tenth of a second of work, and
 /// several minutes for most robots.
@@ -28,6 +27,12 @@ const REST: f64 = 45.0;
 /// people are waiting for the output.
 const LEAST: f64 = 1.0;
 const LEAST_NEW: f64 = 0.2;
+/// The part of the recording that is kept in memory for events and findings: an hour, so that memory is bounded however
+/// long the recording.
+const KEPT: Period = match Period::from_nanos(3_600_000_000_000) {
+    Some(hour) => hour,
+    None => unreachable!(),
+};
 /// The seconds from the first sign of something new to its analysis: a first message alone does not show a rhythm.
 const SETTLED: f64 = 0.5;
 
@@ -74,21 +79,8 @@ struct Follower<'a> {
 
 /// Follows a recording to its end.
 pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
-    let inputs = Inputs {
-        bags: vec![args.what.clone()],
-        ..Inputs::default()
-    };
-    let time = TimeArgs {
-        period: args.period,
-        ..TimeArgs::default()
-    };
-    let reading = reading(
-        &inputs,
-        &time,
-        RangeArgs::default(),
-        &RateArgs::default(),
-        &GraphArgs::default(),
-    )?;
+    let mut reading = Reading::of([&args.what]);
+    reading.division.length = args.period.unwrap_or(Length::Auto);
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
     crate::pipeline::check_outputs(&job)?;
@@ -96,7 +88,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         let text = file::read_text(path, budget::USER_TEXT)?;
         crate::gate::read(&text, path)
     };
-    let follow = Follow::new(reading, args.keep)?;
+    let follow = Follow::new(reading, KEPT)?;
     if args.what.is_dir() && follow.path() != args.what {
         let newest = follow.path().display();
         terminal.note(&format!(
@@ -108,10 +100,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
         args,
         expectation: args.expect.as_deref().map(expectation).transpose()?,
         follow,
-        format: match args.format {
-            FollowFormat::Text => LogFormat::Text,
-            FollowFormat::Ndjson => LogFormat::Ndjson,
-        },
+        format: args.format,
         feed: Feed::default(),
         findings: FindingFeed::default(),
         job,

@@ -4,19 +4,19 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::applies::{self, Given};
-use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
-use super::args::{GraphArgs, Inputs, RateArgs, TimeArgs};
+use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, Undecidable};
+use super::args::{GraphArgs, Inputs, RangeArgs};
+use super::look::summary;
 use super::reading::reading;
-use super::render::summary;
 use super::terminal::Terminal;
-use super::{DONE, FAILED, SKIPPED, USAGE, code, look};
+use super::{DONE, FAILED, SKIPPED, USAGE, code};
 use crate::base::error::{Error, Result};
-use crate::base::geometry::Size;
 use crate::base::nearest::suggestion;
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
 use crate::gate::{CheckFormat, FORMATS, Judgement, Severity, explain};
+use crate::graph::window::Length;
 use crate::mission::Mission;
 use crate::pipeline::{self, Baseline, Check, Diff, Reading, Report};
 
@@ -27,8 +27,18 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
         applies::check_against(given)?;
         return against(args, given, (paths[1 - at], paths[at]), terminal);
     }
-    let job = diff_job(args)?;
-    applies::check_diff(given, &args.graph.infer, !job.pictures.is_empty())?;
+    let one = |path: &PathBuf| {
+        judged(
+            std::slice::from_ref(path),
+            args.range,
+            &GraphArgs::default(),
+        )
+    };
+    let mut job = Diff::new([one(&args.first)?, one(&args.second)?])?;
+    job.rate_change = args.rate_change;
+    for output in &args.outputs {
+        job.write(output)?;
+    }
     for reading in &job.readings {
         applies::check_inputs(given, reading)?;
     }
@@ -71,21 +81,6 @@ fn wrote<'a>(targets: impl Iterator<Item = &'a Target>, what: &str, terminal: &m
     }
 }
 
-fn diff_job(args: &DiffArgs) -> Result<Diff> {
-    let one = |path: &PathBuf| judged(std::slice::from_ref(path), &args.time(), &args.graph);
-    let mut job = Diff::new([one(&args.first)?, one(&args.second)?])?;
-    job.rate_change = args.rate_change;
-    for output in &args.outputs {
-        job.write(output)?;
-    }
-    job.drawing.style = look::style(&args.style)?;
-    if let Some((width, height)) = args.size {
-        job.drawing.page.size = Size::new(f64::from(width), f64::from(height));
-        job.drawing.is_sized = true;
-    }
-    Ok(job)
-}
-
 /// Whether a path names an expectation.
 fn is_expectation(path: &Path) -> bool {
     path.extension()
@@ -106,22 +101,26 @@ fn against(
         expect: Some(expect.to_owned()),
         format: format.unwrap_or(&FORMATS[0]),
         outputs: args.outputs.clone(),
-        link: Vec::new(),
         undecidable: Undecidable::Allow,
         explain: None,
-        time: args.time(),
-        graph: args.graph.clone(),
+        range: args.range,
+        graph: GraphArgs::default(),
     };
     self::check(&check, given, terminal)
 }
 
 /// Writes an expectation that all of these healthy runs meet.
 pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
-    applies::check_baseline(given)?;
-    let runs = args
-        .bags
-        .iter()
-        .map(|bag| judged(std::slice::from_ref(bag), &args.time, &args.graph));
+    let graph = GraphArgs {
+        topology: args.topology.clone(),
+        ..GraphArgs::default()
+    };
+    let run = |bag: &PathBuf| {
+        let mut reading = judged(std::slice::from_ref(bag), args.range, &graph)?;
+        reading.division.length = args.period.unwrap_or(Length::Auto);
+        Ok(reading)
+    };
+    let runs = args.bags.iter().map(run);
     let mut job = Baseline::new(runs.collect::<Result<_>>()?, Target::parse(&args.output));
     job.update.clone_from(&args.update);
     job.only.clone_from(&args.only);
@@ -174,16 +173,13 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
             "give the path of a graph.yaml",
         ));
     };
-    let mut job = Check::new(judged(&args.bags, &args.time, &args.graph)?, &expect);
+    let mut job = Check::new(judged(&args.bags, args.range, &args.graph)?, &expect);
     job.tracked = tracked(&expect);
     let reports = args.outputs.iter().map(|output| report(output));
     job.reports = reports.collect::<Result<_>>()?;
-    job.links.clone_from(&args.link);
     job.is_strict = args.undecidable == Undecidable::Error;
     job.append_to = summary();
-    let formats = job.reports.iter().map(|report| report.format.word);
-    let formats: Vec<&str> = formats.chain([args.format.word]).collect();
-    applies::check_check(given, &args.graph.infer, &formats)?;
+    applies::check_guesses(&args.graph.infer)?;
     applies::check_inputs(given, &job.reading)?;
     verdict(&job, Some(args.format), terminal)
 }
@@ -262,16 +258,10 @@ fn unknown_kind(word: &str) -> Error {
 }
 
 /// The reading for a check. Missions in JSON have their own windows.
-fn judged(bags: &[PathBuf], time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
-    let inputs = Inputs {
-        bags: bags.to_vec(),
-        ..Inputs::default()
-    };
-    let windows = TimeArgs {
-        period: time.period,
-        ..TimeArgs::default()
-    };
-    reading(&inputs, &windows, time.range, &RateArgs::default(), graph)
+fn judged(bags: &[PathBuf], range: RangeArgs, graph: &GraphArgs) -> Result<Reading> {
+    let mut reading = reading(&Inputs::of(bags), graph)?;
+    reading.division = range.in_windows(None);
+    Ok(reading)
 }
 
 /// A report to write; Markdown if it is a CI job's summary file, which has no extension.

@@ -1,10 +1,10 @@
 //! The options for the look of pictures, from the command line.
 
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 
-use super::args::figure::FigureForm;
-use super::args::render::{LookArgs, RenderArgs, SequenceArgs, ViewArgs};
+use super::applies::{Given, OF_GRAPHS};
+use super::args::figure::FigureArgs;
+use super::args::render::{LookArgs, ModeWord, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
@@ -12,10 +12,9 @@ use crate::draw::figure::{FigureKind, RowKind};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
-use crate::export::options::{self, FigureOptions};
-use crate::layout::Orientation;
+use crate::export::options::{self, FigureOptions, SequenceOptions};
 use crate::mission::{Places, read_json};
-use crate::pipeline::{Body, Phases};
+use crate::pipeline::Body;
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// The view options: `rqt_graph`'s defaults or ours, modified by the given options.
@@ -25,8 +24,10 @@ pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     } else {
         ViewOptions::default()
     };
-    if let Some(mode) = &args.mode {
-        view.mode = Mode::parse(mode)?;
+    match args.mode {
+        Some(ModeWord::Nodes) => view.mode = Mode::Nodes,
+        Some(ModeWord::All) => view.mode = Mode::All,
+        Some(ModeWord::Topics) | None => {}
     }
     if let Some(filter) = &args.ns_filter {
         view.ns_filter = NameFilter::parse(filter)?;
@@ -40,10 +41,22 @@ pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     if let Some(group) = &args.group {
         view.group = Grouping::parse(group)?;
     }
-    let names = |names: &[String]| names.iter().map(|n| Arc::from(n.as_str())).collect();
-    view.collapse = names(&args.collapse);
-    view.expand = names(&args.expand);
+    for name in &args.collapse {
+        match name.strip_prefix('-') {
+            Some(kept) => view.expand.push(kept.into()),
+            None => view.collapse.push(name.as_str().into()),
+        }
+    }
     Ok(view)
+}
+
+/// Graph or timeline: as requested, or a graph if an option only applies to a graph.
+pub(super) fn body(mode: Option<ModeWord>, given: &Given) -> Body {
+    match mode {
+        Some(ModeWord::Topics) => Body::TopicTimeline,
+        None if given.any(OF_GRAPHS).is_none() => Body::Auto,
+        _ => Body::Graph,
+    }
 }
 
 /// A built-in style by its name, else a file.
@@ -71,125 +84,64 @@ pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     Fonts::bundled().with(data, path)
 }
 
-pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
+pub(super) fn page(args: &LookArgs, rate_change: f64) -> PageOptions {
     let default = PageOptions::default();
-    let size = args
-        .size
-        .map_or(default.size, |(w, h)| Size::new(f64::from(w), f64::from(h)));
+    let size = args.size.map(|(w, h)| Size::new(w.into(), h.into()));
     PageOptions {
-        size,
+        size: size.unwrap_or(default.size),
         width_mm: args.width,
         bare: args.bare,
         title: args.title.clone(),
-        orientation: match args.orientation.as_str() {
-            "LR" => Some(Orientation::LeftRight),
-            "TB" => Some(Orientation::TopBottom),
-            _ => None,
-        },
+        orientation: args.orientation,
         rate_change,
         ..default
     }
 }
 
-pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> {
+pub(super) fn sequence(args: &SequenceArgs) -> Result<SequenceOptions> {
     let strip = args.strip.as_deref().map(options::Choice::parse);
-    Ok(options::SequenceOptions {
+    Ok(SequenceOptions {
         frame_ms: args.frame_ms,
         max_bytes: args.max_bytes,
         strip: strip.transpose()?,
-        links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
-        ..options::SequenceOptions::default()
+        links: args.link.clone(),
+        append_to: summary(),
+        ..SequenceOptions::default()
     })
 }
 
-/// Graph or board: as requested, or a graph if an option only applies to a graph.
-pub(super) fn body(args: &RenderArgs) -> Result<Body> {
-    let (view, look) = (&args.view, &args.look);
-    let typed = [
-        ("--mode", view.mode.is_some()),
-        ("--hide", view.hide.is_some()),
-        ("--group", view.group.is_some()),
-        ("--collapse", !view.collapse.is_empty()),
-        ("--expand", !view.expand.is_empty()),
-        ("--rqt-defaults", view.rqt_defaults),
-        ("--orientation", look.orientation != "auto"),
-        ("--layout", look.layout != "layered"),
-        ("--layout-from", look.layout_from.is_some()),
-        ("--strip", args.sequence.strip.is_some()),
-    ];
-    let graph = typed.iter().find(|(_, is)| *is).map(|(flag, _)| *flag);
-    match (view.view.as_deref(), graph) {
-        (Some("board"), Some(flag)) => Err(Error::usage(
-            format!("`{flag}` has no effect on a topic timeline"),
-            "omit it, or use `--view graph`",
-        )),
-        (Some("board"), None) => Ok(Body::TopicTimeline),
-        (None, None) => Ok(Body::Auto),
-        _ => Ok(Body::Graph),
-    }
+/// The summary file of a GitHub job; its name has no extension.
+pub(super) fn summary() -> Option<PathBuf> {
+    std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
 }
 
 /// The requested figure, with its width on paper in millimetres.
-pub(super) fn figure(word: &str, form: &FigureForm, width: Option<f64>) -> Result<FigureOptions> {
-    let kind = FigureKind::parse(word)?;
+pub(super) fn figure(args: &FigureArgs) -> Result<FigureOptions> {
+    let (form, kind) = (&args.form, args.kind);
     let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
     let has_steps = matches!(kind, FigureKind::Steps | FigureKind::Changes);
     if !has_steps && !form.steps.is_empty() {
         return Err(Error::usage(
-            format!("`--steps` has no effect on `{word}`"),
+            format!("`--steps` has no effect on `{}`", kind.word()),
             "it chooses the panels of `--kind steps` and `changes`",
         ));
     }
-    let rows = form.rows.as_deref().map(RowKind::parse).transpose()?;
-    if kind != FigureKind::Lives && rows == Some(RowKind::Topics) {
+    if kind != FigureKind::Lives && form.rows == Some(RowKind::Topics) {
         return Err(Error::usage(
-            format!("`{word}` has no rows of topics"),
+            format!("`{}` has no rows of topics", kind.word()),
             "`--rows nodes` or `--rows groups`; topics are arrows",
         ));
     }
     let default = FigureOptions::default();
     Ok(FigureOptions {
         kind,
-        width_mm: width.unwrap_or(default.width_mm),
+        width_mm: args.width.unwrap_or(default.width_mm),
         text_pt: form.text.unwrap_or(default.text_pt),
-        rows,
+        rows: form.rows,
         steps,
+        is_bare: args.bare,
         ..default
     })
-}
-
-/// The source of phases.
-pub(super) fn phases(word: &str) -> Phases {
-    match word {
-        "auto" => Phases::Found,
-        "none" => Phases::None,
-        file => Phases::File(file.into()),
-    }
-}
-
-fn link(text: &str) -> Result<(String, String)> {
-    let parts = text
-        .split_once('=')
-        .filter(|(name, url)| !name.is_empty() && !url.is_empty());
-    let (name, url) = parts.ok_or_else(|| {
-        Error::usage(
-            format!("`--link {text}` is not a name and an address"),
-            "write `--link player=https://…`",
-        )
-    })?;
-    // Readers trust the links in a report: no scheme that executes code.
-    let scheme = url
-        .split_once(':')
-        .map(|(scheme, _)| scheme.to_ascii_lowercase());
-    let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.');
-    let scheme = scheme.filter(|s| s.chars().all(is_word));
-    if scheme.is_some_and(|s| !matches!(s.as_str(), "http" | "https")) {
-        return Err(Error::usage(
-            format!("`--link {text}` is not a valid address"),
-            "write `--link player=https://…`, or a path",
-        ));
-    }
-    Ok((name.to_owned(), url.to_owned()))
 }
 
 /// The positions from an earlier run's JSON.

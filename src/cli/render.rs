@@ -1,12 +1,11 @@
 //! `bagreel render`: from arguments to a job, and the report of what was written.
 
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::applies::{self, Given};
-use super::args::TimeArgs;
 use super::args::figure::FigureArgs;
-use super::args::render::RenderArgs;
+use super::args::render::{LookArgs, ModeWord, RenderArgs};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{code, look};
@@ -15,10 +14,9 @@ use crate::base::error::Error;
 use crate::base::notice::NoticeKind;
 use crate::base::words;
 use crate::export::Output;
-use crate::export::options::FigureOptions;
 use crate::export::target::Target;
 use crate::mission::Mission;
-use crate::pipeline::{Drawing, Purpose, Render, Rendered};
+use crate::pipeline::{Drawing, Reading, Render, Rendered};
 use crate::view::NameFilter;
 
 /// Reads once and writes every output.
@@ -29,6 +27,9 @@ pub(super) fn render(
 ) -> Result<u8, Error> {
     let job = job(args, given)?;
     applies::check_outputs(given, args, &job.outputs)?;
+    if args.view.mode == Some(ModeWord::Topics) {
+        applies::check_topics(given, &job.outputs)?;
+    }
     crate::pipeline::check_outputs(&job)?;
     applies::check_inputs(given, &job.reading)?;
     make_room(&job, terminal);
@@ -65,40 +66,40 @@ pub(super) fn figure(
 
 /// The job of `figure`.
 fn figure_job(args: &FigureArgs) -> Result<Render, Error> {
-    let time = TimeArgs::default();
-    let reading = reading(&args.inputs, &time, args.range, &args.rate, &args.graph)?;
-    let reading = reading.with_phases(look::phases(&args.phases.phases));
-    let outputs = match &args.outputs[..] {
-        [] => vec![Output::parse(
-            &default_output(&reading.inputs, "pdf"),
-            None,
-        )?],
-        some => {
-            let named = some.iter().map(|output| Output::named(output, None));
-            named.collect::<Result<_, _>>()?
-        }
-    };
-    let mut drawing = Drawing::new()?;
-    drawing.fonts = look::fonts(args.font.as_deref())?;
-    let filter = |text: &Option<String>| NameFilter::parse(text.as_deref().unwrap_or_default());
-    drawing.view.ns_filter = filter(&args.ns_filter)?;
-    drawing.view.topic_filter = filter(&args.topic_filter)?;
-    drawing.page.rate_change = args.rate.rate_change;
-    drawing.page.width_mm = args.width;
-    let kept = [args.font.clone(), Some(PathBuf::from(&args.phases.phases))];
-    let figure = look::figure(&args.kind, &args.form, args.width)?;
+    let mut reading = reading(&args.inputs, &args.graph)?;
+    reading.division = args.range.in_windows(None);
+    reading.rate_change = args.rate.rate_change;
+    reading.phases = args.phases.phases.clone();
+    let outputs = outputs(&args.outputs, &reading, "pdf", None)?;
     let mut job = Render::new(reading, outputs)?;
-    job.drawing = drawing;
-    job.sequence.figure = Some(FigureOptions {
-        is_bare: args.bare,
-        ..figure
-    });
-    job.kept = kept
-        .into_iter()
-        .flatten()
-        .filter(|path| path.exists())
-        .collect();
+    let filter = |text: &Option<String>| NameFilter::parse(text.as_deref().unwrap_or_default());
+    job.drawing.fonts = look::fonts(args.font.as_deref())?;
+    job.drawing.view.ns_filter = filter(&args.ns_filter)?;
+    job.drawing.view.topic_filter = filter(&args.topic_filter)?;
+    job.drawing.page.rate_change = args.rate.rate_change;
+    job.drawing.page.width_mm = args.width;
+    job.sequence.figure = Some(look::figure(args)?);
+    job.kept = args.font.iter().cloned().collect();
     Ok(job)
+}
+
+/// The outputs as given, or that of the bag's name with this extension.
+fn outputs(
+    given: &[OsString],
+    reading: &Reading,
+    extension: &str,
+    format: Option<&str>,
+) -> Result<Vec<Output>, Error> {
+    if given.is_empty() {
+        let name = default_output(&reading.inputs, extension);
+        return Ok(vec![Output::parse(&name, format)?]);
+    }
+    let summary = look::summary();
+    let named = given.iter().map(|output| {
+        let is_summary = summary.as_deref() == Some(Path::new(output));
+        Output::named(output, format.or(is_summary.then_some("md")))
+    });
+    named.collect()
 }
 
 /// Prints the files written, the number of windows and changes, and the time taken.
@@ -138,81 +139,47 @@ fn division(mission: &Mission) -> String {
 
 /// The job of `render`.
 fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
-    let reading = reading(
-        &args.inputs,
-        &args.time,
-        args.range,
-        &args.rate,
-        &args.graph,
-    )?;
-    let mut reading = reading.with_phases(look::phases(&args.phases.phases));
-    let outputs = match &args.outputs[..] {
-        [] => {
-            let name = default_output(&reading.inputs, "gif");
-            vec![Output::parse(&name, args.format.as_deref())?]
-        }
-        some => some
-            .iter()
-            .map(|o| Output::named(o, args.format.as_deref().or(summary_format(o))))
-            .collect::<Result<_, _>>()?,
-    };
-    let is_still = applies::allows_still(given, &outputs);
-    reading.is_still_if_unchanged = is_still;
+    let look = &args.look;
+    let mut reading = reading(&args.inputs, &args.graph)?;
+    reading.verify = args.again.verify;
+    reading.division = args.time.division();
+    reading.rate_change = args.rate.rate_change;
+    reading.phases = args.phases.phases.clone();
+    let outputs = outputs(&args.outputs, &reading, "gif", args.format.as_deref())?;
+    reading.is_still_if_unchanged = applies::allows_still(given, &outputs);
     let still = default_output(&reading.inputs, "png");
-    let still = (is_still && args.outputs.is_empty()).then(|| Output::parse(&still, None));
-    let purpose = args
-        .look
-        .purpose
-        .as_deref()
-        .map(Purpose::parse)
-        .transpose()?;
+    let is_still = reading.is_still_if_unchanged && args.outputs.is_empty();
     let drawing = Drawing {
-        body: look::body(args)?,
+        body: look::body(args.view.mode, given),
         view: look::view(&args.view)?,
-        style: look::style(&args.look.style)?,
-        fonts: look::fonts(args.look.font.as_deref())?,
-        page: look::options(&args.look, args.rate.rate_change),
-        is_sized: args.look.size.is_some(),
+        style: look::style(&look.style)?,
+        fonts: look::fonts(look.font.as_deref())?,
+        page: look::page(look, args.rate.rate_change),
+        is_sized: look.size.is_some(),
         purpose: None,
-        is_fitted: args.look.fit == "auto",
-        engine: crate::layout::engine(&args.look.layout)?,
-        kept: look::kept(args.look.layout_from.as_deref())?,
+        is_fitted: look.fit,
+        engine: crate::layout::engine(&look.layout)?,
+        kept: look::kept(look.layout_from.as_deref())?,
     };
     Ok(Render {
-        drawing: match purpose {
+        drawing: match look.purpose {
             Some(purpose) => drawing.seen(purpose),
             None => drawing,
         },
-        sequence: crate::export::sequence::SequenceOptions {
-            append_to: summary(),
-            ..look::sequence(&args.sequence)?
-        },
-        kept: kept(args),
+        sequence: look::sequence(&args.sequence)?,
+        kept: kept(look),
         outputs,
-        still: still.transpose()?,
+        still: is_still.then(|| Output::parse(&still, None)).transpose()?,
         reading,
     })
 }
 
-/// The files that only a drawing reads. Names of built-in styles are included, which is harmless.
-fn kept(args: &RenderArgs) -> Vec<PathBuf> {
-    let look = &args.look;
-    let named = [Some(&look.style), Some(&args.phases.phases)];
-    let named = named.into_iter().flatten().map(PathBuf::from);
-    let files = [&look.font, &look.layout_from].into_iter().flatten();
-    let all = named.chain(files.cloned());
-    all.filter(|path| path.exists()).collect()
-}
-
-/// The summary file of a GitHub job; its name has no extension.
-pub(super) fn summary() -> Option<PathBuf> {
-    std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
-}
-
-fn summary_format(output: &OsStr) -> Option<&'static str> {
-    summary()
-        .is_some_and(|path| path == Path::new(output))
-        .then_some("md")
+/// The files that only a drawing reads. The name of a built-in style is included, which is harmless.
+fn kept(look: &LookArgs) -> Vec<PathBuf> {
+    let style = PathBuf::from(&look.style);
+    let files = [Some(&style), look.font.as_ref(), look.layout_from.as_ref()];
+    let files = files.into_iter().flatten().filter(|path| path.exists());
+    files.cloned().collect()
 }
 
 /// The default output: `out/<bag name>.gif`, `.pdf` for a figure, `.png` for a still; the bag's name is without its

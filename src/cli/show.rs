@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::applies::{self, Given};
-use super::args::{EventsArgs, EventsFormat, InfoArgs, InfoFormat, RangeArgs, RateArgs, TimeArgs};
+use super::args::{EventsArgs, InfoArgs, InfoFormat};
 use super::reading::reading;
 use super::terminal::Terminal;
 use super::{DONE, SKIPPED, code};
@@ -26,8 +26,9 @@ pub(super) fn events(
     given: &Given,
     terminal: &mut Terminal,
 ) -> Result<u8, Error> {
-    let windows = TimeArgs::default();
-    let reading = reading(&args.inputs, &windows, args.range, &args.rate, &args.graph)?;
+    let mut reading = reading(&args.inputs, &args.graph)?;
+    reading.division = args.range.in_windows(None);
+    reading.rate_change = args.rate.rate_change;
     applies::check_inputs(given, &reading)?;
     if args.graph.source.is_some() {
         terminal
@@ -38,13 +39,7 @@ pub(super) fn events(
         all: args.all,
         phases: args.phases,
     };
-    let format = match args.format {
-        EventsFormat::Text => LogFormat::Text,
-        EventsFormat::Csv => LogFormat::Csv,
-        EventsFormat::Ndjson => LogFormat::Ndjson,
-        EventsFormat::Json => LogFormat::Json,
-        EventsFormat::Markdown => LogFormat::Markdown,
-    };
+    let format = args.format;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {
@@ -116,17 +111,9 @@ fn events_of_folder(
 
 /// Prints the summary of a mission, or a row for each bag of a folder.
 pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
-    let time = TimeArgs {
-        period: Some(Length::Parts(PARTS)),
-        ..TimeArgs::default()
-    };
-    let reading = reading(
-        &args.inputs,
-        &time,
-        RangeArgs::default(),
-        &RateArgs::default(),
-        &args.graph,
-    )?;
+    let mut reading = reading(&args.inputs, &args.graph)?;
+    reading.verify = args.again.verify;
+    reading.division.length = Length::Parts(PARTS);
     applies::check_inputs(given, &reading)?;
     let table = args.format.of_table()?;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
@@ -145,7 +132,6 @@ pub(super) fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> R
         return Ok(if skipped { SKIPPED } else { DONE });
     }
     if !args.why.is_empty() {
-        let mut reading = reading;
         reading.collect.why.clone_from(&args.why);
         let (mission, pieces) = explain(&reading, terminal)?;
         terminal.fitted(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::base::leftovers;
 
@@ -87,6 +87,7 @@ fn end(signal: u8, report: fn()) {
 #[cfg(unix)]
 fn listen(stop: &Stop) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use std::time::Instant;
     let mut wanted = vec![SIGINT, SIGTERM];
     if !is_hangup_ignored() {
         wanted.push(SIGHUP);
@@ -120,9 +121,21 @@ fn is_hangup_ignored() -> bool {
 
 #[cfg(not(unix))]
 fn listen(stop: &Stop) {
-    /// The number for Ctrl-C on other systems, which have no signals.
-    const INTERRUPT: u8 = 2;
-    let stop = stop.clone();
+    use signal_hook::consts::{SIGBREAK, SIGINT};
+    /// The pause between two looks, of which people notice nothing.
+    const PAUSE: Duration = Duration::from_millis(20);
+    let is_raised = Arc::new(AtomicBool::new(false));
     // Without a handler, Ctrl-C ends the process at once.
-    let _ = ctrlc::set_handler(move || stop.on_signal(INTERRUPT));
+    for signal in [SIGINT, SIGBREAK] {
+        let _ = signal_hook::flag::register(signal, Arc::clone(&is_raised));
+    }
+    let stop = stop.clone();
+    thread::spawn(move || {
+        loop {
+            thread::sleep(PAUSE);
+            if is_raised.swap(false, Ordering::Relaxed) {
+                stop.on_signal(u8::try_from(SIGINT).unwrap_or(1));
+            }
+        }
+    });
 }

@@ -5,7 +5,6 @@ use crate::base::error::Result;
 use crate::base::words;
 use crate::cli::args::tables::TablesArgs;
 use crate::cli::terminal::Terminal;
-use crate::export::tables::TableFormat;
 use crate::pipeline::{self, Counting, Tabled, Tables};
 
 /// Writes the tables; returns the exit code.
@@ -13,14 +12,12 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     let job = Tables {
         sources: args.bags.clone(),
         folder: args.output.clone(),
-        format: TableFormat::parse(&args.format)?,
+        format: args.format.built()?,
         counting: Counting {
             period: args.period,
-            align: args.align,
+            ..Counting::default()
         },
         skip_existing: args.skip_existing,
-        stops_on_error: args.on_error == "fail",
-        jobs: args.jobs,
     };
     let done = pipeline::tables(&job, terminal)?;
     terminal.notices(&done.notices);

@@ -25,7 +25,7 @@ mod talks;
 mod tex;
 pub(crate) mod tracks;
 
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::base::words::worded;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
@@ -53,18 +53,6 @@ worded! {
     }
 }
 
-impl FigureKind {
-    /// The figure of this word.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word.
-    pub fn parse(word: &str) -> Result<Self> {
-        let what = || format!("`{word}` is not a figure");
-        Self::from_word(word)
-            .ok_or_else(|| Error::usage(what(), "figures: lives, map, steps, changes"))
-    }
-}
-
 worded! {
     /// The kind of element that rows and boxes represent.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,17 +63,6 @@ worded! {
         Groups = "groups",
         /// Topics.
         Topics = "topics",
-    }
-}
-
-impl RowKind {
-    /// The rows of this word: `nodes`, `groups`, `topics`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word.
-    pub fn parse(word: &str) -> Result<Self> {
-        let what = || format!("`{word}` cannot be a row");
-        Self::from_word(word).ok_or_else(|| Error::usage(what(), "rows: nodes, groups, topics"))
     }
 }
 

@@ -225,11 +225,11 @@ impl<'a> TopicTimeline<'a> {
     fn why(&self) -> String {
         let elements = &self.source.mission.elements;
         let why = if self.source.knows_publishers() {
-            "a timeline of topics; --view graph draws the graph".to_owned()
+            "a timeline of topics; --mode all draws the graph".to_owned()
         } else if elements.publishes.is_empty() {
             "the bag names no publishers; add them with --topology FILE; bagreel info says how to record them".to_owned()
         } else {
-            "most publishers are unknown; add them with --topology FILE, or draw what is known with --view graph".to_owned()
+            "most publishers are unknown; add them with --topology FILE, or draw what is known with --mode all".to_owned()
         };
         let left_out = match self.left_out {
             0 => String::new(),

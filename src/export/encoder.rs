@@ -254,10 +254,6 @@ pub enum OneDrawing {
 
 /// An output format.
 #[derive(Debug)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "a row of a table, whose flags are independent"
-)]
 pub struct OutputFormat {
     /// Its extension and its name for `--format`.
     pub word: &'static str,
@@ -269,15 +265,38 @@ pub struct OutputFormat {
     pub is_viewed: bool,
     /// Whether it contains all elements of the view separately, even those that the picture groups.
     pub is_unfolded: bool,
-    /// Whether `--max-bytes` applies to it.
-    pub is_limited: bool,
     /// Whether it can contain one drawing of the whole.
     pub whole: OneDrawing,
+    /// The options of `render` that apply to every output in this format but not to all formats, separated by spaces.
+    pub takes: &'static [&'static str],
+    /// Those that apply to outputs of a single window.
+    pub takes_alone: &'static str,
+    /// Those that apply to outputs of several windows.
+    pub takes_together: &'static str,
     /// A check of other requirements before anything is read.
     pub check: Option<fn(&Target) -> Result<()>>,
     /// The function that begins an output.
     pub start: Start,
 }
+
+impl OutputFormat {
+    /// Whether an option of `render`, such as `frame-ms`, applies to an output in this format, which is of a single
+    /// window or of several.
+    pub fn takes(&self, option: &str, is_alone: bool) -> bool {
+        let these = if is_alone {
+            self.takes_alone
+        } else {
+            self.takes_together
+        };
+        let mut lists = self.takes.iter().chain([&these]);
+        lists.any(|list| list.split(' ').any(|one| one == option))
+    }
+}
+
+/// The options for everything on a page that shows a graph.
+pub(crate) const LOOK: &str = "style for size fit orientation layout layout-from font";
+/// The options for pictures and reports.
+pub(crate) const WORDS: &str = "title phases group collapse";
 
 /// The properties that formats of drawings have in common.
 pub(crate) const PICTURE: OutputFormat = OutputFormat {
@@ -286,8 +305,10 @@ pub(crate) const PICTURE: OutputFormat = OutputFormat {
     is_drawn: true,
     is_viewed: true,
     is_unfolded: false,
-    is_limited: false,
     whole: OneDrawing::Never,
+    takes: &[LOOK, WORDS],
+    takes_alone: "",
+    takes_together: "",
     check: None,
     start: nothing,
 };
@@ -295,14 +316,24 @@ pub(crate) const PICTURE: OutputFormat = OutputFormat {
 /// The properties that formats of single images have in common.
 pub(crate) const IMAGE: OutputFormat = OutputFormat {
     whole: OneDrawing::Always,
+    takes: &[LOOK, WORDS, "width"],
+    takes_alone: "bare",
+    takes_together: "strip",
     ..PICTURE
 };
 
-/// The properties that formats of the graph itself have in common.
-pub(crate) const DATA: OutputFormat = OutputFormat {
+/// The properties that formats of the view as a graph have in common.
+pub(crate) const GRAPH: OutputFormat = OutputFormat {
     is_drawn: false,
-    is_viewed: false,
+    takes: &["group collapse"],
     ..PICTURE
+};
+
+/// The properties that formats of the whole mission have in common.
+pub(crate) const DATA: OutputFormat = OutputFormat {
+    is_viewed: false,
+    takes: &["phases"],
+    ..GRAPH
 };
 
 /// The default start, which each row overrides.

@@ -19,6 +19,7 @@ use ::parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPro
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
+use crate::base::cast::to_f32;
 use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
 
 /// The most rows in a group, as in other writers.
@@ -122,36 +123,25 @@ fn memory(batch: &Batch) -> usize {
     let columns = batch.columns.iter().map(|column| {
         let ends = column.lists.iter().map(|ends| size_of_val(&ends[..]));
         let valid = column.valid.as_ref().map_or(0, Vec::len);
-        ends.sum::<usize>() + valid + memory_of(&column.values)
+        let values = match &column.values {
+            ColumnValues::Wholes(v) => size_of_val(&v[..]),
+            ColumnValues::Floats(v) => size_of_val(&v[..]),
+            ColumnValues::Texts(v) => v.bytes.len() + size_of_val(&v.ends[..]),
+            ColumnValues::Words(v) => v.words.bytes.len() + size_of_val(&v.numbers[..]),
+        };
+        ends.sum::<usize>() + valid + values
     });
     columns.sum()
-}
-
-fn memory_of(values: &ColumnValues) -> usize {
-    match values {
-        ColumnValues::Flag(v) => size_of_val(&v[..]),
-        ColumnValues::I8(v) => size_of_val(&v[..]),
-        ColumnValues::U8(v) => size_of_val(&v[..]),
-        ColumnValues::I16(v) => size_of_val(&v[..]),
-        ColumnValues::U16(v) => size_of_val(&v[..]),
-        ColumnValues::I32(v) => size_of_val(&v[..]),
-        ColumnValues::U32(v) => size_of_val(&v[..]),
-        ColumnValues::F32(v) => size_of_val(&v[..]),
-        ColumnValues::I64(v) => size_of_val(&v[..]),
-        ColumnValues::U64(v) => size_of_val(&v[..]),
-        ColumnValues::F64(v) => size_of_val(&v[..]),
-        ColumnValues::Texts(v) => v.bytes.len() + size_of_val(&v.ends[..]),
-        ColumnValues::Words(v) => v.words.bytes.len() + size_of_val(&v.numbers[..]),
-    }
 }
 
 /// Chooses the encoding of a column if a dictionary of its values, the default, is unsuitable.
 fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterPropertiesBuilder {
     let path = || ColumnPath::new(vec![column.name.to_string()]);
+    let is_long = matches!(column.kind, ColumnKind::I64 | ColumnKind::Time);
     match &column.values {
         // Times and counts differ little between rows and are rarely equal; they are delta-encoded, which all Parquet 2
         // readers support.
-        ColumnValues::I64(_) if column.lists.is_empty() => properties
+        ColumnValues::Wholes(_) if is_long && column.lists.is_empty() => properties
             .set_column_dictionary_enabled(path(), false)
             .set_column_encoding(path(), Encoding::DELTA_BINARY_PACKED),
         // Minimum and maximum words of time-sorted row groups never allow skipping one.
@@ -200,19 +190,21 @@ fn field(column: &TableColumn) -> ParquetResult<TypePtr> {
 }
 
 fn kind(kind: ColumnKind) -> (Physical, Option<LogicalType>) {
-    let integer = |bits, signed| Some(LogicalType::integer(bits, signed));
     match kind {
-        ColumnKind::Flag => (Physical::BOOLEAN, None),
-        ColumnKind::I8 => (Physical::INT32, integer(8, true)),
-        ColumnKind::U8 => (Physical::INT32, integer(8, false)),
-        ColumnKind::I16 => (Physical::INT32, integer(16, true)),
-        ColumnKind::U16 => (Physical::INT32, integer(16, false)),
-        ColumnKind::I32 => (Physical::INT32, None),
-        ColumnKind::U32 => (Physical::INT32, integer(32, false)),
+        ColumnKind::FLAG => (Physical::BOOLEAN, None),
         ColumnKind::I64 => (Physical::INT64, None),
-        ColumnKind::U64 => (Physical::INT64, integer(64, false)),
-        ColumnKind::F32 => (Physical::FLOAT, None),
+        ColumnKind::Whole { bits, is_signed } => {
+            let physical = if bits == 64 {
+                Physical::INT64
+            } else {
+                Physical::INT32
+            };
+            let is_plain = bits == 32 && is_signed;
+            let integer = LogicalType::integer(bits.cast_signed(), is_signed);
+            (physical, Some(integer).filter(|_| !is_plain))
+        }
         ColumnKind::F64 => (Physical::DOUBLE, None),
+        ColumnKind::Float { .. } => (Physical::FLOAT, None),
         ColumnKind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         ColumnKind::Bytes => (Physical::BYTE_ARRAY, None),
         ColumnKind::Time => {
@@ -229,17 +221,17 @@ fn column(
     rows: usize,
 ) -> ParquetResult<()> {
     match &column.values {
-        ColumnValues::Flag(v) => values::<BoolType>(to, column, rows, |at| v[at]),
-        ColumnValues::I8(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
-        ColumnValues::U8(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
-        ColumnValues::I16(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
-        ColumnValues::U16(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
-        ColumnValues::I32(v) => values::<Int32Type>(to, column, rows, |at| v[at]),
-        ColumnValues::U32(v) => values::<Int32Type>(to, column, rows, |at| v[at].cast_signed()),
-        ColumnValues::I64(v) => values::<Int64Type>(to, column, rows, |at| v[at]),
-        ColumnValues::U64(v) => values::<Int64Type>(to, column, rows, |at| v[at].cast_signed()),
-        ColumnValues::F32(v) => values::<FloatType>(to, column, rows, |at| v[at]),
-        ColumnValues::F64(v) => values::<DoubleType>(to, column, rows, |at| v[at]),
+        ColumnValues::Wholes(v) => match column.kind {
+            ColumnKind::FLAG => values::<BoolType>(to, column, rows, |at| v[at] != 0),
+            ColumnKind::Whole { bits: ..=32, .. } => {
+                values::<Int32Type>(to, column, rows, |at| low(v[at]))
+            }
+            _ => values::<Int64Type>(to, column, rows, |at| v[at]),
+        },
+        ColumnValues::Floats(v) if column.kind == ColumnKind::F64 => {
+            values::<DoubleType>(to, column, rows, |at| v[at])
+        }
+        ColumnValues::Floats(v) => values::<FloatType>(to, column, rows, |at| to_f32(v[at])),
         ColumnValues::Texts(v) => values::<ByteArrayType>(to, column, rows, texts(v)),
         ColumnValues::Words(v) => {
             let words: Vec<ByteArray> = (0..v.words.ends.len()).map(texts(&v.words)).collect();
@@ -247,6 +239,12 @@ fn column(
             values::<ByteArrayType>(to, column, rows, word)
         }
     }
+}
+
+/// The lower half of a number, which is all of it in a column of at most 32 bits.
+#[expect(clippy::cast_possible_truncation, reason = "the upper half is dropped")]
+fn low(number: i64) -> i32 {
+    number as i32
 }
 
 /// The texts by index, which share one copy of the bytes.

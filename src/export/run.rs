@@ -132,7 +132,8 @@ impl<'a> OutputJob<'a> {
     }
 
     fn is_too_large(&self, error: &Error) -> bool {
-        self.output.format.is_limited && kind(error) == Some(io::ErrorKind::FileTooLarge)
+        self.output.format.takes("max-bytes", false)
+            && kind(error) == Some(io::ErrorKind::FileTooLarge)
     }
 
     fn finish(mut self) -> Result<Option<Written>> {

@@ -15,7 +15,6 @@ use crate::base::table::{Batch, TableCell};
 use crate::export::sequence::Sequence;
 use crate::export::sink::OutputSink;
 use crate::export::target::{Target, is_special};
-#[cfg(feature = "arrow")]
 use crate::mission::Mission;
 use mission::{RowTaker, TABLES, Table};
 pub use writer::TableFormat;
@@ -73,9 +72,8 @@ pub(crate) fn start<'a>(
     }))
 }
 
-/// All complete tables of a mission by name.
-#[cfg(feature = "arrow")]
-pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
+/// Every table of a mission by name: `edges`, `topics`, `nodes`, `changes`, `events`, `phases`, `bags`.
+pub fn of_mission(mission: &Mission) -> Vec<(&'static str, Batch)> {
     let fill = |table: &Table| {
         let mut batch = (table.batch)();
         (table.fill)(mission, &mut |row: &[TableCell<'_>]| batch.push(row));

@@ -27,8 +27,6 @@ pub(crate) struct Subject<'a> {
     pub(crate) file: String,
     /// The path of the expectation from the root of its repository, which services compare with changed files.
     pub(crate) tracked: String,
-    /// Names and addresses of links in the report.
-    pub(crate) links: Vec<(String, String)>,
 }
 
 /// A format of a verdict.

@@ -51,7 +51,7 @@ pub struct Built {
 }
 
 /// Draws the conclusions and builds the graph of each window. Windows are sorted by start, none inside another; they
-/// may overlap. `grace` is that of `graphs`.
+/// may overlap.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -59,12 +59,11 @@ pub fn build(
     recorded: &Recorded,
     windows: &[Span],
     options: &conclude::ConcludeOptions,
-    grace: usize,
 ) -> Result<Built> {
     let mut findings = conclude(recorded, options)?;
     let traffic = traffic(recorded, &findings)?;
     let history = made(recorded, &mut findings, &traffic)?;
-    let windowed = graphs(recorded, &findings, &history, windows, grace)?;
+    let windowed = graphs(recorded, &findings, &history, windows)?;
     Ok(Built {
         lives: PerElement::new(&history.elements, |what| {
             let record = history.records.of(what);

@@ -31,10 +31,10 @@ fn connection(id: u32, topic: &str, publisher: Option<&str>, latching: bool) -> 
 }
 
 fn graphs(talks: &[Talk<'_>], period: i64) -> Built {
-    built(talks, period, &ConcludeOptions::default(), 0)
+    built(talks, period, &ConcludeOptions::default())
 }
 
-fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usize) -> Built {
+fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions) -> Built {
     let mut collector = Collector::new(crate::evidence::collector::CollectOptions::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
@@ -54,7 +54,7 @@ fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usiz
         })
         .take_while(|w| w.start < span.end)
         .collect();
-    build(&recorded, &windows, options, grace).unwrap()
+    build(&recorded, &windows, options).unwrap()
 }
 
 /// The state of one node in each window, `-` where it does not exist.
@@ -234,16 +234,6 @@ fn elements_are_in_the_order_of_their_names() {
 }
 
 #[test]
-fn grace_keeps_a_silent_node_for_some_windows() {
-    let talks: [Talk<'_>; 2] = [
-        ("/a", Some("/x"), false, &[5, 6, 7, 8, 9]),
-        ("/b", Some("/y"), false, &[0, 49]),
-    ];
-    let all = built(&talks, 10, &ConcludeOptions::default(), 2);
-    assert_eq!(states(&all, "/x"), ["active", "active", "active", "-", "-"]);
-}
-
-#[test]
 fn a_node_whose_rhythm_breaks_off_is_not_held_by_its_latched_message() {
     let all = graphs(
         &[
@@ -304,7 +294,7 @@ fn user_topology_is_added_without_overwriting() {
         ("/a", Some("/x"), false, &[0, 1, 2, 3, 4, 5]),
         ("/b", Some("/y"), false, &[0, 29]),
     ];
-    let all = built(&talks, 10, &options, 0);
+    let all = built(&talks, 10, &options);
     assert_eq!(states(&all, "/x"), ["active", "-", "-"]);
     assert_eq!(states(&all, "/z"), ["-", "active", "-"]);
     let words: Vec<_> = all.elements.subscribes[EdgeId(0)]
@@ -332,7 +322,7 @@ fn windows_may_overlap() {
             )
         })
         .collect();
-    let all = build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap();
+    let all = build(&recorded, &windows, &ConcludeOptions::default()).unwrap();
     assert_eq!(all.messages, [20, 20, 20, 10]);
 }
 
@@ -386,7 +376,7 @@ fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
     let windows: Vec<_> = (0..10)
         .map(|n| Span::new(Stamp(n * 10 * SECOND), Stamp((n + 1) * 10 * SECOND)))
         .collect();
-    build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap()
+    build(&recorded, &windows, &ConcludeOptions::default()).unwrap()
 }
 
 /// The windows in which a node exists.

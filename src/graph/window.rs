@@ -3,7 +3,7 @@
 use crate::base::budget;
 use crate::base::error::{Error, Result};
 use crate::base::time::{Moment, Period, Span, Stamp};
-use crate::base::words;
+use crate::base::words::{self, worded};
 
 const SECOND: i64 = 1_000_000_000;
 /// The periods for a bag shorter than five minutes, in nanoseconds, the longest first.
@@ -45,14 +45,16 @@ pub enum Length {
     Fixed(Period),
 }
 
-/// The alignment of windows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Align {
-    /// At the first message.
-    #[default]
-    Bag,
-    /// At whole periods of UTC.
-    Clock,
+worded! {
+    /// The alignment of windows.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Align {
+        /// At the first message.
+        #[default]
+        Bag = "bag",
+        /// At whole periods of UTC.
+        Clock = "clock",
+    }
 }
 
 /// The requested division of time.
@@ -72,13 +74,15 @@ pub struct Division {
     pub cut: Option<Cut>,
 }
 
-/// The points at which windows of unequal length begin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cut {
-    /// With each phase.
-    Phases,
-    /// With each reconfiguration; changes within seconds of each other are one.
-    Changes,
+worded! {
+    /// The points at which windows of unequal length begin.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Cut {
+        /// With each phase.
+        Phases = "phases",
+        /// With each reconfiguration; changes within seconds of each other are one.
+        Changes = "changes",
+    }
 }
 
 /// The windows of a mission: all as long as the period, a step apart, except those cut off by the mission's

@@ -11,27 +11,29 @@ pub(crate) use super::json::events::text as quoted;
 use crate::base::columns::hang;
 use crate::base::csv;
 use crate::base::time::Stamp;
-use crate::base::words::{self, visible};
+use crate::base::words::{self, visible, worded};
 use crate::graph::{ById, Element, NodeId};
 use crate::mission::Mission;
 use crate::mission::event_log::{
     Detail, Event, EventId, Interruption, InterruptionKind, Kind, Parts, Phase, Switch,
 };
 
-/// The format of a log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LogFormat {
-    /// A line per event, for people.
-    #[default]
-    Text,
-    /// A table with a head, times in nanoseconds since 1970.
-    Csv,
-    /// An object per line, as in the `events` of a mission.
-    Ndjson,
-    /// One object, schema `bagreel.events/2`, with these objects as a list.
-    Json,
-    /// A table for a pull request or a report.
-    Markdown,
+worded! {
+    /// The format of a log.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum LogFormat {
+        /// A line per event, for people.
+        #[default]
+        Text = "text",
+        /// A table with a head, times in nanoseconds since 1970.
+        Csv = "csv",
+        /// An object per line, as in the `events` of a mission.
+        Ndjson = "ndjson",
+        /// One object, schema `bagreel.events/2`, with these objects as a list.
+        Json = "json",
+        /// A table for a pull request or a report.
+        Markdown = "markdown",
+    }
 }
 
 /// Options for the events of a log.

@@ -383,7 +383,7 @@ fn show_timeline(
     let mut all = mission.notices.clone();
     all.extend(unmatched(&mission.elements, &drawing.view));
     if drawing.body == Body::Auto {
-        let text = "most publishers are unknown; drawing a topic timeline instead of a graph (draw what is known with `--view graph`)";
+        let text = "most publishers are unknown; drawing a topic timeline instead of a graph (draw what is known with `--mode all`)";
         all.add(Notice::new(NoticeKind::Note, text));
     }
     let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);

@@ -72,8 +72,6 @@ pub struct Check {
     pub bags: Vec<String>,
     /// The files to write.
     pub reports: Vec<Report>,
-    /// Names and URLs of links in Markdown.
-    pub links: Vec<(String, String)>,
     /// Whether facts that cannot be decided are errors.
     pub is_strict: bool,
     /// A file that reports are appended to instead of replacing it.
@@ -100,7 +98,6 @@ impl Check {
             reading,
             expect,
             reports: Vec::new(),
-            links: Vec::new(),
             is_strict: false,
             append_to: None,
         }
@@ -113,7 +110,6 @@ impl Check {
             bags: self.bags.clone(),
             file: plain(&self.expect),
             tracked: self.tracked.clone(),
-            links: self.links.clone(),
         };
         (format.write)(&subject, &done.verdict)
     }

@@ -1,6 +1,5 @@
 //! The medium of a picture, and a page with legible text for it.
 
-use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::words::worded;
 use crate::draw::picture::PageOptions;
@@ -28,16 +27,6 @@ const HIGHEST: f64 = 225.0;
 const DECORATIONS: f64 = 10.5;
 
 impl Purpose {
-    /// The purpose of this word.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word.
-    pub fn parse(word: &str) -> Result<Self> {
-        let what = || format!("unknown medium `{word}`");
-        Self::from_word(word)
-            .ok_or_else(|| Error::usage(what(), "choose one of readme, slide, column, page"))
-    }
-
     /// The width on paper in millimetres, if printed.
     fn width_mm(self) -> Option<f64> {
         match self {

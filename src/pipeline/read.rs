@@ -49,8 +49,6 @@ pub struct Reading {
     pub collect: collector::CollectOptions,
     /// Sources of facts besides the bags.
     pub conclude: conclude::ConcludeOptions,
-    /// The number of silent windows before an element counts as gone.
-    pub grace: usize,
     /// The source code to read; replaces `conclude.code`.
     #[cfg(feature = "source")]
     pub code: Option<SourceCode>,
@@ -72,7 +70,6 @@ impl Default for Reading {
             is_still_if_unchanged: false,
             collect: collector::CollectOptions::default(),
             conclude: conclude::ConcludeOptions::default(),
-            grace: 0,
             #[cfg(feature = "source")]
             code: None,
             rate_change: RATE_CHANGE,
@@ -279,16 +276,16 @@ fn mission(
     reading: &Reading,
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
-    let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
+    let graphs = |spans: &[Span]| graphs(recorded, findings, &history, spans);
     let log = log_of(&history, collected, reading)?;
     let mut windows = divided(reading, collected.range, &log)?;
     let period = windows.period;
-    let mut windowed = graphs(&windows.spans, reading.grace)?;
+    let mut windowed = graphs(&windows.spans)?;
     let mut list = list(&windows, &windowed, &history, &log);
     let is_still = reading.is_still_if_unchanged && is_still(&windows, &log);
     if is_still {
         windows.spans = vec![windows.span];
-        windowed = graphs(&windows.spans, reading.grace)?;
+        windowed = graphs(&windows.spans)?;
         list = self::list(&windows, &windowed, &history, &log);
     }
     let mut notices: Notices = recorded.notices.clone();

@@ -1,7 +1,5 @@
 //! Counts the messages of many bags, several at a time: a table per recording.
 
-#[cfg(feature = "arrow")]
-pub mod arrow;
 mod count;
 
 use std::collections::BTreeSet;
@@ -23,8 +21,7 @@ use crate::export::check::make_folder;
 use crate::export::sink::write_file;
 use crate::export::tables::{TableFormat, writer};
 use crate::export::target::{Target, resolved};
-pub use count::Counting;
-use count::count;
+pub use count::{Counted, Counting, count};
 
 /// The whole job of `bagreel tables`.
 #[derive(Clone, Debug, Default)]
@@ -40,10 +37,6 @@ pub struct Tables {
     pub counting: Counting,
     /// Whether to skip recordings whose table is newer, whatever options it was made with.
     pub skip_existing: bool,
-    /// Whether to stop at the first unreadable bag instead of reporting it.
-    pub stops_on_error: bool,
-    /// The number of recordings to count in parallel; by default one per processor.
-    pub jobs: Option<NonZeroUsize>,
 }
 
 impl Tables {
@@ -78,7 +71,7 @@ pub struct Tabled {
 /// Counts every recording and writes its table, whole or not at all.
 ///
 /// # Errors
-/// If nothing can be listed or written, and with [`Tables::stops_on_error`] for the first unreadable bag.
+/// If nothing can be listed or written.
 pub fn tables(job: &Tables, watch: &mut dyn Watch) -> Result<Tabled> {
     watch.stage(Stage::Count);
     let bags = listed(job)?;
@@ -86,7 +79,7 @@ pub fn tables(job: &Tables, watch: &mut dyn Watch) -> Result<Tabled> {
     let (next, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (to, from) = channel();
     thread::scope(|scope| {
-        for _ in 0..job.jobs.map_or(cores, NonZeroUsize::get).min(bags.len()) {
+        for _ in 0..cores.min(bags.len()) {
             let (bags, next, is_stopped, to) = (&bags, &next, &is_stopped, to.clone());
             scope.spawn(move || {
                 while !is_stopped.load(Ordering::Relaxed)
@@ -199,13 +192,12 @@ impl Listed {
         }
         let inputs = self.recording.inputs();
         match alone(&self.name, || count(&self.name, &inputs, &job.counting)) {
-            Err(error) if !job.stops_on_error => {
+            Err(error) => {
                 done.unreadable = 1;
                 done.notices
                     .add(Notice::new(NoticeKind::Damaged, error.to_string()));
             }
-            counted => {
-                let counted = counted?;
+            Ok(counted) => {
                 let target = Target::Path(self.file.clone());
                 make_folder(&target)?;
                 write_file(&target, &writer::whole(job.format, &counted.rows)?)?;

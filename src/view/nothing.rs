@@ -74,7 +74,7 @@ pub(crate) fn unmatched(elements: &Elements, options: &ViewOptions) -> Vec<Notic
             &topics,
         ),
         ("--collapse", "name", without(&options.collapse), &both),
-        ("--expand", "name", without(&options.expand), &both),
+        ("--collapse -", "name", without(&options.expand), &both),
     ];
     let unused = options.iter().flat_map(|(flag, what, unused, names)| {
         let each = unused.iter();
@@ -95,7 +95,8 @@ fn unused_text(flag: &str, text: &str, what: &str, names: &[&str]) -> Notice {
     let meant = meant(&[text.trim_start_matches('-')], names);
     // A filter's syntax is not accepted for namespaces.
     let meant = meant.split(": ").next().unwrap_or_default();
-    let text = format!("`{flag} {text}` matches no {what}; {meant}");
+    let space = if flag.ends_with('-') { "" } else { " " };
+    let text = format!("`{flag}{space}{text}` matches no {what}; {meant}");
     Notice::new(NoticeKind::Note, text)
 }
 

@@ -24,14 +24,6 @@ impl Mode {
     pub(crate) fn is_direct(self) -> bool {
         self == Self::Nodes
     }
-
-    /// The mode of this word.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word.
-    pub fn parse(word: &str) -> Result<Self> {
-        Self::from_word(word).ok_or_else(|| unknown("mode", word, "nodes, all"))
-    }
 }
 
 /// The elements to leave out. The default is `quiet` alone.
@@ -274,7 +266,6 @@ mod tests {
             Hide::parse("dead,dad").unwrap_err(),
             Grouping::parse("action").unwrap_err(),
             Grouping::parse("namespaces=two").unwrap_err(),
-            Mode::parse("some").unwrap_err(),
         ] {
             assert!(error.is_usage() && !error.hint().is_empty());
         }

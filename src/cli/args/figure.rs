@@ -4,11 +4,11 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 
-use super::values::{points, width};
+use super::values::{one_of, phases, points, width};
 use super::{GraphArgs, Inputs, RangeArgs, RateArgs};
-use crate::draw::figure::FigureKind;
+use crate::draw::figure::{FigureKind, RowKind};
+use crate::pipeline::Phases;
 
 #[derive(Debug, Args)]
 pub(crate) struct FigureArgs {
@@ -19,8 +19,8 @@ pub(crate) struct FigureArgs {
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
     /// Lifelines, a map of who publishes to whom, or the reconfigurations one by one.
-    #[arg(long, default_value = "lives", value_parser = kinds())]
-    pub(crate) kind: String,
+    #[arg(long, default_value = "lives", value_parser = one_of(FigureKind::ALL))]
+    pub(crate) kind: FigureKind,
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]
     #[arg(long, value_name = "MM", value_parser = width)]
     pub(crate) width: Option<f64>,
@@ -52,8 +52,8 @@ pub(crate) struct FigureArgs {
 #[derive(Debug, Default, Args)]
 pub(crate) struct FigureForm {
     /// What a row or box represents. [default: the finest that fits]
-    #[arg(long, value_name = "nodes|groups|topics", value_parser = ["nodes", "groups", "topics"])]
-    pub(crate) rows: Option<String>,
+    #[arg(long, value_name = "nodes|groups|topics", value_parser = one_of(RowKind::ALL))]
+    pub(crate) rows: Option<RowKind>,
     /// Phases whose beginnings `steps` shows, such as `3,5`. [default: the six with most changes]
     #[arg(long, value_name = "N,M,…", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(2..))]
     pub(crate) steps: Vec<u16>,
@@ -65,11 +65,6 @@ pub(crate) struct FigureForm {
 #[derive(Debug, Args)]
 pub(crate) struct PhaseArgs {
     /// Phases of the mission: detected (`auto`), `none`, or a file of lines such as `0:38 navigation` or names alone.
-    #[arg(long, value_name = "FILE|auto|none", default_value = "auto")]
-    pub(crate) phases: String,
-}
-
-/// The kinds of figures.
-pub(super) fn kinds() -> PossibleValuesParser {
-    PossibleValuesParser::new(FigureKind::ALL.map(FigureKind::word))
+    #[arg(long, value_name = "FILE|auto|none", default_value = "auto", value_parser = phases)]
+    pub(crate) phases: Phases,
 }

@@ -3,11 +3,12 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::values::{length, period};
+use super::values::{length, one_of, period};
 use crate::base::time::Period;
 use crate::graph::window::Length;
+use crate::mission::events::LogFormat;
 
 #[derive(Debug, Args)]
 pub(crate) struct FollowArgs {
@@ -15,9 +16,9 @@ pub(crate) struct FollowArgs {
     /// is followed.
     #[arg(value_name = "WHAT")]
     pub(crate) what: PathBuf,
-    /// Output format.
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) format: FollowFormat,
+    /// Output format: a line per event for people, or an object per line for programs.
+    #[arg(long, value_name = "text|ndjson", default_value = "text", value_parser = one_of([LogFormat::Text, LogFormat::Ndjson]))]
+    pub(crate) format: LogFormat,
     /// Check the recording against this expectations file: print findings when they are certain, and exit
     /// as `check` does.
     #[arg(long, value_name = "FILE")]
@@ -31,19 +32,6 @@ pub(crate) struct FollowArgs {
     /// Stop when nothing was written for this long. [default: when the recorder closes the recording, or at a signal]
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub(crate) idle: Option<Period>,
-    /// Keep this much of the recording in memory for events and findings; outputs cover all of it.
-    #[arg(long, value_name = "TIME", default_value = "1h", value_parser = period)]
-    pub(crate) keep: Period,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "lower")]
-pub(crate) enum FollowFormat {
-    /// A line per event, for people.
-    #[default]
-    Text,
-    /// An object per event and line, for programs.
-    Ndjson,
 }
 
 pub(crate) const FOLLOW_HELP: &str = "Nothing is written to the recording, and a database is never locked. A line is marked `(so far)` until it is certain.\n\n\

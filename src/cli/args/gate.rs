@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::values::{length, share, size};
+use super::values::{length, share};
 use super::{GraphArgs, RangeArgs};
 use crate::gate;
 use crate::graph::diff::RATE_CHANGE;
@@ -25,29 +25,11 @@ pub(crate) struct DiffArgs {
     /// Also write this file: `.txt`, `.json`, `.md`, or a picture of both in any format of `render`. Repeatable.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Built-in style or style file of pictures; see `bagreel styles`.
-    #[arg(long, default_value = "light", value_name = "NAME|FILE")]
-    pub(crate) style: String,
-    /// Size of pictures in pixels.
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub(crate) size: Option<(u32, u32)>,
     /// Report rates that differ by more than this fraction, if statistically significant.
     #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(crate) rate_change: f64,
     #[command(flatten)]
     pub(crate) range: RangeArgs,
-    #[command(flatten)]
-    pub(crate) graph: GraphArgs,
-}
-
-impl DiffArgs {
-    /// The part of the missions that is compared.
-    pub(crate) fn time(&self) -> GateTime {
-        GateTime {
-            period: None,
-            range: self.range,
-        }
-    }
 }
 
 #[derive(Debug, Args)]
@@ -70,10 +52,14 @@ pub(crate) struct BaselineArgs {
     /// Update only these nodes and topics.
     #[arg(long, value_name = "NAME", requires = "update")]
     pub(crate) only: Vec<String>,
+    /// Length of the windows in which rates are measured: `60`, `30s`, `500ms`. [default: the file's `period`]
+    #[arg(long, short, value_parser = length)]
+    pub(crate) period: Option<Length>,
     #[command(flatten)]
-    pub(crate) time: GateTime,
-    #[command(flatten)]
-    pub(crate) graph: GraphArgs,
+    pub(crate) range: RangeArgs,
+    /// Add nodes and edges from a CSV, YAML, MCAP (`/rosgraph`) or launch file, or from DOT saved by rqt_graph.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) topology: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -90,20 +76,16 @@ pub(crate) struct CheckArgs {
     /// Also write this file, in the format of its extension or prefix: `check.xml`, `gitlab:quality.json`. Repeatable.
     #[arg(long = "output", short, value_name = "[WORD:]FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Link to add to Markdown reports, such as `player=URL`.
-    #[arg(long, value_name = "NAME=URL", value_parser = link)]
-    pub(crate) link: Vec<(String, String)>,
     /// How to treat rules that cannot be evaluated.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) undecidable: Undecidable,
     /// Explain a kind of finding, such as `topic-rate-low`, and exit.
     #[arg(long, value_name = "ID", conflicts_with_all = [
-        "bags", "expect", "format", "outputs", "link", "undecidable", "period", "start", "end", "topology", "source",
-        "infer",
+        "bags", "expect", "format", "outputs", "undecidable", "start", "end", "topology", "source", "infer",
     ])]
     pub(crate) explain: Option<String>,
     #[command(flatten)]
-    pub(crate) time: GateTime,
+    pub(crate) range: RangeArgs,
     #[command(flatten)]
     pub(crate) graph: GraphArgs,
 }
@@ -117,16 +99,6 @@ pub(crate) enum Undecidable {
     Allow,
     /// They fail the check.
     Error,
-}
-
-/// The part of a mission that is checked, and its windows.
-#[derive(Debug, Default, Args)]
-pub(crate) struct GateTime {
-    /// Length of the windows in which rates are checked: `60`, `30s`, `500ms`. [default: the file's `period`]
-    #[arg(long, short, value_parser = length)]
-    pub(crate) period: Option<Length>,
-    #[command(flatten)]
-    pub(crate) range: RangeArgs,
 }
 
 pub(crate) const DIFF_HELP: &str = "Exit codes: 0 equal, 1 different, 2 not compared (usage error, unreadable bag), 3 equal but data was skipped \
@@ -145,14 +117,6 @@ fn check_format(word: &str) -> Result<&'static gate::CheckFormat, String> {
 
 fn diff_format(word: &str) -> Result<&'static gate::DiffFormat, String> {
     gate::DiffFormat::from_word(word).ok_or_else(|| "write one of text, json, markdown".to_owned())
-}
-
-fn link(text: &str) -> Result<(String, String), String> {
-    let (name, url) = text.split_once('=').ok_or("write `player=URL`")?;
-    if name.is_empty() || url.is_empty() {
-        return Err("write `player=URL`".to_owned());
-    }
-    Ok((name.to_owned(), url.to_owned()))
 }
 
 /// The formats, for the end of `check --help`.

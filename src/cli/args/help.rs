@@ -7,25 +7,25 @@ use super::Typed;
 
 /// The headings of `--help`, in their order, and the options under each, in every command.
 const HEADINGS: [(&str, &str); 7] = [
-    ("Input", "ns verify msg_path on_error expect only update"),
+    ("Input", "ns verify msg_path expect only update"),
     (
         "Time",
-        "offset period step start end align cut rate_change grace phases idle keep",
+        "offset period step start end align cut rate_change phases idle",
     ),
     (
         "Filter",
-        "mode ns_filter topic_filter hide group collapse expand rqt_defaults all",
+        "mode ns_filter topic_filter hide group collapse rqt_defaults all",
     ),
     (
         "Picture",
-        "view kind style size for width fit orientation layout layout_from title rows steps text bare font",
+        "kind style size for width fit orientation layout layout_from title rows steps text bare font",
     ),
     (
         "Output",
         "outputs output format frame_ms strip max_bytes link fields parts undecidable explain",
     ),
     ("Evidence", "topology source infer why"),
-    ("Performance", "skip_existing jobs"),
+    ("Performance", "skip_existing"),
 ];
 
 /// What `-h` shows of each command: its most important options, and three examples.
@@ -64,7 +64,7 @@ const SCREENS: [(&str, &str, &str); 13] = [
     ),
     (
         "tables",
-        "output format period align skip_existing on_error jobs",
+        "output format period skip_existing",
         "
   bagreel tables bags/ -o counts/                     all bags of a folder
   bagreel tables bags/ -o counts/ --skip-existing     again, for new bags only
@@ -80,7 +80,7 @@ const SCREENS: [(&str, &str, &str); 13] = [
     ),
     (
         "diff",
-        "format outputs size rate_change start end",
+        "format outputs rate_change start end",
         "
   bagreel diff good.bag run.bag                       what differs, as text
   bagreel diff good.bag run.bag --format markdown     for a pull request
@@ -96,7 +96,7 @@ const SCREENS: [(&str, &str, &str); 13] = [
     ),
     (
         "check",
-        "expect format outputs undecidable explain period start end",
+        "expect format outputs undecidable explain start end",
         "
   bagreel check run.bag --expect expect.yaml          print findings; the exit code is 1 if a rule is broken
   bagreel check run.bag --expect expect.yaml -o check.xml   also write a JUnit report

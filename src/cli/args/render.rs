@@ -3,17 +3,23 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use clap::{ArgAction, Args};
 
 use super::figure::PhaseArgs;
-use super::values::{bytes, size, width};
-use super::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
+use super::values::{bytes, link, one_of, size, width};
+use super::{GraphArgs, Inputs, RateArgs, TimeArgs, VerifyArgs};
+use crate::base::words::worded;
 use crate::export::FORMATS;
+use crate::layout::Orientation;
+use crate::pipeline::Purpose;
 
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) inputs: Inputs,
+    #[command(flatten)]
+    pub(crate) again: VerifyArgs,
     #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT))]
     pub(crate) outputs: Vec<OsString>,
     /// Format of outputs without a known extension, such as `-`.
@@ -21,8 +27,6 @@ pub(crate) struct RenderArgs {
     pub(crate) format: Option<String>,
     #[command(flatten)]
     pub(crate) time: TimeArgs,
-    #[command(flatten)]
-    pub(crate) range: RangeArgs,
     #[command(flatten)]
     pub(crate) rate: RateArgs,
     #[command(flatten)]
@@ -39,12 +43,10 @@ pub(crate) struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// Draw the graph, or a timeline of topics. [default: graph; board if most publishers are unknown]
-    #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"])]
-    pub(crate) view: Option<String>,
-    /// Draw nodes only, with one line per pair and the topics on it, or nodes and topics.
-    #[arg(long, value_name = "nodes|all", value_parser = ["nodes", "all"])]
-    pub(crate) mode: Option<String>,
+    /// Draw nodes only, with one line per pair and the topics on it, nodes and topics, or a timeline of topics.
+    /// [default: all; topics if most publishers are unknown]
+    #[arg(long, value_name = "nodes|all|topics", value_parser = one_of(ModeWord::ALL))]
+    pub(crate) mode: Option<ModeWord>,
     /// Nodes to draw, as `rqt_graph` filters: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(crate) ns_filter: Option<String>,
@@ -57,15 +59,30 @@ pub(crate) struct ViewArgs {
     /// Kinds to draw as one box: actions, tf, images, namespaces=N, or none. [default: all of them]
     #[arg(long, value_name = "KIND,…")]
     pub(crate) group: Option<String>,
-    /// Draw each of these namespaces as one box.
-    #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
+    /// Draw each of these namespaces as one box; one after `-` never is: `/robot2,-/robot1`.
+    #[arg(
+        long,
+        value_name = "[-]NAMESPACE,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     pub(crate) collapse: Vec<String>,
-    /// Never collapse these namespaces.
-    #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
-    pub(crate) expand: Vec<String>,
     /// Draw what `rqt_graph` shows by default.
     #[arg(long)]
     pub(crate) rqt_defaults: bool,
+}
+
+worded! {
+    /// What a picture shows.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) enum ModeWord {
+        /// Nodes.
+        Nodes = "nodes",
+        /// Nodes and topics.
+        All = "all",
+        /// Topics, over time.
+        Topics = "topics",
+    }
 }
 
 #[derive(Debug, Args)]
@@ -77,18 +94,19 @@ pub(crate) struct LookArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<(u32, u32)>,
     /// Choose page and text size for a README (830 px), a slide (1280×720), or a paper's column (88 mm) or page (181 mm).
-    #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
+    #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = one_of(Purpose::ALL),
         conflicts_with_all = ["size", "width", "strip", "layout_from"])]
-    pub(crate) purpose: Option<String>,
+    pub(crate) purpose: Option<Purpose>,
     /// Printed width of a PDF or SVG: `88mm`, `180mm`.
     #[arg(long, value_name = "MM", value_parser = width)]
     pub(crate) width: Option<f64>,
     /// Enlarge the page and collapse namespaces until labels are legible.
-    #[arg(long, value_name = "auto|none", default_value = "auto", value_parser = ["auto", "none"])]
-    pub(crate) fit: String,
-    /// Direction of edges.
-    #[arg(long, value_name = "LR|TB|auto", default_value = "auto", value_parser = ["LR", "TB", "auto"])]
-    pub(crate) orientation: String,
+    #[arg(long, value_name = "auto|none", default_value = "auto", action = ArgAction::Set,
+        value_parser = PossibleValuesParser::new(["auto", "none"]).map(|word| word == "auto"))]
+    pub(crate) fit: bool,
+    /// Direction of edges. [default: the better one]
+    #[arg(long, value_name = "LR|TB", value_parser = one_of(Orientation::ALL))]
+    pub(crate) orientation: Option<Orientation>,
     /// Layout engine: layered or layout-rs.
     #[arg(long, value_name = "ENGINE", default_value = "layered")]
     pub(crate) layout: String,
@@ -118,8 +136,8 @@ pub(crate) struct SequenceArgs {
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub(crate) max_bytes: Option<u64>,
     /// Link to add to the report, such as `player=URL`.
-    #[arg(long, value_name = "NAME=URL")]
-    pub(crate) link: Vec<String>,
+    #[arg(long, value_name = "NAME=URL", value_parser = link)]
+    pub(crate) link: Vec<(String, String)>,
 }
 
 const OUTPUT: &str = "Output file; the extension selects the format, `{n}` writes one file per window, `-` is standard \

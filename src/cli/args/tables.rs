@@ -1,13 +1,12 @@
 //! The arguments of `bagreel tables`.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::values::{align, period};
+use super::values::{one_of, period};
 use crate::base::time::Period;
-use crate::graph::window::Align;
+use crate::export::tables::TableFormat;
 
 #[derive(Debug, Args)]
 pub(crate) struct TablesArgs {
@@ -18,23 +17,14 @@ pub(crate) struct TablesArgs {
     #[arg(long, short, value_name = "FOLDER")]
     pub(crate) output: PathBuf,
     /// Output format.
-    #[arg(long, value_name = "csv|parquet", default_value = "csv")]
-    pub(crate) format: String,
-    /// Length of a window.
+    #[arg(long, value_name = "csv|parquet", default_value = "csv", value_parser = one_of(TableFormat::ALL))]
+    pub(crate) format: TableFormat,
+    /// Length of a window; windows begin at whole periods of UTC.
     #[arg(long, short, value_parser = period, default_value = "10s")]
     pub(crate) period: Period,
-    /// Align windows with whole periods of UTC (`clock`) or with each bag's first message (`bag`).
-    #[arg(long, value_parser = align, value_name = "clock|bag", default_value = "clock")]
-    pub(crate) align: Align,
     /// Skip bags that are older than their table, whatever options it was made with.
     #[arg(long)]
     pub(crate) skip_existing: bool,
-    /// Report an unreadable bag and go on (`skip`), or stop (`fail`).
-    #[arg(long, value_parser = ["skip", "fail"], value_name = "skip|fail", default_value = "skip")]
-    pub(crate) on_error: String,
-    /// Number of bags to count in parallel. [default: one per processor]
-    #[arg(long, value_name = "N")]
-    pub(crate) jobs: Option<NonZeroUsize>,
 }
 
 pub(crate) const HELP: &str = "\

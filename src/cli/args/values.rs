@@ -2,8 +2,24 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
 use crate::base::time::{Moment, Period, parse_nanos};
-use crate::graph::window::{Align, Cut, Length};
+use crate::base::words::Worded;
+use crate::graph::window::Length;
+use crate::pipeline::Phases;
+
+/// The parser of the words of these values.
+pub(super) fn one_of<T, const N: usize>(all: [T; N]) -> impl TypedValueParser<Value = T>
+where
+    T: Worded + Send + Sync + 'static,
+{
+    let words = PossibleValuesParser::new(all.each_ref().map(Worded::word));
+    words.try_map(move |word| {
+        let found = all.iter().find(|one| one.word() == word);
+        found.copied().ok_or("it is not listed")
+    })
+}
 
 pub(super) fn length(text: &str) -> Result<Length, String> {
     if text == "all" {
@@ -48,19 +64,31 @@ pub(super) fn namespace(text: &str) -> Result<(PathBuf, String), String> {
     parsed.ok_or_else(|| "write a bag and a namespace, such as `robot2.bag=/robot2`".to_owned())
 }
 
-pub(super) fn align(text: &str) -> Result<Align, String> {
-    match text {
-        "bag" => Ok(Align::Bag),
-        "clock" => Ok(Align::Clock),
-        _ => Err("write `bag` or `clock`".to_owned()),
-    }
+/// The source of phases; any word but two is a file.
+#[expect(clippy::unnecessary_wraps, reason = "the form that clap requires")]
+pub(super) fn phases(text: &str) -> Result<Phases, String> {
+    Ok(match text {
+        "auto" => Phases::Found,
+        "none" => Phases::None,
+        file => Phases::File(file.into()),
+    })
 }
 
-pub(super) fn cut(text: &str) -> Result<Cut, String> {
-    match text {
-        "phases" => Ok(Cut::Phases),
-        "changes" => Ok(Cut::Changes),
-        _ => Err("write `phases` or `changes`".to_owned()),
+/// A name and an address. Readers trust the links in a report: no scheme that executes code.
+pub(super) fn link(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=');
+    let parts = parts.filter(|(name, url)| !name.is_empty() && !url.is_empty());
+    let is_safe = |url: &str| {
+        let scheme = url.split_once(':').map(|(scheme, _)| scheme);
+        let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.');
+        let mut scheme = scheme.into_iter().filter(|s| s.chars().all(is_part));
+        scheme.all(|s| ["http", "https"].contains(&&*s.to_ascii_lowercase()))
+    };
+    let (name, url) = parts.ok_or("write `player=https://…`, or a path")?;
+    if is_safe(url) {
+        Ok((name.to_owned(), url.to_owned()))
+    } else {
+        Err("write an address on the web, or a path".to_owned())
     }
 }
 

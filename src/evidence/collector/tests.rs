@@ -415,7 +415,7 @@ fn a_node_that_forwards_stamps_subscribes_to_their_source() {
     let recorded = flow().finish().unwrap();
     let span = recorded.span.unwrap();
     let options = crate::evidence::conclude::ConcludeOptions::default();
-    let built = crate::graph::build(&recorded, &[span], &options, 0).unwrap();
+    let built = crate::graph::build(&recorded, &[span], &options).unwrap();
     let all = &built.elements;
     let inferred = all
         .subscribes

@@ -30,8 +30,8 @@ const MOST_COLUMNS: usize = 2000;
 /// The type of a field that is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Primitive {
-    /// A number or a Boolean, and its size in bytes.
-    Number(ColumnKind, usize),
+    /// A number or a Boolean.
+    Number(ColumnKind),
     Text,
 }
 
@@ -275,20 +275,21 @@ impl DecodePlan<'_> {
         levels: usize,
         depth: usize,
     ) -> Result<(Vec<DecodeStep>, usize), String> {
-        let number = |kind, size| Ok((Primitive::Number(kind, size), size));
+        let number = |kind: ColumnKind| Ok((Primitive::Number(kind), kind.size()));
+        let whole = |bits, is_signed| number(ColumnKind::whole(bits, is_signed));
         let primitive = match kind {
-            "bool" => number(ColumnKind::Flag, 1),
-            "int8" => number(ColumnKind::I8, 1),
+            "bool" => number(ColumnKind::FLAG),
+            "int8" => whole(8, true),
             // In ROS 1 `byte` is signed by definition; in ROS 2, and in practice everywhere, it is unsigned.
-            "uint8" | "char" | "byte" | "octet" => number(ColumnKind::U8, 1),
-            "int16" => number(ColumnKind::I16, 2),
-            "uint16" => number(ColumnKind::U16, 2),
-            "int32" => number(ColumnKind::I32, 4),
-            "uint32" => number(ColumnKind::U32, 4),
-            "int64" => number(ColumnKind::I64, 8),
-            "uint64" => number(ColumnKind::U64, 8),
-            "float32" => number(ColumnKind::F32, 4),
-            "float64" => number(ColumnKind::F64, 8),
+            "uint8" | "char" | "byte" | "octet" => whole(8, false),
+            "int16" => whole(16, true),
+            "uint16" => whole(16, false),
+            "int32" => whole(32, true),
+            "uint32" => whole(32, false),
+            "int64" => whole(64, true),
+            "uint64" => whole(64, false),
+            "float32" => number(ColumnKind::Float { bits: 32 }),
+            "float64" => number(ColumnKind::F64),
             "string" => Ok((Primitive::Text, 4)),
             "wstring" => Err("wide strings are not decoded".to_owned()),
             "time" if !self.is_cdr => return Ok(self.time(name, levels)),
@@ -311,7 +312,7 @@ impl DecodePlan<'_> {
         let (primitive, least) = primitive?;
         let column = self.columns.len();
         let kind = match primitive {
-            Primitive::Number(kind, _) => kind,
+            Primitive::Number(kind) => kind,
             Primitive::Text => ColumnKind::Text,
         };
         self.columns.push((name.to_owned(), kind, levels));
@@ -336,8 +337,8 @@ fn run(
 ) -> Result<(), Malformed> {
     for step in steps {
         match step {
-            DecodeStep::One(column, Primitive::Number(_, size)) => {
-                numbers(payload, 1, *size, &mut columns[*column].values)?;
+            DecodeStep::One(column, Primitive::Number(kind)) => {
+                numbers(payload, 1, *kind, &mut columns[*column].values)?;
             }
             DecodeStep::One(column, Primitive::Text) => {
                 text(payload, &mut columns[*column].values)?;
@@ -358,7 +359,7 @@ fn run(
                     i64::from(sec)
                 };
                 let nanosec = i64::from(payload.u32()?);
-                if let ColumnValues::I64(to) = &mut columns[*column].values {
+                if let ColumnValues::Wholes(to) = &mut columns[*column].values {
                     to.push(sec * 1_000_000_000 + nanosec);
                 }
             }
@@ -408,8 +409,8 @@ fn list(
     columns: &mut [TableColumn],
 ) -> Result<(), Malformed> {
     match element {
-        [DecodeStep::One(column, Primitive::Number(_, size))] => {
-            numbers(payload, count, *size, &mut columns[*column].values)
+        [DecodeStep::One(column, Primitive::Number(kind))] => {
+            numbers(payload, count, *kind, &mut columns[*column].values)
         }
         _ => (0..count).try_for_each(|_| run(element, payload, columns)),
     }
@@ -426,38 +427,36 @@ fn text(payload: &mut PayloadCursor<'_>, to: &mut ColumnValues) -> Result<(), Ma
     Ok(())
 }
 
-/// Adds `count` numbers of `size` bytes each.
+/// Adds `count` numbers of a kind.
 fn numbers(
     payload: &mut PayloadCursor<'_>,
     count: usize,
-    size: usize,
+    kind: ColumnKind,
     to: &mut ColumnValues,
 ) -> Result<(), Malformed> {
     let is_big = payload.is_big_endian();
+    let size = kind.size();
     let data = payload.numbers(count, size)?;
-    macro_rules! add {
-        ($to:expr, $number:ty) => {{
-            let (all, _) = data.as_chunks::<{ size_of::<$number>() }>();
-            if is_big {
-                $to.extend(all.iter().map(|b| <$number>::from_be_bytes(*b)));
-            } else {
-                $to.extend(all.iter().map(|b| <$number>::from_le_bytes(*b)));
-            }
-        }};
-    }
-    match to {
-        ColumnValues::Flag(to) => to.extend(data.iter().map(|b| *b != 0)),
-        ColumnValues::U8(to) => to.extend_from_slice(data),
-        ColumnValues::I8(to) => add!(to, i8),
-        ColumnValues::I16(to) => add!(to, i16),
-        ColumnValues::U16(to) => add!(to, u16),
-        ColumnValues::I32(to) => add!(to, i32),
-        ColumnValues::U32(to) => add!(to, u32),
-        ColumnValues::I64(to) => add!(to, i64),
-        ColumnValues::U64(to) => add!(to, u64),
-        ColumnValues::F32(to) => add!(to, f32),
-        ColumnValues::F64(to) => add!(to, f64),
-        ColumnValues::Texts(_) | ColumnValues::Words(_) => {}
+    let each = data.chunks_exact(size.max(1)).map(|bytes| {
+        let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+        match is_big {
+            true => bytes.iter().fold(0, add),
+            false => bytes.iter().rev().fold(0, add),
+        }
+    });
+    match (to, kind) {
+        (ColumnValues::Wholes(to), ColumnKind::FLAG) => to.extend(each.map(|n| i64::from(n != 0))),
+        (ColumnValues::Wholes(to), ColumnKind::Whole { bits, is_signed }) => {
+            // The sign is that of the highest bit of the number.
+            let unused = if is_signed { 64 - bits } else { 0 };
+            to.extend(each.map(|n| (n << unused).cast_signed() >> unused));
+        }
+        (ColumnValues::Floats(to), ColumnKind::F64) => to.extend(each.map(f64::from_bits)),
+        (ColumnValues::Floats(to), _) => {
+            let single = |n: u64| u32::try_from(n).map_or(f32::NAN, f32::from_bits);
+            to.extend(each.map(|n| f64::from(single(n))));
+        }
+        _ => {}
     }
     Ok(())
 }

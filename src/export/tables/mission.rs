@@ -70,7 +70,7 @@ pub(super) const TABLES: &[Table] = &[
 fn put<R>(mission: &Mission, columns: &[Column<R>], one: &R, row: RowTaker<'_>) {
     let cells: Vec<_> = columns
         .iter()
-        .map(|(.., cell)| cell(mission, one))
+        .map(|column| (column.cell)(mission, one))
         .collect();
     row(&cells);
 }
@@ -93,7 +93,7 @@ const NODES: &[Column<Seen>] = of_elements! {
 
 macro_rules! element_columns {
     ($($column:ident $name:literal $kind:ident $cell:expr;)*) => {
-        $(const $column: Column<Seen> = ($name, ColumnKind::$kind, $cell);)*
+        $(const $column: Column<Seen> = ColumnOf { name: $name, kind: ColumnKind::$kind, cell: $cell };)*
     };
 }
 
@@ -215,7 +215,7 @@ const EVENTS: &[Column<EventId>] = columns! {
     "degree" Text |all, id| TableCell::text(event(all, *id).confidence.word());
     "evidence" Text |all, id| words(event(all, *id).evidence.words());
     "part_of" I64 |all, id| count(event(all, *id).part_of.map(|id| id.0.into()));
-    "is_quiet" Flag |all, id| TableCell::Flag(event(all, *id).quiet);
+    "is_quiet" FLAG |all, id| TableCell::Flag(event(all, *id).quiet);
     "weight" I64 |all, id| TableCell::count(event(all, *id).weight);
 };
 
@@ -236,7 +236,7 @@ const BAGS: &[Column<usize>] = columns! {
     "compression" Text |all, at| TableCell::text(all.bags[*at].compression.join(" "));
     "tier" Text |all, at| TableCell::text(all.bags[*at].tier.word());
     "tier_reason" Text |all, at| text(all.bags[*at].tier_reason.as_deref());
-    "is_complete" Flag |all, at| TableCell::Flag(all.bags[*at].complete);
+    "is_complete" FLAG |all, at| TableCell::Flag(all.bags[*at].complete);
     "file_bytes" I64 |all, at| TableCell::count(all.bags[*at].file_bytes);
 };
 

@@ -6,43 +6,23 @@ use std::path::Path;
 use crate::base::csv;
 use crate::base::error::{Error, Result};
 use crate::base::table::Batch;
+use crate::base::words::worded;
 #[cfg(feature = "parquet")]
 use crate::export::parquet;
 
-/// The format of a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum TableFormat {
-    /// Comma-separated values, stamps as nanoseconds since 1970.
-    #[default]
-    Csv,
-    /// Apache Parquet, stamps as timestamps; written with the feature `parquet`.
-    Parquet,
+worded! {
+    /// The format of a table; its word is also its file extension.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum TableFormat {
+        /// Comma-separated values, stamps as nanoseconds since 1970.
+        #[default]
+        Csv = "csv",
+        /// Apache Parquet, stamps as timestamps; written with the feature `parquet`.
+        Parquet = "parquet",
+    }
 }
 
 impl TableFormat {
-    /// Its name on the command line and its file extension.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Parquet => "parquet",
-        }
-    }
-
-    /// The format of this word.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for another word, and for a format that this build does not write.
-    pub fn parse(word: &str) -> Result<Self> {
-        match word {
-            "csv" => Ok(Self::Csv),
-            "parquet" => Self::Parquet.built(),
-            _ => Err(Error::usage(
-                format!("`{word}` is not a format of tables"),
-                "formats: csv, parquet",
-            )),
-        }
-    }
-
     /// The format, if this build writes it.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use super::{Subject, grouped, mermaid};
 use crate::base::words;
-use crate::export::report::escape::{address, code, plain};
+use crate::export::report::escape::{code, plain};
 use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
@@ -35,7 +35,6 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     groups.sort_by_key(|(_, group)| (group.first().map(|f| f.severity), Reverse(group.len())));
     causes(&groups, &mut out);
     table(&facts, &groups, &mut out);
-    links(subject, &mut out);
     if let Some(chart) = mermaid::chart(&facts, &broken) {
         let open = "<details><summary>Graph around the changes</summary>";
         let _ = writeln!(out, "{open}\n\n```mermaid\n{chart}```\n</details>\n");
@@ -178,19 +177,6 @@ fn value(text: &str) -> String {
         code(text)
     } else {
         plain(text)
-    }
-}
-
-fn links(subject: &Subject<'_>, out: &mut String) {
-    let links = subject.links.iter();
-    let links: Vec<String> = links
-        .map(|(name, url)| {
-            let sign = if name == "player" { "▶ " } else { "" };
-            format!("[{sign}{}](<{}>)", plain(name), address(url))
-        })
-        .collect();
-    if !links.is_empty() {
-        let _ = writeln!(out, "{}\n", links.join(" · "));
     }
 }
 

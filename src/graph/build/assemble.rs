@@ -27,8 +27,7 @@ pub(crate) struct Windowed {
     pub messages: Vec<u64>,
 }
 
-/// Builds the graph of each window. Windows are sorted by start, none inside another; they may overlap. An element
-/// without any later sign counts as gone after `grace` windows of silence.
+/// Builds the graph of each window. Windows are sorted by start, none inside another; they may overlap.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -37,7 +36,6 @@ pub(crate) fn graphs(
     findings: &Findings,
     history: &History,
     windows: &[Span],
-    grace: usize,
 ) -> Result<Windowed> {
     let sorted = SortedWindows(windows);
     let measures = WindowMeasures::new(recorded, findings, history, &sorted);
@@ -46,7 +44,6 @@ pub(crate) fn graphs(
         graphs: GraphsWriter::new(windows.to_vec()),
         messages: vec![0; windows.len()],
         windows: sorted,
-        grace,
         findings,
         history,
         published: BTreeMap::new(),
@@ -68,8 +65,6 @@ struct GraphAssembly<'a> {
     graphs: GraphsWriter,
     messages: Vec<u64>,
     windows: SortedWindows<'a>,
-    /// The number of windows of silence after which an element without later signs counts as gone.
-    grace: usize,
     findings: &'a Findings,
     history: &'a History,
     /// The messages of each known publisher on each topic, in windows with any.
@@ -184,7 +179,7 @@ impl GraphAssembly<'_> {
         let mut rows = ColumnWriter::default();
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
-            if !self.sees(record, *window) {
+            if !Self::sees(record, *window) {
                 continue;
             }
             let state = Row::new(
@@ -221,7 +216,7 @@ impl GraphAssembly<'_> {
             let sent = self.sent.get(name);
             let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
-                if !self.sees(record, *window) {
+                if !Self::sees(record, *window) {
                     continue;
                 }
                 let lifecycle = self.findings.values.lifecycle(*name, *window);
@@ -265,7 +260,7 @@ impl GraphAssembly<'_> {
                 let row = sent.as_mut().map(ColumnCursor::next);
                 let own = row.flatten();
                 let count = row.map(|row| row.and_then(|row| row.count).unwrap_or(0));
-                if !self.sees(record, *window) {
+                if !Self::sees(record, *window) {
                     continue;
                 }
                 let (delivered, bytes) = self.measures.counted(what, at);
@@ -299,7 +294,7 @@ impl GraphAssembly<'_> {
             let mut rows = ColumnWriter::default();
             for (at, window) in self.windows.0.iter().enumerate() {
                 let topic = topic.as_mut().and_then(ColumnCursor::next);
-                if !self.sees(record, *window) {
+                if !Self::sees(record, *window) {
                     continue;
                 }
                 let state = match topic {
@@ -331,18 +326,9 @@ impl GraphAssembly<'_> {
     }
 
     /// Whether an element with this record exists in a window.
-    fn sees(&self, record: &Record, window: Span) -> bool {
-        let last = record.lives.len().saturating_sub(1);
-        record.spans().enumerate().any(|(at, run)| {
-            let end = if at == last && self.grace > 0 {
-                self.windows
-                    .last_moment(run.end.plus(-1), self.grace)
-                    .plus(1)
-            } else {
-                run.end
-            };
-            run.start < window.end && window.start < end
-        })
+    fn sees(record: &Record, window: Span) -> bool {
+        let mut runs = record.spans();
+        runs.any(|run| run.start < window.end && window.start < run.end)
     }
 }
 

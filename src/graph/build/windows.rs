@@ -27,19 +27,6 @@ impl SortedWindows<'_> {
         let end = self.0.partition_point(|w| w.start <= to);
         first..end.max(first)
     }
-
-    /// The last moment at which an element whose last sign was at `time` counts as present, after `more`
-    /// windows of silence.
-    pub(crate) fn last_moment(&self, time: Stamp, more: usize) -> Stamp {
-        let last = self.over(time, time).end.saturating_sub(1);
-        match self
-            .0
-            .get(last.saturating_add(more).min(self.len().saturating_sub(1)))
-        {
-            Some(window) if more > 0 => window.start.max(time),
-            _ => time,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -45,7 +45,7 @@ const COLUMNS: &[ColumnOf<(), SurveyRow>] = columns! {
     "bag_format" Text |(), row| of_bag(row, |bag| TableCell::text(&bag.format));
     "compression" Text |(), row| of_bag(row, |bag| TableCell::text(bag.compression.join(" ")));
     "tier" Text |(), row| of_bag(row, |bag| TableCell::text(bag.tier));
-    "is_complete" Flag |(), row| TableCell::Flag(row.is_complete);
+    "is_complete" FLAG |(), row| TableCell::Flag(row.is_complete);
     "file_bytes" I64 |(), row| TableCell::known(row.file_bytes, TableCell::count);
     "start_ns" Time |(), row| known(row, |info| TableCell::Time(Stamp(info.start_ns)));
     "duration_s" F64 |(), row| known(row, |info| TableCell::Float(info.duration_s));

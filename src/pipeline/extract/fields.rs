@@ -8,7 +8,7 @@ use crate::bag::{Connection, ConnectionId, Input, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
+use crate::base::table::{Batch, ColumnKind, ColumnOf, TableCell, TableColumn, columns};
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::message::fields::{Decoder, Decoders, KnownTypes};
@@ -22,7 +22,7 @@ use crate::view::none_pass;
 /// The columns before a message's fields: its log time, and its publisher if known.
 const TIME: &str = "time_ns";
 const PUBLISHER: &str = "publisher";
-/// The columns of the index of tables: topic, type, file, number of rows.
+/// The name of the index of tables.
 const INDEX: &str = "index";
 /// The bytes of messages that one table buffers before its rows are written.
 const MOST_WAITING: usize = 4 << 20;
@@ -137,6 +137,13 @@ struct FieldTable {
     waiting: usize,
     writer: Option<Writer<BufWriter<Part>>>,
 }
+
+const INDEX_COLUMNS: &[ColumnOf<(), FieldTable>] = columns! {
+    "topic" Text |(), table| TableCell::text(&table.topic);
+    "type" Text |(), table| TableCell::text(&table.type_name);
+    "file" Text |(), table| TableCell::text(&table.file);
+    "n" I64 |(), table| TableCell::count(table.rows);
+};
 
 /// All tables.
 struct FieldTables {
@@ -270,23 +277,9 @@ impl FieldTables {
 
     /// Writes the index of tables and files.
     fn write_index(&mut self) -> io::Result<()> {
-        let mut index = Batch::new(&[
-            ("topic", ColumnKind::Text),
-            ("type", ColumnKind::Text),
-            ("file", ColumnKind::Text),
-            ("n", ColumnKind::I64),
-        ]);
         let mut tables: Vec<&FieldTable> = self.all.iter().filter(|t| t.rows > 0).collect();
         tables.sort_by_key(|t| (&t.topic, &t.file));
-        for table in tables {
-            let text = |text: &str| TableCell::text(text.to_owned());
-            index.push(&[
-                text(&table.topic),
-                text(&table.type_name),
-                text(&table.file),
-                TableCell::count(table.rows),
-            ]);
-        }
+        let index = Batch::filled(INDEX_COLUMNS, &(), tables);
         let part = self.folder.file(format!("{INDEX}.{}", self.format.word()));
         let mut writer = Writer::new(self.format, BufWriter::new(part), &index, &[])?;
         writer.write(&index)?;

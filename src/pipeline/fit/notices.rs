@@ -42,7 +42,7 @@ pub(super) fn reported(
     if let Some((first, _)) = collapsed.first() {
         let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
         let text = format!(
-            "drew namespaces as one box each{}: {}; expand one with `--expand {first}`, all with `--fit none`",
+            "drew namespaces as one box each{}: {}; keep one open with `--collapse -{first}`, all with `--fit none`",
             so_that(is_readable),
             words::some_of(&collapsed, 3)
         );

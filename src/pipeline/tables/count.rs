@@ -42,18 +42,21 @@ const TEN_SECONDS: Period = match Period::from_nanos(10_000_000_000) {
 };
 
 /// The counts of a recording.
-pub(super) struct Counted {
+#[derive(Clone, Debug)]
+pub struct Counted {
     /// A row per publisher, topic and window with messages.
-    pub(super) rows: Batch,
-    pub(super) messages: u64,
-    pub(super) notices: Notices,
+    pub rows: Batch,
+    /// The number of messages counted.
+    pub messages: u64,
+    /// The notices for the user, such as those about losses.
+    pub notices: Notices,
 }
 
-/// Counts the messages of a recording, which may have several parts.
+/// Counts the messages of a recording, which may have several parts; its name in the rows is `name`.
 ///
 /// # Errors
 /// If it cannot be read, or if the temporary file of times cannot be used.
-pub(super) fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counted> {
+pub fn count(name: &str, inputs: &[Input], counting: &Counting) -> Result<Counted> {
     let (inputs, twice) = each_once(inputs)?;
     let mut taken = Taken::default();
     taken.notices.extend(twice);
