@@ -30,6 +30,7 @@ pub(crate) use build::{
     History, Record, TopicCount, Windowed, counts, graphs, made, traffic, unread,
 };
 pub use elements::{Edge, EdgeId, Element, Elements, Existence, Node, NodeId, Topic, TopicId};
+pub(crate) use elements::Wiring;
 pub use per_element::PerElement;
 
 worded! {

@@ -119,6 +119,15 @@ pub struct Edge {
     pub seen: Existence,
 }
 
+/// The ends of each topic and the topics of each node, in order.
+#[derive(Clone, Debug)]
+pub(crate) struct Wiring {
+    pub(crate) publishers: ById<TopicId, Vec<NodeId>>,
+    pub(crate) subscribers: ById<TopicId, Vec<NodeId>>,
+    pub(crate) published: ById<NodeId, Vec<TopicId>>,
+    pub(crate) subscribed: ById<NodeId, Vec<TopicId>>,
+}
+
 /// All nodes, topics and edges of the mission: nodes and topics sorted by name, publications by (node, topic),
 /// subscriptions by (topic, node).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -237,6 +246,25 @@ impl Elements {
             .topics
             .binary_search_by(|topic| topic.name.as_str().cmp(name));
         at.ok().map(Id::of)
+    }
+
+    /// Who publishes and subscribes to what, as far as `is_meant` of node and topic.
+    pub(crate) fn wiring(&self, is_meant: impl Fn(NodeId, TopicId) -> bool) -> Wiring {
+        let mut all = Wiring {
+            publishers: ById::like(&self.topics, Vec::new()),
+            subscribers: ById::like(&self.topics, Vec::new()),
+            published: ById::like(&self.nodes, Vec::new()),
+            subscribed: ById::like(&self.nodes, Vec::new()),
+        };
+        for edge in self.publishes.iter().filter(|e| is_meant(e.node, e.topic)) {
+            all.publishers[edge.topic].push(edge.node);
+            all.published[edge.node].push(edge.topic);
+        }
+        for edge in self.subscribes.iter().filter(|e| is_meant(e.node, e.topic)) {
+            all.subscribers[edge.topic].push(edge.node);
+            all.subscribed[edge.node].push(edge.topic);
+        }
+        all
     }
 
     /// The publication of a topic by a node.

@@ -5,10 +5,10 @@
 //! here depends on windows.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 use std::sync::Arc;
 
-use super::{ById, EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
+use super::{ById, Element, Elements, Graphs, NodeId, State, TopicId};
 use crate::base::rhythm::{FEWEST, LONGER, OFTEN, SAME_RATE, STEADY, STEADY_NS, broken_after};
 use crate::base::time::{Span, Stamp};
 
@@ -132,13 +132,7 @@ impl Sending {
     /// The messages of a mission with known windows only: in each window with messages, a stretch of its
     /// rate.
     pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
-        let mut published: BTreeMap<TopicId, Vec<(EdgeId, NodeId)>> = BTreeMap::new();
-        for (id, edge) in elements.publishes.with_ids() {
-            published
-                .entry(edge.topic)
-                .or_default()
-                .push((id, edge.node));
-        }
+        let publishers = elements.wiring(|_, _| true).publishers;
         let mut senders = Vec::new();
         for topic in elements.topics.ids() {
             let mut rest = vec![0; graphs.len()];
@@ -146,10 +140,13 @@ impl Sending {
                 rest[at] = row.count.unwrap_or(0);
             }
             let mut own = Vec::new();
-            for (id, node) in published.get(&topic).into_iter().flatten() {
+            for node in &publishers[topic] {
+                let Some(edge) = elements.published((*node, topic)) else {
+                    continue;
+                };
                 let mut counts = vec![0; graphs.len()];
                 let mut is_latched = false;
-                for (at, row) in graphs.rows(Element::Publish(*id)) {
+                for (at, row) in graphs.rows(edge) {
                     is_latched |= row.state == State::Latched;
                     counts[at] = row.count.unwrap_or(0);
                     rest[at] = rest[at].saturating_sub(counts[at]);

@@ -79,14 +79,13 @@ pub(crate) fn nodes_in_words(
     are_leaves_in_words: bool,
 ) -> ById<NodeId, bool> {
     let elements = &mission.elements;
-    let mut ends = ById::like(&elements.topics, [Vec::new(), Vec::new()]);
-    for (edges, end) in [(&elements.publishes, 0), (&elements.subscribes, 1)] {
-        for edge in edges {
-            if selection.nodes[edge.node].is_none() {
-                ends[edge.topic][end].push(edge.node);
-            }
-        }
-    }
+    let wiring = elements.wiring(|node, _| selection.nodes[node].is_none());
+    let ends: ById<TopicId, [Vec<NodeId>; 2]> = wiring
+        .publishers
+        .into_iter()
+        .zip(wiring.subscribers)
+        .map(<[_; 2]>::from)
+        .collect();
     let (changes, changes_itself) = changing_nodes(mission, drawn, &ends);
     let is_drawn = drawn.iter().zip(&selection.topics);
     let is_drawn = is_drawn.map(|(drawn, reason)| *drawn && reason.is_none());

@@ -7,7 +7,7 @@ use super::make::{Drafts, LogInput};
 use super::{Detail, Event, EventId, Kind};
 use crate::base::rhythm::{CLOSE_NS, CROWD_NS, FLAPS, SAME_STEP, TOGETHER_NS};
 use crate::base::time::Stamp;
-use crate::graph::{Element, NodeId, TopicId};
+use crate::graph::{Element, NodeId, TopicId, Wiring};
 
 /// Makes events with a known cause parts of it.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
@@ -60,15 +60,11 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
         let (node, topic) = context.elements.ends(event.what);
         topic.filter(|_| node.is_some())
     });
-    let mut sent: BTreeMap<NodeId, Vec<TopicId>> = BTreeMap::new();
-    for edge in &context.elements.publishes {
-        sent.entry(edge.node).or_default().push(edge.topic);
-    }
+    let sent = context.elements.wiring(|_, _| true).published;
     // Whether a node is known only from the messages of a topic.
     let is_only_sender = |node: NodeId, topic| {
         let mut words = context.elements.nodes[node].seen.evidence.words();
-        let mut sent = sent.get(&node).into_iter().flatten();
-        words.all(|word| word == "connection") && sent.all(|other| *other == topic)
+        words.all(|word| word == "connection") && sent[node].iter().all(|other| *other == topic)
     };
     for hand in headlines(drafts, &[Kind::HandedOver]) {
         let event = drafts.get(hand).clone();
@@ -104,7 +100,7 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
 /// Subscriptions that appear or vanish with the topic's publisher are consequences.
 fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
     let turns = by(drafts, drafts.list.ids(), turn);
-    let wiring = Wiring::of(context);
+    let wiring = wiring(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let event = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
@@ -112,7 +108,7 @@ fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
         else {
             continue;
         };
-        let senders = wiring.publishers.get(&topic).into_iter().flatten();
+        let senders = wiring.publishers[topic].iter();
         let kind = match event.kind {
             Kind::Appeared => Kind::Started,
             _ => Kind::Stopped,
@@ -129,47 +125,24 @@ fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// The publishers and subscribers of each topic, without housekeeping.
-struct Wiring {
-    publishers: BTreeMap<TopicId, Vec<NodeId>>,
-    inputs: BTreeMap<NodeId, Vec<TopicId>>,
+/// The ends of each topic, without housekeeping.
+fn wiring(context: &LogInput<'_>) -> Wiring {
+    context.elements.wiring(|node, topic| {
+        !context.is_by_the_way(topic) && !context.is_quiet(Element::Node(node))
+    })
 }
 
-impl Wiring {
-    fn of(context: &LogInput<'_>) -> Self {
-        let (mut publishers, mut inputs) = (BTreeMap::new(), BTreeMap::new());
-        let is_meant = |node: NodeId, topic| {
-            !context.is_by_the_way(topic) && !context.is_quiet(Element::Node(node))
-        };
-        for edge in &context.elements.publishes {
-            if is_meant(edge.node, edge.topic) {
-                let of: &mut Vec<_> = publishers.entry(edge.topic).or_default();
-                of.push(edge.node);
-            }
-        }
-        for edge in &context.elements.subscribes {
-            if is_meant(edge.node, edge.topic) {
-                let of: &mut Vec<_> = inputs.entry(edge.node).or_default();
-                of.push(edge.topic);
-            }
-        }
-        Self { publishers, inputs }
-    }
-
-    /// The publishers of an event's element.
-    fn senders(&self, context: &LogInput<'_>, what: Element) -> Vec<NodeId> {
-        match (context.elements.ends(what), what) {
-            ((_, Some(topic)), Element::Topic(_)) => {
-                self.publishers.get(&topic).cloned().unwrap_or_default()
-            }
-            ((node, _), _) => node.into_iter().collect(),
-        }
+/// The publishers of an event's element.
+fn senders(context: &LogInput<'_>, wiring: &Wiring, what: Element) -> Vec<NodeId> {
+    match (context.elements.ends(what), what) {
+        ((_, Some(topic)), Element::Topic(_)) => wiring.publishers[topic].clone(),
+        ((node, _), _) => node.into_iter().collect(),
     }
 }
 
 /// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too.
 fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let wiring = Wiring::of(context);
+    let wiring = wiring(context);
     let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
     let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
     for (id, event) in drafts.list.with_ids() {
@@ -183,8 +156,8 @@ fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
     for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
         let event = drafts.get(id);
-        let own = wiring.senders(context, event.what);
-        let inputs = own.iter().filter_map(|node| wiring.inputs.get(node));
+        let own = senders(context, &wiring, event.what);
+        let inputs = own.iter().map(|node| &wiring.subscribed[*node]);
         let cause = inputs.flatten().find_map(|input| {
             if event.kind == Kind::Rate {
                 let of = steps.get(input).into_iter().flatten();
@@ -192,7 +165,7 @@ fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
                     .copied()
                     .find(|step| is_same_step(event, drafts.get(*step), CROWD_NS));
             }
-            let senders = wiring.publishers.get(input).into_iter().flatten();
+            let senders = wiring.publishers[*input].iter();
             let whose = senders.map(|node| Element::Node(*node));
             let of = whose
                 .chain([Element::Topic(*input)])
