@@ -174,7 +174,11 @@ fn names(folder: &Path) -> Vec<String> {
 fn every_animation_has_the_frames_of_the_images() {
     let folder = tempfile::tempdir().unwrap();
     let outputs = ["a.gif", "p{n}.png", "w{n}.webp", "s/{n}.svg"];
-    let written = show(folder.path(), &outputs, SequenceOptions::default()).unwrap();
+    let options = SequenceOptions {
+        frame_ms: Some(1000),
+        ..SequenceOptions::default()
+    };
+    let written = show(folder.path(), &outputs, options).unwrap();
     assert_eq!(
         written.iter().map(|w| w.files).collect::<Vec<_>>(),
         [1, 8, 8, 8]

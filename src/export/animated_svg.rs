@@ -18,7 +18,7 @@ const MANY: usize = 100;
 pub(crate) fn start<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Started<'a> {
     one_file(target, "all windows are in one file", move |sink| {
         let remarks = remark(sequence.view).into_iter().collect();
-        let times = sequence.frame_times();
+        let times = sequence.frame_times(true);
         let busiest = sequence.view.busiest();
         let still = times.iter().rposition(|time| time.window <= busiest);
         let scene = |time: &FrameTime| (sequence.picture.scene(time.window), time.ms);

@@ -280,6 +280,11 @@ pub struct OutputFormat {
 }
 
 impl OutputFormat {
+    /// Whether it is always an animation, whose frames last as long as their news takes to read.
+    pub(crate) fn is_film(&self) -> bool {
+        self.takes("frame-ms", true)
+    }
+
     /// Whether an option of `render`, such as `frame-ms`, applies to an output in this format, which is of a single
     /// window or of several.
     pub fn takes(&self, option: &str, is_alone: bool) -> bool {

@@ -9,8 +9,8 @@ pub use crate::draw::strip::Choice;
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SequenceOptions {
-    /// The time for which a window is shown, in milliseconds, ≥ 20.
-    pub frame_ms: u32,
+    /// The time for which each window is shown, in milliseconds, ≥ 20; `None`: as long as its headline takes to read.
+    pub frame_ms: Option<u32>,
     /// The step from one window that is shown to the next, in windows, ≥ 1; windows with a change are shown in any
     /// case.
     pub every: usize,
@@ -35,7 +35,7 @@ pub struct SequenceOptions {
 impl Default for SequenceOptions {
     fn default() -> Self {
         Self {
-            frame_ms: 1000,
+            frame_ms: None,
             every: 1,
             changes_only: false,
             scale: 1.0,

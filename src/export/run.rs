@@ -34,7 +34,16 @@ pub fn run(
     for output in outputs {
         check::make_folder(&output.target)?;
     }
-    let outcomes = pass(sequence, outputs, progress)?;
+    // Films leave windows out that files have, and are the same whatever else is written.
+    let (films, files): (Vec<&Output>, Vec<&Output>) =
+        outputs.iter().partition(|output| output.format.is_film());
+    let mut films = pass(sequence, &films, progress)?.into_iter();
+    let mut files = pass(sequence, &files, progress)?.into_iter();
+    let outcome = |output: &Output| {
+        let of = if output.format.is_film() { &mut films } else { &mut files };
+        of.next().flatten()
+    };
+    let outcomes: Vec<_> = outputs.iter().map(outcome).collect();
     let each = outputs.iter().zip(outcomes);
     each.map(|(output, outcome)| match outcome {
         Some(written) => Ok(written),
@@ -43,14 +52,15 @@ pub fn run(
     .collect()
 }
 
-/// One run of the sequence; `None` for an output that would exceed `max_bytes`.
+/// One run of the sequence through outputs that are all films or none; `None` for an output that would exceed `max_bytes`.
 pub(crate) fn pass(
     sequence: &Sequence<'_>,
-    outputs: &[Output],
+    outputs: &[&Output],
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Option<Written>>> {
     let start = |output| OutputJob::start(sequence, output);
-    let mut jobs: Vec<OutputJob<'_>> = outputs.iter().map(start).collect::<Result<_>>()?;
+    let jobs = outputs.iter().copied().map(start);
+    let mut jobs: Vec<OutputJob<'_>> = jobs.collect::<Result<_>>()?;
     let needs = jobs.iter().map(OutputJob::needs).max();
     if needs > Some(Needs::Nothing) {
         play(sequence, &mut jobs, progress)?;
@@ -175,7 +185,8 @@ fn play(
     jobs: &mut [OutputJob<'_>],
     progress: &mut Progress<'_>,
 ) -> Result<()> {
-    let frame_times = sequence.frame_times();
+    let is_film = jobs.iter().all(|job| job.output.format.is_film());
+    let frame_times = sequence.frame_times(is_film);
     let wants: Vec<FrameWant> = jobs.iter().map(OutputJob::want).collect();
     let pool = RasterPool::new(sequence, &frame_times, &wants)?;
     let mut done = 0;

@@ -124,22 +124,71 @@ pub struct FrameTime {
 }
 
 impl Sequence<'_> {
-    /// The frames in order. The total duration is constant: the time of an omitted window is added to the previous one. A
-    /// long time without messages is one frame of normal duration.
-    pub fn frame_times(&self) -> Vec<FrameTime> {
+    /// The frames in order: of an animation (`is_film`), or of files with a window each. A long time without messages is one
+    /// frame.
+    pub fn frame_times(&self, is_film: bool) -> Vec<FrameTime> {
         let frames = &self.view.frames;
         let changed: Vec<bool> = frames.iter().map(Frame::is_changed).collect();
         let mut times = frame_times(&changed, &self.options);
         let empty = |time: &FrameTime| frames[time.window].empty;
         times.dedup_by(|later, before| empty(later).is_some() && empty(later) == empty(before));
+        if is_film && self.options.frame_ms.is_none() {
+            let words = |window: usize| {
+                let frame = &frames[window];
+                let text = frame.words(READ_PHRASES);
+                frame.is_changed().then(|| text.split_whitespace().count())
+            };
+            times = paced(&times, words);
+        }
         times
     }
 }
 
+/// The duration of each window's frame if none was requested, in milliseconds.
+const FRAME_MS: u32 = 1000;
+/// The duration of a frame without news, in milliseconds: long enough to see that nothing changes.
+const QUIET_MS: u32 = 400;
+/// The duration of a frame with news, in milliseconds: the time to find it, the time for each word (readers of subtitles take
+/// about 300 ms, but most words here are names that were seen before), and the most, after which a film seems to stand.
+const NEWS_MS: u32 = 800;
+const WORD_MS: u32 = 120;
+const MOST_MS: u32 = 3500;
+/// The number of phrases of a headline that count as read.
+const READ_PHRASES: usize = 4;
+/// The most frames without news in a row; more become one frame.
+const MOST_QUIET: usize = 2;
+
+/// The frames with the time that it takes to read their news: `words` is the number of words, or `None` without news. More than
+/// two frames without news in a row are one, unless nothing changes in the whole film.
+fn paced(times: &[FrameTime], words: impl Fn(usize) -> Option<usize>) -> Vec<FrameTime> {
+    let is_news = |time: &FrameTime| words(time.window).is_some();
+    let has_news = times.iter().any(is_news);
+    let mut paced = Vec::with_capacity(times.len());
+    for run in times.chunk_by(|a, b| !is_news(a) && !is_news(b)) {
+        let shown = if has_news && run.len() > MOST_QUIET {
+            &run[..1]
+        } else {
+            run
+        };
+        paced.extend(shown.iter().map(|time| {
+            let read = |words: usize| u32::try_from(words).unwrap_or(u32::MAX);
+            let ms = words(time.window).map_or(QUIET_MS, |words| {
+                NEWS_MS.saturating_add(WORD_MS.saturating_mul(read(words)))
+            });
+            FrameTime {
+                ms: ms.min(MOST_MS),
+                ..*time
+            }
+        }));
+    }
+    paced
+}
+
+/// The total duration is constant: the time of an omitted window is added to the previous one.
 fn frame_times(changed: &[bool], options: &SequenceOptions) -> Vec<FrameTime> {
     let mut frame_times: Vec<FrameTime> = Vec::with_capacity(changed.len());
     for (window, &changed) in changed.iter().enumerate() {
-        let ms = options.frame_ms;
+        let ms = options.frame_ms.unwrap_or(FRAME_MS);
         let stays = if options.changes_only {
             window == 0
         } else {
@@ -164,6 +213,23 @@ mod tests {
     fn plan(changed: &[bool], options: &SequenceOptions) -> Vec<(usize, u32)> {
         let times = frame_times(changed, options).into_iter();
         times.map(|time| (time.window, time.ms)).collect()
+    }
+
+    #[test]
+    fn news_is_shown_as_long_as_it_takes_to_read() {
+        let paced = |words: &[Option<usize>]| -> Vec<(usize, u32)> {
+            let times: Vec<FrameTime> = (0..words.len())
+                .map(|window| FrameTime { window, ms: 1000 })
+                .collect();
+            let times = super::paced(&times, |window| words[window]);
+            times.iter().map(|time| (time.window, time.ms)).collect()
+        };
+        let film = [None, None, Some(5), None, None, None, Some(11), Some(80)];
+        assert_eq!(
+            paced(&film),
+            [(0, 400), (1, 400), (2, 1400), (3, 400), (6, 2120), (7, 3500)]
+        );
+        assert_eq!(paced(&[None; 3]), [(0, 400), (1, 400), (2, 400)]);
     }
 
     #[test]

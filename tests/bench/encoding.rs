@@ -87,7 +87,7 @@ fn main() {
         strip: Some(&page.scene),
         options,
     };
-    let frame_times = sequence.frame_times().len();
+    let frame_times = sequence.frame_times(true).len();
     let run = |names: &[&str]| {
         let output = |n: &&str| Output::parse(&folder.join(n).to_string_lossy(), None).unwrap();
         let outputs: Vec<Output> = names.iter().map(output).collect();
@@ -133,7 +133,7 @@ fn worst_psnr(sequence: &Sequence<'_>, path: &Path) -> f64 {
     let width = usize::from(decoder.width());
     let mut canvas = vec![0; width * usize::from(decoder.height()) * 4];
     let mut worst = f64::INFINITY;
-    for frame_time in sequence.frame_times() {
+    for frame_time in sequence.frame_times(true) {
         let Some(frame) = decoder.read_next_frame().unwrap() else {
             break;
         };

@@ -126,9 +126,9 @@ pub(crate) struct LookArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SequenceArgs {
-    /// Duration of a frame in milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=600_000))]
-    pub(crate) frame_ms: u32,
+    /// Duration of every frame in milliseconds [default: the time to read what changes, and none for long quiet times].
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(20..=600_000))]
+    pub(crate) frame_ms: Option<u32>,
     /// Draw several windows side by side: a grid `3x2`, or window numbers `0,4,9`.
     #[arg(long, value_name = "3x2|N,M,…")]
     pub(crate) strip: Option<String>,
