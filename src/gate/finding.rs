@@ -37,7 +37,7 @@ kinds! {
         "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.";
     NodeLate "node-late":
         "A node appeared later, or earlier, than it should have.",
-        "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have existed before its \
+        "`within: 40s..1:10` counts from the first message; `within: 20s` is short for `within: ..20s`. Undecidable where the node may have existed before its \
          first sign.";
     NodeGone "node-gone":
         "A node ended before the mission did.",
@@ -100,9 +100,6 @@ kinds! {
         "A node does not subscribe to an expected topic.",
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
          discovery, or this node's log of its connections.";
-    OrderBroken "order-broken":
-        "Nodes did not appear in the expected order.",
-        "`appear_in_order: [/a, /b]`. Undecidable where the uncertain times overlap.";
     ReactionMissing "reaction-missing":
         "An expected reaction did not happen.",
         "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second must follow; the uncertainty of both times is taken into account.";
@@ -124,9 +121,6 @@ kinds! {
     MessagesLost "messages-lost":
         "The recorder lost messages, so that gaps and low rates may be its own.",
         "A warning wherever the recorder reports it; `policy: {messages_lost: error}` or `allow`.";
-    AllowUnused "allow-unused":
-        "An allowance matched no finding.",
-        "Remove it, so that it does not hide another finding later.";
 }
 
 impl FindingKind {
@@ -173,8 +167,6 @@ worded! {
         Warning = "warning",
         /// Not observable in the bag.
         Unknown = "unknown",
-        /// Known and accepted.
-        Allowed = "allowed",
     }
 }
 
@@ -224,8 +216,6 @@ pub struct Finding {
     pub help: Vec<String>,
     /// The name in the file that `baseline --update` would rewrite.
     pub accept: Option<String>,
-    /// The reason why it is accepted.
-    pub why: Option<String>,
     /// The number of earlier findings in the file with the same [`Self::fingerprint`] input.
     pub(crate) nth: usize,
 }
@@ -251,14 +241,23 @@ impl Finding {
             cause: None,
             help: Vec::new(),
             accept: None,
-            why: None,
             nth: 0,
         }
     }
 
-    /// The finding as one that is not observable, with the reason in its text.
-    pub(crate) fn unknown(mut self) -> Self {
-        self.severity = Severity::Unknown;
+    /// A finding that is not observable, with the reason in its text.
+    pub(crate) fn unknown(
+        kind: FindingKind,
+        name: &str,
+        place: YamlPlace,
+        text: impl fmt::Display,
+    ) -> Self {
+        Self::new(kind, name, place, text).severe(Severity::Unknown)
+    }
+
+    /// The finding with another severity.
+    pub(crate) fn severe(mut self, severity: Severity) -> Self {
+        self.severity = severity;
         self
     }
 

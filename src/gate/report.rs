@@ -1,12 +1,7 @@
 //! Verdicts in formats for people, for programs, and for CI services.
 
-mod github;
-mod gitlab;
-mod json;
-mod junit;
+mod data;
 mod markdown;
-mod mermaid;
-mod sarif;
 mod text;
 
 use std::collections::BTreeMap;
@@ -49,7 +44,7 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
         word: "text",
         endings: &[".txt"],
         what: "for people: findings with file and line, grouped by cause",
-        write: text::write,
+        write: text::text,
     },
     CheckFormat {
         word: "gitlab",
@@ -59,13 +54,13 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
             "code-quality.json",
         ],
         what: "GitLab's code quality; also called codequality",
-        write: gitlab::write,
+        write: data::gitlab,
     },
     CheckFormat {
         word: "json",
         endings: &[".json"],
         what: "everything, for programs",
-        write: json::write,
+        write: data::json,
     },
     CheckFormat {
         word: "markdown",
@@ -77,19 +72,19 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
         word: "junit",
         endings: &[".xml"],
         what: "a test case for every fact of the file",
-        write: junit::write,
+        write: data::junit,
     },
     CheckFormat {
         word: "sarif",
         endings: &[".sarif", ".sarif.json"],
         what: "SARIF 2.1.0, for code scanning",
-        write: sarif::write,
+        write: data::sarif,
     },
     CheckFormat {
         word: "github",
         endings: &[],
         what: "GitHub's annotations, then the text",
-        write: github::write,
+        write: text::github,
     },
 ];
 
@@ -150,21 +145,16 @@ impl Verdict {
 
     /// The number of findings as text: `2 errors, 1 warning, 1 unknown`.
     fn summary(&self) -> String {
-        let broken = self.broken();
-        let mut parts: Vec<String> = Some(broken).into_iter().filter(|b| !b.is_empty()).collect();
-        for (severity, word) in [
-            (Severity::Unknown, "unknown"),
-            (Severity::Allowed, "allowed"),
-        ] {
-            let n = self.count(severity);
-            if n > 0 {
-                parts.push(format!("{n} {word}"));
-            }
+        let unknown = match self.count(Severity::Unknown) {
+            0 => String::new(),
+            unknown => format!("{unknown} unknown"),
+        };
+        let mut parts = vec![self.broken(), unknown];
+        parts.retain(|words| !words.is_empty());
+        match parts.is_empty() {
+            true => "no findings".to_owned(),
+            false => parts.join(", "),
         }
-        if parts.is_empty() {
-            parts.push("no findings".to_owned());
-        }
-        parts.join(", ")
     }
 }
 
@@ -183,21 +173,35 @@ fn quoted(text: &str) -> String {
 pub(crate) fn explain(word: &str, width: usize) -> Option<String> {
     let (_, word, meaning, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
     let [meaning, more] = [meaning, more].map(|text| hang("", text, 0, Some(width)));
-    Some(format!(
-        "{word}\n\n{meaning}\n{more}\nTo allow it:\n\nallow:\n  - finding: {word}\n    name: /name\n    until: 2027-01-31\n    why: \"…\"\n"
-    ))
+    Some(format!("{word}\n\n{meaning}\n{more}"))
+}
+
+/// Findings with one cause, or one without.
+struct Group<'a> {
+    cause: Option<&'a str>,
+    findings: Vec<&'a Finding>,
+}
+
+impl Group<'_> {
+    /// The worst severity.
+    fn worst(&self) -> Option<Severity> {
+        self.findings.first().map(|finding| finding.severity)
+    }
 }
 
 /// The findings grouped by cause, ordered by the worst of each; those without a cause are separate.
-fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
-    let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
+fn grouped<'a>(findings: &[&'a Finding]) -> Vec<Group<'a>> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();
     for finding in findings {
         let cause = finding.cause.as_ref().map(|c| c.text.as_str());
         let place = cause.map(|cause| *places.entry(cause).or_insert(groups.len()));
         match place.and_then(|place| groups.get_mut(place)) {
-            Some((_, group)) => group.push(finding),
-            None => groups.push((cause, vec![finding])),
+            Some(group) => group.findings.push(finding),
+            None => groups.push(Group {
+                cause,
+                findings: vec![finding],
+            }),
         }
     }
     groups

@@ -14,8 +14,8 @@ use crate::export::check as places;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
-    CheckFormat, DiffFormat, DiffSubject, Difference, Side, Subject, Verdict, Written, differences,
-    judge, pairs, union, update, write,
+    CheckFormat, DiffFormat, DiffSubject, Difference, Runs, Side, Subject, Verdict, Written,
+    differences, judge, pairs, union, update, write,
 };
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
@@ -379,7 +379,11 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
     };
     let text = if let Some((path, text, _)) = old {
         let is_part = job.runs.iter().any(is_part);
-        let new = update(&text, path, (&done.missions, is_part), &job.only)?;
+        let runs = Runs {
+            missions: &done.missions,
+            is_part,
+        };
+        let new = update(&text, path, runs, &job.only)?;
         (done.changed, done.left) = (new.changed, new.left);
         new.text
     } else {

@@ -14,18 +14,17 @@ nodes:
   /probe: {}
   /camera_backup: {}
 rules:
-  - {id: localizer-starts, node: /localizer, present_within: 1s}
-  - {id: planner-starts, node: /planner, present_within: 50s}
-  - {id: controller-starts, node: /controller, present_within: 80s}
+  - {id: localizer-starts, node: /localizer, within: 1s}
+  - {id: planner-starts, node: /planner, within: 50s}
+  - {id: controller-starts, node: /controller, within: 80s}
   - {id: backup-takes-over, when: {removed: /camera_driver}, expect: {handed_over: /image_small, to: /camera_backup}, within: 20s}
-  - {id: probe-starts, node: /probe, present_within: 160s}
+  - {id: probe-starts, node: /probe, within: 160s}
   - {id: planner-restarts, node: /planner, restarts: ..0}
   - {id: probe-restarts, node: /probe, restarts: ..0}
-  - {id: successor-starts, node: /controller_v2, present_within: 200s}
-  - {id: joystick-starts, node: /joystick, present_within: 200s}
+  - {id: successor-starts, node: /controller_v2, within: 200s}
+  - {id: joystick-starts, node: /joystick, within: 200s}
   - {id: localizer-restarts, node: /localizer, restarts: ..0}
   - {id: quiet-at-end, during: -30s.., changes: ..0}
-  - {id: kept-order, appear_in_order: [/localizer, /planner, /controller]}
   - {id: kept-takeover, when: {removed: /camera_driver}, expect: {added: /camera_backup}, within: 40s}
   - {id: kept-rate, topic: /scan_small, hz: 4..6}
   - {id: kept-restarts, node: /probe, restarts: ..1}

@@ -154,11 +154,7 @@ fn row(difference: &Difference) -> DifferenceRow<'_> {
     DifferenceRow {
         kind: difference.kind,
         name: &difference.name,
-        side: match difference.side {
-            Where::First => "first",
-            Where::Second => "second",
-            Where::Both => "both",
-        },
+        side: difference.side.word(),
         first: &difference.first,
         second: &difference.second,
         known: difference.is_known,

@@ -1,16 +1,15 @@
-//! Named rules: about several nodes, order, reactions, and times without changes.
+//! Named rules: facts of nodes and topics, reactions to events, and times without changes.
 
-use super::{Judge, absence};
+use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{
-    At, Demand, EventKind, ExpectedEvent, NodeFacts, Rule, TopicFacts, YamlPlace,
+    At, Demand, Entry, EventKind, ExpectedEvent, Reaction, Rule, YamlPlace,
 };
 use crate::gate::finding::{Cause, Finding, FindingKind};
-use crate::gate::pattern::Pattern;
-use crate::gate::range::{During, Range};
-use crate::graph::history::Bound;
-use crate::mission::event_log::Event;
+use crate::gate::values::{During, Pattern, Range};
+use crate::graph::{Element, NodeId};
+use crate::mission::event_log::{Detail, Event, Kind};
 use crate::mission::events::sentence;
 
 /// The time in nanoseconds by which a reaction may precede its cause: the last sign of a node that ended is a period
@@ -24,62 +23,43 @@ impl Judge<'_> {
     pub(super) fn rule(&mut self, rule: &Rule) {
         let before = self.checks.len();
         match &rule.demand {
-            Demand::Nodes(names, facts) => self.node_rule(rule, names, facts),
-            Demand::Topic(name, facts) => self.topic_rule(rule, name, facts),
-            Demand::Order(names) => {
-                let found = self.order(names);
-                self.note(&rule.id, rule.at, found);
+            Demand::Nodes(names, entry) => {
+                for name in names {
+                    self.node_rule(rule, name, entry);
+                }
             }
-            Demand::Reaction {
-                when,
-                expect,
-                within,
-            } => {
-                let found = self.reaction(rule, when, expect, *within);
+            Demand::Topic(name, entry) => self.topic_rule(rule, name, entry),
+            Demand::Reaction(reaction) => {
+                let found = self.reaction(rule.at, reaction);
                 self.note(&rule.id, rule.at, found);
             }
             Demand::Changes { during, many } => {
                 let found = self.changes(rule.at, *during, *many);
-                self.note(&rule.id, rule.at, found);
+                self.note(&rule.id, rule.at, found.into_iter().collect());
             }
         }
+        let detail = format!("rule {}", words::visible(&rule.id));
         for finding in self.found_since(before) {
-            finding
-                .details
-                .push(format!("rule {}", words::visible(&rule.id)));
+            finding.details.push(detail.clone());
         }
     }
 
-    fn node_rule(&mut self, rule: &Rule, names: &[At<Pattern>], facts: &NodeFacts) {
-        for name in names {
-            let title = format!("{}: {}", rule.id, name.value);
-            if facts.forbidden {
-                let found = self.forbidden_nodes(&name.value, name.at);
-                self.note(title, name.at, found);
-                continue;
+    fn node_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
+        let title = format!("{}: {}", rule.id, name.value);
+        // A deadline implies presence.
+        let within = entry.within.as_ref();
+        let found = if entry.forbidden {
+            self.forbidden_nodes(&name.value, name.at)
+        } else if let Some(within) = within.filter(|_| self.facts.nodes(&name.value).is_empty()) {
+            if within.value.0.is_beyond(self.facts.mission.span) {
+                vec![self.too_short(name)]
+            } else {
+                self.node_presence(&name.value, name.at, &Entry::default())
             }
-            // A deadline implies presence.
-            if let Some(within) = &facts.within
-                && self.facts.nodes(&name.value).is_empty()
-            {
-                let span = self.facts.mission.span;
-                if within.value.is_beyond(span) {
-                    self.note(title, name.at, vec![self.too_short(name)]);
-                    continue;
-                }
-                let is_there = NodeFacts {
-                    may_end: Some(At {
-                        at: name.at,
-                        value: During::WHOLE,
-                    }),
-                    ..NodeFacts::default()
-                };
-                let found = self.presence(&name.value, name.at, &is_there);
-                self.note(title, name.at, found);
-                continue;
-            }
-            self.node_facts(&title, &name.value, facts);
-        }
+        } else {
+            return self.node_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
     }
 
     /// The finding that the mission ended before a node had to be present.
@@ -87,164 +67,95 @@ impl Judge<'_> {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
         let text = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
-        Finding::new(FindingKind::NodeLate, name, at, text).unknown()
+        Finding::unknown(FindingKind::NodeLate, name, at, text)
     }
 
-    fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, facts: &TopicFacts) {
+    fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
         let title = format!("{}: {}", rule.id, name.value);
-        if facts.forbidden {
-            let found = self.forbidden_topics(&name.value, name.at);
-            self.note(title, name.at, found);
-            return;
-        }
         let topics = self.facts.topics(&name.value);
-        let needs = facts.whilst.is_none() && self.is_owed(facts);
-        if topics.is_empty() || needs && !self.is_sent(&topics) {
-            let found = self.topic_presence(&name.value, name.at, facts);
-            self.note(title, name.at, found);
-            return;
-        }
-        self.topic_facts(&title, &name.value, facts);
+        let found = if entry.forbidden {
+            self.forbidden_topics(&name.value, name.at)
+        } else if topics.is_empty() || self.is_owed(entry) && !self.is_sent(&topics) {
+            self.topic_presence(&name.value, name.at, entry)
+        } else {
+            return self.topic_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
     }
 
-    fn order(&self, names: &[At<Pattern>]) -> Vec<Finding> {
+    fn reaction(&self, at: YamlPlace, reaction: &Reaction) -> Vec<Finding> {
+        let answers = self.events(&reaction.expect);
         let mut found = Vec::new();
-        let mut before: Option<(&At<Pattern>, Bound)> = None;
-        for name in names {
-            let roles = self.facts.nodes(&name.value);
-            let began = roles
-                .iter()
-                .filter_map(|(_, nodes)| self.facts.began(nodes));
-            let Some(began) = began.min_by_key(|bound| bound.time) else {
-                let text = format!("{} never appeared, expected in order", name.value);
-                let mut finding =
-                    Finding::new(FindingKind::OrderBroken, name.value.as_str(), name.at, text)
-                        .saw("absent", order_of(names));
-                finding.cause = Some(absence(name.value.as_str()));
-                found.push(finding);
-                continue;
-            };
-            if let Some((other, earlier)) = before
-                && began.time < earlier.time
-            {
-                found.push(self.swapped((other, earlier), (name, began), names));
-            }
-            before = Some((name, began));
-        }
-        found
-    }
-
-    fn swapped(
-        &self,
-        (first, earlier): (&At<Pattern>, Bound),
-        (second, began): (&At<Pattern>, Bound),
-        names: &[At<Pattern>],
-    ) -> Finding {
-        let (one, other) = (first.value.as_str(), second.value.as_str());
-        let at = |bound: Bound| self.facts.clock(bound.time);
-        if began.latest >= earlier.earliest {
-            let text =
-                format!("cannot tell whether {other} appeared after {one}: the times overlap");
-            return Finding::new(FindingKind::OrderBroken, other, second.at, text).unknown();
-        }
-        let text = format!(
-            "{other} appeared at {}, expected after {one} at {}",
-            at(began),
-            at(earlier)
-        );
-        let seen = format!("{other} at {}, {one} at {}", at(began), at(earlier));
-        Finding::new(FindingKind::OrderBroken, other, second.at, text)
-            .saw(seen, order_of(names))
-            .at(Span::new(began.time, earlier.time))
-    }
-
-    fn reaction(
-        &self,
-        rule: &Rule,
-        when: &ExpectedEvent,
-        expect: &ExpectedEvent,
-        within: i64,
-    ) -> Vec<Finding> {
-        let answers = self.events(expect);
-        let mut found = Vec::new();
-        for cause in self.events(when) {
+        for cause in self.events(&reaction.when) {
             let from = cause.earliest.plus(-BEFORE_NS);
-            let to = cause.latest.plus(within);
+            let to = cause.latest.plus(reaction.within);
             if answers.iter().any(|e| from <= e.time && e.time <= to) {
                 continue;
             }
             // A hand-over is complete when the new sender publishes, even if its start is uncertain.
-            let may = |e: &&&Event| {
-                expect.kind != EventKind::HandedOver && e.earliest <= to && from <= e.latest
-            };
-            let doubt = if answers.iter().any(|e| may(&e)) {
+            let is_exact = reaction.expect.kind == EventKind::HandedOver;
+            let may = |e: &&Event| !is_exact && e.earliest <= to && from <= e.latest;
+            let doubt = if answers.iter().any(may) {
                 Some("the times overlap")
             } else if to > self.facts.mission.span.end {
                 Some("the mission ended before")
             } else {
                 None
             };
-            found.push(self.no_answer(rule.at, (when, cause), expect, within, doubt));
+            let late = answers.iter().find(|e| e.time > cause.time);
+            let missing = MissingReaction {
+                reaction,
+                cause,
+                late: late.copied(),
+                doubt,
+            };
+            found.push(self.no_answer(at, &missing));
         }
         found
     }
 
-    fn no_answer(
-        &self,
-        at: YamlPlace,
-        (when, cause): (&ExpectedEvent, &Event),
-        expect: &ExpectedEvent,
-        within: i64,
-        doubt: Option<&str>,
-    ) -> Finding {
+    fn no_answer(&self, at: YamlPlace, missing: &MissingReaction<'_>) -> Finding {
+        let (kind, cause) = (FindingKind::ReactionMissing, missing.cause);
+        let Reaction {
+            when,
+            expect,
+            within,
+        } = missing.reaction;
         let name = expect.name.as_str();
-        let expected = format!(
-            "{} within {}",
-            expected_text(expect),
-            words::duration(within)
-        );
-        let what = format!("{} {}", when.name, past(when));
         let clock = self.facts.clock(cause.time);
-        if let Some(doubt) = doubt {
-            let text = format!(
-                "cannot tell whether {name} {} in time after {what} at {clock}: {doubt}",
-                past(expect)
-            );
-            return Finding::new(FindingKind::ReactionMissing, name, at, text).unknown();
+        let what = format!("{} {} at {clock}", when.name, past(when));
+        if let Some(doubt) = missing.doubt {
+            let past = past(expect);
+            let text = format!("cannot tell whether {name} {past} in time after {what}: {doubt}");
+            return Finding::unknown(kind, name, at, text);
         }
-        let text = format!("{what} at {clock}, and {expected} did not follow");
-        let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, text)
+        let within_words = words::duration(*within);
+        let expected = format!("{} within {within_words}", expected_text(expect));
+        let text = format!("{what}, and {expected} did not follow");
+        let mut finding = Finding::new(kind, name, at, text)
             .saw("nothing", expected)
-            .at(Span::new(cause.time, cause.latest.plus(within)));
-        let after = self
-            .events(expect)
-            .into_iter()
-            .find(|e| e.time > cause.time);
-        if let Some(after) = after {
+            .at(Span::new(cause.time, cause.latest.plus(*within)));
+        if let Some(after) = missing.late {
             let late = words::duration(after.time.since(cause.time));
             finding = finding.detail(format!("it followed after {late}"));
         }
         finding.cause = Some(Cause {
             time: Some(cause.time),
-            text: format!("{what} at {clock}"),
+            text: what,
         });
         finding
     }
 
-    fn changes(&self, at: YamlPlace, during: Option<During>, many: Range) -> Vec<Finding> {
-        let whole = self.facts.mission.span;
-        let span = during.map_or(whole, |d| d.on(whole));
+    fn changes(&self, at: YamlPlace, during: During, many: Range) -> Option<Finding> {
+        let span = during.on(self.facts.mission.span);
         let headlines = self.facts.mission.log.headlines(span);
         let events: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
         if many.holds(events.len() as f64) {
-            return Vec::new();
+            return None;
         }
         let seen = words::count(events.len(), "reconfiguration");
-        let text = format!(
-            "{seen} from {} to {}, expected {many}",
-            self.facts.clock(span.start),
-            self.facts.clock(span.end)
-        );
+        let [from, to] = [span.start, span.end].map(|time| self.facts.clock(time));
+        let text = format!("{seen} from {from} to {to}, expected {many}");
         let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, text)
             .saw(events.len(), words::count_range(many.from, many.to))
             .at(span);
@@ -256,13 +167,64 @@ impl Judge<'_> {
         if events.len() > MOST_LISTED {
             finding = finding.detail(format!("and {} more", events.len() - MOST_LISTED));
         }
-        vec![finding]
+        Some(finding)
+    }
+
+    /// The events that match an event, in order.
+    fn events(&self, wanted: &ExpectedEvent) -> Vec<&Event> {
+        let all = self.facts.mission.log.events.iter();
+        all.filter(|event| self.is_event(wanted, event)).collect()
+    }
+
+    fn is_event(&self, wanted: &ExpectedEvent, event: &Event) -> bool {
+        let kinds: &[Kind] = match wanted.kind {
+            EventKind::Added => &[Kind::Started, Kind::Appeared],
+            EventKind::Removed => &[Kind::Stopped, Kind::Restarted, Kind::Vanished],
+            EventKind::Restarted => &[Kind::Restarted],
+            EventKind::Silent => &[Kind::Silent],
+            EventKind::HandedOver => &[Kind::HandedOver],
+            EventKind::Rate => &[Kind::Rate],
+            EventKind::Lifecycle => &[Kind::Lifecycle],
+        };
+        kinds.contains(&event.kind) && self.is_about(wanted, event) && self.has_ends(wanted, event)
+    }
+
+    fn is_about(&self, wanted: &ExpectedEvent, event: &Event) -> bool {
+        match event.what {
+            Element::Node(id) => self.facts.fits(&wanted.name, id),
+            Element::Topic(id) => wanted.name.matches(self.facts.topic(id)),
+            Element::Publish(id) if wanted.kind == EventKind::Rate => {
+                let topic = self.facts.mission.elements.publishes[id].topic;
+                wanted.name.matches(self.facts.topic(topic))
+            }
+            Element::Publish(_) | Element::Subscribe(_) => false,
+        }
+    }
+
+    fn has_ends(&self, wanted: &ExpectedEvent, event: &Event) -> bool {
+        let any = |wanted: &Option<Pattern>, nodes: &[NodeId]| {
+            let fits = |p: &Pattern| nodes.iter().any(|id| self.facts.fits(p, *id));
+            wanted.as_ref().is_none_or(fits)
+        };
+        let is = |wanted: &Option<Pattern>, value: &str| {
+            wanted.as_ref().is_none_or(|p| p.matches(value))
+        };
+        match &event.detail {
+            Detail::Senders { from, to } => any(&wanted.from, from) && any(&wanted.to, to),
+            Detail::Values { from, to } => is(&wanted.from, from) && is(&wanted.to, to),
+            _ => wanted.from.is_none() && wanted.to.is_none(),
+        }
     }
 }
 
-fn order_of(names: &[At<Pattern>]) -> String {
-    let names: Vec<&str> = names.iter().map(|n| n.value.as_str()).collect();
-    names.join(", ")
+/// An event that an expected event did not follow in time.
+struct MissingReaction<'a> {
+    reaction: &'a Reaction,
+    cause: &'a Event,
+    /// The expected event after it, too late.
+    late: Option<&'a Event>,
+    /// The reason why it may have followed in time.
+    doubt: Option<&'static str>,
 }
 
 /// The predicate for an event that happened: `was removed`.
