@@ -125,7 +125,11 @@ fn pair_at(text: &str, value: Location) -> (&str, &str) {
         key => before.rfind(key).unwrap_or(start),
     };
     let pair = text.get(begin..start.saturating_add(bytes));
-    (key, pair.and_then(|pair| pair.lines().next()).unwrap_or_default())
+    (
+        key,
+        pair.and_then(|pair| pair.lines().next())
+            .unwrap_or_default(),
+    )
 }
 
 /// A position in a document.

@@ -12,7 +12,6 @@ use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code, look};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
-use crate::base::nearest::suggestion;
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
@@ -162,10 +161,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
 pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     if let Some(word) = &args.explain {
         let width = terminal.width().unwrap_or(80).min(80);
-        let Some(text) = explain(word, width) else {
-            return Err(unknown_kind(word));
-        };
-        terminal.results(&text)?;
+        terminal.results(&explain(word, width)?)?;
         return Ok(DONE);
     }
     let Some(expect) = args.expect.clone() else {
@@ -249,16 +245,6 @@ fn tracked(path: &Path) -> String {
     };
     let parts = below.iter().map(|part| part.to_string_lossy());
     parts.collect::<Vec<_>>().join("/")
-}
-
-fn unknown_kind(word: &str) -> Error {
-    let words = || crate::gate::FindingKind::words();
-    let near = suggestion(word, words());
-    let all: Vec<&str> = words().collect();
-    Error::usage(
-        format!("unknown kind of finding `{word}`{near}"),
-        format!("choose one of {}", all.join(", ")),
-    )
 }
 
 /// The reading for a check. Missions in JSON have their own windows.

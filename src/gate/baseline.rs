@@ -5,7 +5,7 @@ mod update;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::expectation::SCHEMA;
-use super::facts::{Facts, NodeIn, Rate, TopicIn};
+use super::facts::{Facts, Rate, Role, TopicIn};
 use super::values::Range;
 use crate::base::budget;
 use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
@@ -198,27 +198,24 @@ impl Draft {
 }
 
 fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
-    let mut all: BTreeMap<&str, Vec<NodeIn<'_>>> = BTreeMap::new();
+    let mut all: BTreeMap<&str, Vec<Role<'_>>> = BTreeMap::new();
     for facts in runs {
         for role in facts.robot_roles() {
-            let nodes = role.nodes;
-            all.entry(role.name)
-                .or_default()
-                .push(NodeIn { facts, nodes });
+            all.entry(role.name).or_default().push(role);
         }
     }
-    let line = |(name, seen): (&str, Vec<NodeIn<'_>>)| {
+    let line = |(name, seen): (&str, Vec<Role<'_>>)| {
         let is_optional = seen.len() < runs.len();
         (name.to_owned(), node(&seen, times, is_optional))
     };
     all.into_iter().map(line).collect()
 }
 
-fn node(seen: &[NodeIn<'_>], times: &Times, is_optional: bool) -> Line {
-    let since = |run: &NodeIn<'_>, at| run.facts.mission.offset(at);
+fn node(seen: &[Role<'_>], times: &Times, is_optional: bool) -> Line {
+    let since = |run: &Role<'_>, at| run.facts.mission.offset(at);
     // Known to within seconds.
     let is_sure = |bound: &Bound| bound.latest.since(bound.earliest) <= CLOSING_NS;
-    let ended = |s: &NodeIn<'_>| s.facts.ended(s.nodes, ENDED_NS);
+    let ended = |s: &Role<'_>| s.facts.ended(s.nodes, ENDED_NS);
     let are_ends_sure = seen.iter().filter_map(ended).all(|end| is_sure(&end));
     let ends = seen.iter().filter_map(|s| Some(since(s, ended(s)?.time)));
     let ends: Vec<i64> = ends.collect();
@@ -229,7 +226,7 @@ fn node(seen: &[NodeIn<'_>], times: &Times, is_optional: bool) -> Line {
         is_sure.then(|| since(s, began.time))
     });
     let began: Option<Vec<i64>> = began.collect();
-    let state = |s: &NodeIn<'_>| s.facts.lifecycle(s.nodes).map(str::to_owned);
+    let state = |s: &Role<'_>| s.facts.lifecycle(s.nodes).map(str::to_owned);
     let restarts = seen
         .iter()
         .map(|s| s.facts.events(s.nodes, Kind::Restarted).len());

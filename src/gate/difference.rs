@@ -5,11 +5,13 @@ mod report;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::facts::{Facts, NodeIn, Rate, TopicIn};
+use serde::Serialize;
+
+use super::facts::{Facts, Rate, Role, TopicIn};
 use super::values::Pattern;
 use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN};
 use crate::base::time::{Span, Stamp};
-use crate::base::words::{self, worded};
+use crate::base::words;
 use crate::graph::history::Bound;
 use crate::graph::{Element, NodeId};
 use crate::mission::Mission;
@@ -34,18 +36,17 @@ const FEWEST_OF_TIMES: u64 = 20;
 /// The longest silence of a topic, times this, is the uncertainty of its first and its last message.
 const SILENCES: i64 = 2;
 
-worded! {
-    /// Which of two missions contain an element.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-    #[non_exhaustive]
-    pub enum Where {
-        /// Only in the first.
-        First = "first",
-        /// Only in the second.
-        Second = "second",
-        /// In both, but different.
-        Both = "both",
-    }
+/// Which of two missions contain an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Where {
+    /// Only in the first.
+    First,
+    /// Only in the second.
+    Second,
+    /// In both, but different.
+    Both,
 }
 
 impl Where {
@@ -56,7 +57,7 @@ impl Where {
 }
 
 /// One difference.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Difference {
     /// The kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
@@ -64,14 +65,17 @@ pub struct Difference {
     /// The name of the node or topic it is about, or both names of an edge.
     pub name: String,
     /// The node or topic, or both as in `name`; the name of an event contains more.
+    #[serde(skip)]
     pub element: String,
     /// The missions that contain it.
+    #[serde(rename = "in")]
     pub side: Where,
     /// The value in the first mission; empty for none.
     pub first: String,
     /// The value in the second mission; empty for none.
     pub second: String,
     /// Whether it is observable in both missions. An element without evidence in one is not absent from it.
+    #[serde(rename = "known")]
     pub is_known: bool,
 }
 
@@ -134,10 +138,11 @@ pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -
 
 /// The nodes, topics and edges in only one mission, and the differences between those in both.
 fn elements(facts: &[Facts<'_>; 2], rate_change: f64) -> Vec<Difference> {
-    let nodes = facts.each_ref().map(|facts| -> BTreeMap<&str, NodeIn<'_>> {
-        let own = |nodes| NodeIn { facts, nodes };
+    let nodes = facts.each_ref().map(|facts| {
         let roles = facts.robot_roles();
-        roles.map(|role| (role.name, own(role.nodes))).collect()
+        roles
+            .map(|role| (role.name, role))
+            .collect::<BTreeMap<&str, Role<'_>>>()
     });
     let mut all = presence("node", &nodes);
     // Whether the mission that lacks a node would name it.
@@ -190,7 +195,7 @@ fn presence<T>(kind: &'static str, both: &[BTreeMap<&str, T>; 2]) -> Vec<Differe
 }
 
 /// The differences of a node in both missions.
-fn node(name: &str, both: [NodeIn<'_>; 2], all: &mut Vec<Difference>) {
+fn node(name: &str, both: [Role<'_>; 2], all: &mut Vec<Difference>) {
     let restarts = both.map(|own| own.facts.events(own.nodes, Kind::Restarted).len());
     if restarts[0] != restarts[1] {
         let restarts = restarts.map(|many| many.to_string());

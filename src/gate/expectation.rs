@@ -7,14 +7,12 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _, IgnoredAny, SeqAccess, Visitor};
 
-use super::finding::FindingKind;
 use super::values::{During, MEASURES, Measure, Pattern, Range};
 use crate::base::error::{Error, Result};
 use crate::base::time::{Period, parse_nanos};
 use crate::base::words::worded;
 use crate::base::yaml::{self, BadYaml, Keyed, Pairs};
 pub(crate) use crate::base::yaml::{At, YamlPlace};
-use crate::mission::event_log::Kind;
 
 /// The first line of every expectation.
 pub(crate) const SCHEMA: &str = "bagreel.expect/1";
@@ -23,11 +21,10 @@ const NODE: &str = "forbidden optional may_end known_by restarts lifecycle withi
 const TOPIC: &str = "forbidden optional may_end type by to hz mean_hz percent max_gap within age bytes drops latched qos \
     during";
 /// The keys that determine the form of a rule, each with the other allowed keys.
-const FORMS: [(&str, &str); 5] = [
+const FORMS: [(&str, &str); 4] = [
     ("node", NODE),
     ("nodes", NODE),
     ("topic", TOPIC),
-    ("when", "expect within"),
     ("changes", "during"),
 ];
 
@@ -68,46 +65,8 @@ pub(crate) enum Demand {
     Nodes(Vec<At<Pattern>>, Box<Entry>),
     /// Facts of a topic.
     Topic(At<Pattern>, Box<Entry>),
-    Reaction(Reaction),
     /// The range of the number of reconfigurations.
-    Changes {
-        during: During,
-        many: Range,
-    },
-}
-
-/// An event that another must follow.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Reaction {
-    pub(crate) when: ExpectedEvent,
-    pub(crate) expect: ExpectedEvent,
-    /// In nanoseconds.
-    pub(crate) within: i64,
-}
-
-/// An event of the event log.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ExpectedEvent {
-    pub(crate) kind: EventKind,
-    pub(crate) name: Pattern,
-    /// The sender or value before; any if `None`.
-    pub(crate) from: Option<Pattern>,
-    /// The sender or value after; any if `None`.
-    pub(crate) to: Option<Pattern>,
-}
-
-worded! {
-    /// Kinds of events, as a rule names them.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub(crate) enum EventKind {
-        Added = "added",
-        Removed = "removed",
-        Restarted = "restarted",
-        Silent = "silent",
-        HandedOver = "handed_over",
-        Rate = "rate",
-        Lifecycle = "lifecycle",
-    }
+    Changes { during: During, many: Range },
 }
 
 /// A fact that is in the file, or is not.
@@ -179,8 +138,6 @@ pub(crate) struct Entry {
     node: Fact<Pattern>,
     nodes: Fact<Names>,
     topic: Fact<Pattern>,
-    when: Fact<Pairs<At<Pattern>>>,
-    expect: Fact<Pairs<At<Pattern>>>,
     changes: Fact<Range>,
 }
 
@@ -192,13 +149,16 @@ impl Entry {
     }
 
     /// The ranges of measures of messages in every window.
-    pub(crate) fn measures(&self) -> impl Iterator<Item = (&Measure, Option<At<Range>>)> {
-        let age = self.age.as_ref().map(|age| (age.at, age.value.0));
-        let bytes = self.bytes.as_ref().map(|bytes| (bytes.at, bytes.value.0));
-        let drops = self.drops.as_ref().map(|drops| (drops.at, drops.value.0));
-        let ranges = [age, bytes, drops];
-        let ranges = ranges.map(|range| range.map(|(at, value)| At { at, value }));
-        MEASURES.iter().zip(ranges)
+    pub(crate) fn measures(&self) -> impl Iterator<Item = (&Measure, Fact<Range>)> {
+        let age = self.age.map(|own| own.map(|range| range.0));
+        let bytes = self.bytes.map(|own| own.map(|range| range.0));
+        let drops = self.drops.map(|own| own.map(|range| range.0));
+        MEASURES.iter().zip([age, bytes, drops].map(Fact))
+    }
+
+    /// The times in which an element may end, unless it may at any time.
+    pub(crate) fn limit(&self) -> Fact<MayEnd> {
+        Fact(self.may_end.filter(|limit| limit.value.0 != During::WHOLE))
     }
 
     /// Whether so many of these windows may be out of range.
@@ -228,9 +188,9 @@ pub(crate) struct Policy {
     pub(crate) unexpected_topics: Unlisted,
     /// The policy for publishers of topics whose publishers are listed.
     pub(crate) unexpected_publishers: Unlisted,
-    starved: Unlisted,
-    duplicate_names: Unlisted,
-    messages_lost: Unlisted,
+    pub(crate) starved: Unlisted,
+    pub(crate) duplicate_names: Unlisted,
+    pub(crate) messages_lost: Unlisted,
 }
 
 impl Default for Policy {
@@ -243,38 +203,6 @@ impl Default for Policy {
             duplicate_names: Unlisted::Warn,
             messages_lost: Unlisted::Warn,
         }
-    }
-}
-
-/// A kind of remark in the event log that is a finding.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Remark {
-    pub(crate) title: &'static str,
-    pub(crate) kind: Kind,
-    pub(crate) finding: FindingKind,
-    pub(crate) policy: Unlisted,
-}
-
-impl Policy {
-    pub(crate) fn remarks(&self) -> [Remark; 3] {
-        let remark = |title, kind, finding, policy| Remark {
-            title,
-            kind,
-            finding,
-            policy,
-        };
-        let (starved, lost) = (self.starved, self.messages_lost);
-        let twice = FindingKind::DuplicateName;
-        [
-            remark("starved", Kind::Starved, FindingKind::Starved, starved),
-            remark(
-                "duplicate names",
-                Kind::Duplicate,
-                twice,
-                self.duplicate_names,
-            ),
-            remark("messages lost", Kind::Lost, FindingKind::MessagesLost, lost),
-        ]
     }
 }
 
@@ -478,102 +406,52 @@ fn section(pairs: Pairs<Keyed<Entry>>, known: &str) -> Result<Vec<Named>, BadYam
 }
 
 fn rule(At { at, value }: At<Keyed<Entry>>) -> Result<Rule, BadYaml> {
-    let Keyed { keys, value: entry } = value;
-    let missing = |key: &str, hint: &str| BadYaml::new(at, format!("`{key}` is missing"), hint);
-    let Some(At { value: id, .. }) = entry.id.0.clone() else {
-        return Err(missing("id", "every rule has an `id: a-name`"));
+    let Keyed {
+        keys,
+        value: mut entry,
+    } = value;
+    let Some(At { value: id, .. }) = entry.id.0.take() else {
+        let hint = "every rule has an `id: a-name`";
+        return Err(BadYaml::new(at, "`id` is missing", hint));
     };
     let has = |form: &str| keys.iter().any(|key| key.value == form);
     let Some((form, with)) = FORMS.iter().find(|(form, _)| has(form)) else {
         let hint = format!("a rule has one of {}", FORMS.map(|(key, _)| key).join(", "));
         return Err(BadYaml::new(at, "the rule has no subject", hint));
     };
-    let together = with.replace(' ', ", ");
+    let hint = format!("`{form}` can be combined with {}", with.replace(' ', ", "));
     let mut others = keys
         .iter()
-        .filter(|key| key.value != "id" && key.value != *form);
-    if let Some(key) = others
-        .clone()
-        .find(|key| !with.split(' ').any(|own| own == key.value))
-    {
+        .filter(|key| ![*form, "id"].contains(&&*key.value));
+    let is_other = |key: &&At<String>| with.split(' ').all(|own| own != key.value);
+    if let Some(key) = others.clone().find(is_other) {
         let reason = format!("`{}` cannot be combined with `{form}`", key.value);
-        let hint = format!("it can be combined with {together}");
         return Err(BadYaml::new(key.at, reason, hint));
     }
-    let is_about_element = entry.when.is_none() && entry.changes.is_none();
-    if is_about_element && others.all(|key| key.value == "during") {
-        let hint = format!("`{form}` can be combined with {together}");
-        return Err(BadYaml::new(
-            at,
-            format!("the rule `{id}` has no condition"),
-            hint,
-        ));
-    }
-    let demand = if let Some(name) = entry.node.0.clone() {
-        Demand::Nodes(vec![name], Box::new(entry))
-    } else if let Some(names) = entry.nodes.0.clone() {
-        Demand::Nodes(names.value.0, Box::new(entry))
-    } else if let Some(name) = entry.topic.0.clone() {
-        Demand::Topic(name, Box::new(entry))
-    } else if let Some(many) = &*entry.changes {
+    let demand = if let Some(many) = entry.changes.0 {
+        let during = entry.during.as_ref();
         Demand::Changes {
-            during: entry
-                .during
-                .as_ref()
-                .map_or(During::WHOLE, |during| during.value),
+            during: during.map_or(During::WHOLE, |during| during.value),
             many: many.value,
         }
+    } else if others.all(|key| key.value == "during") {
+        let reason = format!("the rule `{id}` has no condition");
+        return Err(BadYaml::new(at, reason, hint));
+    } else if let Some(name) = entry.topic.0.take() {
+        Demand::Topic(name, Box::new(entry))
     } else {
-        let hint = "write `when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`";
-        let (Some(when), Some(expect)) = (&*entry.when, &*entry.expect) else {
-            return Err(missing("expect", hint));
-        };
-        let Some(within) = &*entry.within else {
-            return Err(missing("within", hint));
-        };
-        let length = within.value.0.length();
-        let no_length = || BadYaml::new(within.at, "`within` is not a length of time", hint);
-        Demand::Reaction(Reaction {
-            when: event("when", when)?,
-            expect: event("expect", expect)?,
-            within: length.ok_or_else(no_length)?,
-        })
+        let names = entry.nodes.0.take().map(|names| names.value.0);
+        let names = entry
+            .node
+            .0
+            .take()
+            .into_iter()
+            .chain(names.into_iter().flatten());
+        Demand::Nodes(names.collect(), Box::new(entry))
     };
     Ok(Rule { id, at, demand })
 }
 
-fn event(key: &str, part: &At<Pairs<At<Pattern>>>) -> Result<ExpectedEvent, BadYaml> {
-    let words = EventKind::ALL.map(EventKind::word);
-    let (mut kinds, mut from, mut to) = (Vec::new(), None, None);
-    for (word, name) in &part.value.0 {
-        match (word.value.as_str(), EventKind::from_word(&word.value)) {
-            (_, Some(kind)) => kinds.push((kind, &name.value)),
-            ("from", _) => from = Some(name),
-            ("to", _) => to = Some(name),
-            (word_, _) => {
-                let known = [&words[..], &["from", "to"]].concat();
-                return Err(BadYaml::unknown_key(word.at, word_, &known));
-            }
-        }
-    }
-    let [(kind, name)] = kinds[..] else {
-        let reason = format!("`{key}` does not name one event");
-        let hint = format!("it has one of {}", words.join(", "));
-        return Err(BadYaml::new(part.at, reason, hint));
-    };
-    let has_ends = matches!(kind, EventKind::HandedOver | EventKind::Lifecycle);
-    if let Some(end) = from.or(to).filter(|_| !has_ends) {
-        let reason = format!("`{}` has no `from` and no `to`", kind.word());
-        let hint = "only `handed_over` and `lifecycle` have one";
-        return Err(BadYaml::new(end.at, reason, hint));
-    }
-    Ok(ExpectedEvent {
-        kind,
-        name: name.clone(),
-        from: from.map(|from| from.value.clone()),
-        to: to.map(|to| to.value.clone()),
-    })
-}
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -594,13 +472,12 @@ mod tests {
              topics:\n  /scan: {type: sensor_msgs/LaserScan, by: [/a], to: [/b], hz: 13.5..16.5, percent: 95, max_gap: 0.5s}\n\
              \x20 /map: {latched: true, hz: 1.., during: 5s..}\n\
              rules:\n  - {id: up, nodes: [/a, /b], within: ..20s}\n  - {id: drive, topic: /scan, hz: 10.., during: -30s..}\n\
-             \x20 - {id: safe, when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s}\n\
              \x20 - {id: flap, node: /nav/*, restarts: ..1}\n  - {id: quiet, during: -30s.., changes: ..0}\n",
         )
         .unwrap();
         assert_eq!(
             (all.nodes.len(), all.topics.len(), all.rules.len()),
-            (4, 2, 5)
+            (4, 2, 4)
         );
         assert_eq!(all.policy.value.unexpected_nodes, Unlisted::Warn);
         assert_eq!(all.policy.value.starved, Unlisted::Warn);
@@ -650,10 +527,6 @@ mod tests {
                 "two rules have the id `x`",
             ),
             (
-                "rules:\n  - {id: x, when: {removed: /a, to: /b}, expect: {added: /b}, within: 1}",
-                "has no `from`",
-            ),
-            (
                 "topics:\n  /s: {by: [/a, [/b]]}",
                 "line 3, column 17: this is not a string",
             ),
@@ -674,14 +547,6 @@ mod tests {
                 "line 3, column 18: `optional: maybe` is not valid",
             ),
             ("rules: 5", "line 2, column 8: `rules` is not a list"),
-            (
-                "rules:\n  - {id: x, when: {remvoed: /a}, expect: {added: /b}, within: 1}",
-                "unknown key `remvoed`; the nearest is `removed`",
-            ),
-            (
-                "rules:\n  - {id: x, when: {removed: /a}, expect: {added: /b}, within: 1..2}",
-                "line 3, column 69: `within` is not a length of time",
-            ),
             (
                 "policy: {unexpected_nodes: deny}",
                 "`unexpected_nodes: deny` is not valid",

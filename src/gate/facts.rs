@@ -12,7 +12,7 @@ use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::Bound;
+use crate::graph::history::{Bound, Sending};
 use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, Row, State, Topic, TopicId};
 use crate::mission::event_log::{Event, Kind};
 use crate::mission::{Mission, Window};
@@ -30,14 +30,14 @@ pub(crate) struct Facts<'a> {
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The role of each of them.
     names: BTreeMap<&'a str, &'a str>,
-    topics: BTreeMap<&'a str, TopicId>,
     /// The publications and the subscriptions of each topic.
     edges: [ById<TopicId, Vec<EdgeId>>; 2],
 }
 
-/// A role and its nodes.
-#[derive(Clone, Copy, Debug)]
+/// A role of a mission and its nodes.
+#[derive(Clone, Copy)]
 pub(crate) struct Role<'a> {
+    pub(crate) facts: &'a Facts<'a>,
     pub(crate) name: &'a str,
     pub(crate) nodes: &'a [NodeId],
 }
@@ -55,13 +55,6 @@ impl Peer {
     pub(crate) fn is_sure(&self) -> bool {
         self.confidence <= Confidence::Stated
     }
-}
-
-/// A node of one of several missions.
-#[derive(Clone, Copy)]
-pub(crate) struct NodeIn<'a> {
-    pub(crate) facts: &'a Facts<'a>,
-    pub(crate) nodes: &'a [NodeId],
 }
 
 /// A topic of one of several missions.
@@ -187,9 +180,10 @@ impl<'a> Facts<'a> {
         let confidences = mission.graphs.confidences(elements);
         let is_there = |id| confidences.of(Element::Node(id)) < Some(&Confidence::Declared);
         let count = |id| messages(mission, Element::Topic(id));
-        let topics = elements.topics.with_ids();
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
         let mut names = BTreeMap::new();
+        let mut notices = mission.notices.iter();
+        let is_rewritten = notices.any(|notice| notice.kind == NoticeKind::Rewritten);
         for (id, node) in elements.nodes.with_ids() {
             // Elements in no window are outside the part that is checked.
             if is_there(id) && is_seen(node.seen.evidence) {
@@ -201,15 +195,9 @@ impl<'a> Facts<'a> {
             mission,
             confidences,
             messages: elements.topics.ids().map(count).collect(),
-            is_rewritten: mission
-                .notices
-                .iter()
-                .any(|n| n.kind == NoticeKind::Rewritten),
+            is_rewritten,
             roles,
             names,
-            topics: topics
-                .map(|(id, topic)| (topic.name.as_str(), id))
-                .collect(),
             edges: [&elements.publishes, &elements.subscribes]
                 .map(|edges| by_topic(edges, &elements.topics)),
         }
@@ -217,8 +205,17 @@ impl<'a> Facts<'a> {
 
     /// The present roles.
     pub(crate) fn roles(&self) -> impl Iterator<Item = Role<'_>> {
-        let roles = self.roles.iter();
-        roles.map(|(name, nodes)| Role { name, nodes })
+        self.roles
+            .iter()
+            .map(|(name, nodes)| self.role_of(name, nodes))
+    }
+
+    fn role_of<'s>(&'s self, name: &'s str, nodes: &'s [NodeId]) -> Role<'s> {
+        Role {
+            facts: self,
+            name,
+            nodes,
+        }
     }
 
     /// The roles that a pattern matches; a node name matches its role too.
@@ -230,7 +227,9 @@ impl<'a> Facts<'a> {
             let found = roles
                 .into_iter()
                 .filter_map(|role| self.roles.get_key_value(role));
-            return found.map(|(name, nodes)| Role { name, nodes }).collect();
+            return found
+                .map(|(name, nodes)| self.role_of(name, nodes))
+                .collect();
         }
         let fits = |role: &Role<'_>| {
             pattern.matches(role.name)
@@ -247,7 +246,7 @@ impl<'a> Facts<'a> {
     /// The present topics that a pattern matches.
     pub(crate) fn topics(&self, pattern: &Pattern) -> Vec<TopicId> {
         if pattern.is_name() {
-            let own = self.topics.get(pattern.as_str()).copied();
+            let own = self.mission.elements.topic(pattern.as_str());
             return own.into_iter().filter(|id| self.is_there(*id)).collect();
         }
         let topics = self.mission.elements.topics.with_ids();
@@ -402,18 +401,15 @@ impl<'a> Facts<'a> {
         for id in nodes {
             let runs = &self.mission.elements.seen(Element::Node(*id)).lives;
             if runs.is_empty() {
-                all.extend(self.windows_of(*id));
+                // A mission without finer times.
+                let rows = self.mission.graphs.rows(Element::Node(*id));
+                let windows = rows.filter_map(|(at, _)| self.mission.windows.get(at));
+                all.extend(windows.map(|window| window.span));
             } else {
                 all.extend(runs);
             }
         }
         Span::joined(all, 0)
-    }
-
-    /// The windows that contain a node, for a mission without finer times.
-    fn windows_of(&self, node: NodeId) -> impl Iterator<Item = Span> + use<'a> {
-        let rows = self.mission.graphs.rows(Element::Node(node));
-        rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
     /// The time in which a node published a topic, if known, and the number of its messages.
@@ -517,10 +513,7 @@ impl<'a> Facts<'a> {
 
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
     pub(crate) fn received(&self, topic: TopicId) -> Option<Span> {
-        let of = self.mission.sending.of_topic(topic).iter();
-        let stretches = of.flat_map(|sender| &sender.stretches);
-        let first = stretches.clone().map(|s| s.first).min()?;
-        let last = stretches.map(|s| s.last).max()?;
+        let (first, last) = Sending::bounds(self.mission.sending.of_topic(topic).iter())?;
         Some(Span::new(first, last.plus(1)))
     }
 
@@ -543,6 +536,7 @@ impl<'a> Facts<'a> {
         let (mut all, mut first) = (Vec::new(), None);
         for window in &self.mission.windows {
             let row = rows.next_if(|(own, _)| own.index == window.index);
+            let row = row.as_ref().map(|(_, row)| row);
             let inside = during.start <= window.span.start && window.span.end <= during.end;
             // A window cut by the mission's end has a rate if it is long enough, or the topic was even until then.
             let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
@@ -553,8 +547,8 @@ impl<'a> Facts<'a> {
             let rate = |span| Rate {
                 window: window.index,
                 span,
-                count: row.as_ref().map_or(0, |(_, row)| count(row)),
-                median_s: row.as_ref().and_then(|(_, row)| row.median.value()),
+                count: row.and_then(|row| row.count).unwrap_or(0),
+                median_s: row.and_then(|row| row.median.value()),
             };
             if let Some(span) = self.counted(window.span, received, may_end) {
                 all.push(rate(span));
@@ -618,7 +612,7 @@ impl<'a> Facts<'a> {
             if let (true, Some(gap)) = (inside, row.gap.value()) {
                 all.push(TopicSilence {
                     span: window.span,
-                    nanos: nanos(gap),
+                    nanos: cast::to_i64(libm::round(gap * 1e9)),
                 });
             }
         }
@@ -755,13 +749,4 @@ fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
     let span = Span::new(gap.start.max(during.start), gap.end.min(during.end));
     let nanos = span.end.since(span.start);
     (nanos > 0).then_some(TopicSilence { span, nanos })
-}
-
-fn count(row: &Row) -> u64 {
-    row.count.unwrap_or(0)
-}
-
-/// Seconds in nanoseconds, saturating.
-fn nanos(seconds: f64) -> i64 {
-    cast::to_i64(libm::round(seconds * 1e9))
 }

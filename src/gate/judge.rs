@@ -1,19 +1,19 @@
-//! Checks a mission against an expectation: every fact of the file separately.
+//! Checks a mission against an expectation: every fact and rule of the file separately, then what is not in the file.
 
 mod node;
-mod rule;
 mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{At, Demand, Entry, Expectation, Named, Remark, Unlisted, YamlPlace};
+use super::expectation::{At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, YamlPlace};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, FindingKind, Severity, number};
-use super::values::{NamePatterns, Pattern};
+use super::values::{During, NamePatterns, Pattern, Range};
 use crate::base::nearest::nearest;
 use crate::base::time::Span;
-use crate::base::words::{visible, worded};
+use crate::base::words::{self, visible, worded};
 use crate::mission::Mission;
+use crate::mission::event_log::Kind;
 use crate::mission::events::sentence;
 
 /// One checked fact of an expectations file.
@@ -173,6 +173,8 @@ const TOPICS: Section = Section {
     facts: |judge, title, name, entry| judge.topic_facts(title, name, entry),
 };
 
+/// The number of events that are written out.
+const MOST_LISTED: usize = 6;
 /// The number of names that are reported in one line.
 const NAMED: usize = 6;
 
@@ -184,8 +186,7 @@ impl Judge<'_> {
     fn near<'k>(&self, pattern: &Pattern, known: impl Iterator<Item = &'k str>) -> Option<String> {
         self.searched.set(self.searched.get() + 1);
         let near = (self.searched.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
-        let text = format!("the nearest name in the bag is `{}`", near??);
-        Some(visible(&text).into_owned())
+        Some(format!("the nearest name in the bag is `{}`", near??))
     }
 
     /// Checks an element of the file.
@@ -227,13 +228,13 @@ impl Judge<'_> {
         &mut self,
         subjects: &Subjects<'_, S>,
         key: &str,
-        wanted: Option<&At<T>>,
+        wanted: &Fact<T>,
         is_moot: bool,
-        found: impl Fn(&Self, S, &At<T>) -> F,
+        found: impl Fn(&Self, S, &Entry, &At<T>) -> F,
     ) {
-        let Some(wanted) = wanted else { return };
+        let Some(wanted) = &**wanted else { return };
         let all = subjects.all.iter().filter(|_| !is_moot);
-        let findings = all.flat_map(|subject| found(self, *subject, wanted));
+        let findings = all.flat_map(|subject| found(self, *subject, subjects.entry, wanted));
         let check = CheckedFact {
             title: format!("{} {key}", subjects.title),
             place: wanted.at,
@@ -241,6 +242,90 @@ impl Judge<'_> {
             is_moot,
         };
         self.checks.push(check);
+    }
+
+    /// Checks a rule.
+    fn rule(&mut self, rule: &Rule) {
+        let before = self.checks.len();
+        match &rule.demand {
+            Demand::Nodes(names, entry) => {
+                for name in names {
+                    self.node_rule(rule, name, entry);
+                }
+            }
+            Demand::Topic(name, entry) => self.topic_rule(rule, name, entry),
+            Demand::Changes { during, many } => {
+                let found = self.changes(rule.at, *during, *many);
+                self.note(&rule.id, rule.at, found.into_iter().collect());
+            }
+        }
+        let detail = format!("rule {}", words::visible(&rule.id));
+        for finding in self.found_since(before) {
+            finding.details.push(detail.clone());
+        }
+    }
+
+    fn node_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
+        let title = format!("{}: {}", rule.id, name.value);
+        // A deadline implies presence.
+        let within = entry.within.as_ref();
+        let found = if entry.forbidden {
+            self.forbidden_nodes(&name.value, name.at)
+        } else if let Some(within) = within.filter(|_| self.facts.nodes(&name.value).is_empty()) {
+            if within.value.0.is_beyond(self.facts.mission.span) {
+                vec![self.too_short(name)]
+            } else {
+                self.node_presence(&name.value, name.at, &Entry::default())
+            }
+        } else {
+            return self.node_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
+    }
+
+    /// The finding that the mission ended before a node had to be present.
+    fn too_short(&self, name: &At<Pattern>) -> Finding {
+        let (name, at) = (name.value.as_str(), name.at);
+        let long = words::duration(self.facts.mission.span.nanos());
+        let text = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
+        Finding::unknown(FindingKind::NodeLate, name, at, text)
+    }
+
+    fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
+        let title = format!("{}: {}", rule.id, name.value);
+        let topics = self.facts.topics(&name.value);
+        let found = if entry.forbidden {
+            self.forbidden_topics(&name.value, name.at)
+        } else if topics.is_empty() || self.is_owed(entry) && !self.is_sent(&topics) {
+            self.topic_presence(&name.value, name.at, entry)
+        } else {
+            return self.topic_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
+    }
+
+    fn changes(&self, at: YamlPlace, during: During, many: Range) -> Option<Finding> {
+        let span = during.on(self.facts.mission.span);
+        let headlines = self.facts.mission.log.headlines(span);
+        let events: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
+        if many.holds(events.len() as f64) {
+            return None;
+        }
+        let seen = words::count(events.len(), "reconfiguration");
+        let [from, to] = [span.start, span.end].map(|time| self.facts.clock(time));
+        let text = format!("{seen} from {from} to {to}, expected {many}");
+        let parts = self.facts.mission.log.all_parts();
+        let listed = events.iter().take(MOST_LISTED).map(|(id, event)| {
+            let text = sentence(self.facts.mission, &parts, *id, event);
+            format!("{}  {text}", self.facts.clock(event.time))
+        });
+        let rest = events.len().saturating_sub(MOST_LISTED);
+        let rest = (rest > 0).then(|| format!("and {rest} more"));
+        let finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, text)
+            .saw(events.len(), words::count_range(many.from, many.to))
+            .at(span)
+            .details(listed.chain(rest));
+        Some(finding)
     }
 
     /// Checks the elements that are not in the file, and the remarks of the event log.
@@ -254,29 +339,42 @@ impl Judge<'_> {
             let found = self.strange_topics(severity);
             self.note("unexpected topics", at, found);
         }
-        for remark in policy.remarks() {
-            let found = self.remarks(&remark);
-            if !found.is_empty() {
-                self.note(remark.title, at, found);
+        let (starved, duplicates) = (policy.starved, policy.duplicate_names);
+        for (title, kind, finding, unlisted) in [
+            ("starved", Kind::Starved, FindingKind::Starved, starved),
+            (
+                "duplicate names",
+                Kind::Duplicate,
+                FindingKind::DuplicateName,
+                duplicates,
+            ),
+            (
+                "messages lost",
+                Kind::Lost,
+                FindingKind::MessagesLost,
+                policy.messages_lost,
+            ),
+        ] {
+            let severity = unlisted.severity();
+            let found = severity.map(|severity| self.remarks(kind, finding, severity));
+            if let Some(found) = found.filter(|found| !found.is_empty()) {
+                self.note(title, at, found);
             }
         }
     }
 
     /// The findings of one kind of remark in the event log.
-    fn remarks(&self, remark: &Remark) -> Vec<Finding> {
-        let Some(severity) = remark.policy.severity() else {
-            return Vec::new();
-        };
+    fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
         let mission = self.facts.mission;
         let parts = mission.log.all_parts();
         let own = mission.log.events.with_ids();
-        let own = own.filter(|(_, event)| event.kind == remark.kind && !event.quiet);
+        let own = own.filter(|(_, event)| event.kind == kind && !event.quiet);
         let found = own.map(|(id, event)| {
             let (node, topic) = mission.elements.names(event.what);
             let text = sentence(mission, &parts, id, event);
             let name = topic.or(node).unwrap_or_default();
             let until = event.until.unwrap_or(event.time).plus(1);
-            Finding::new(remark.finding, name, self.expectation.policy.at, text)
+            Finding::new(finding, name, self.expectation.policy.at, text)
                 .severe(severity)
                 .at(Span::new(event.time, until))
         });
@@ -337,10 +435,11 @@ impl Judge<'_> {
     }
 }
 
-/// Nodes or topics that are checked, and the beginning of the titles of their facts.
+/// Nodes or topics that are checked, what is expected of them, and the beginning of the titles of their facts.
 struct Subjects<'a, S> {
     title: &'a str,
     all: &'a [S],
+    entry: &'a Entry,
 }
 
 /// The absence of a node as a cause of findings.

@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 use super::finding::{Finding, FindingKind, KINDS, Severity};
 use super::judge::Verdict;
 use crate::base::columns::hang;
+use crate::base::error::{Error, Result};
+use crate::base::nearest::suggestion;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
 
@@ -168,12 +170,23 @@ fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
-/// The meaning of a kind of finding, for `--explain`, in lines of at most `width` characters; `None` for an unknown
-/// word.
-pub(crate) fn explain(word: &str, width: usize) -> Option<String> {
-    let (_, word, meaning, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
-    let [meaning, more] = [meaning, more].map(|text| hang("", text, 0, Some(width)));
-    Some(format!("{word}\n\n{meaning}\n{more}"))
+/// The meaning of a kind of finding, for `--explain`, in lines of at most `width` characters.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown word.
+pub(crate) fn explain(word: &str, width: usize) -> Result<String> {
+    let words = || KINDS.iter().map(|row| row.word);
+    let Some(kind) = FindingKind::from_word(word) else {
+        let near = suggestion(word, words());
+        let all: Vec<&str> = words().collect();
+        return Err(Error::usage(
+            format!("unknown kind of finding `{word}`{near}"),
+            format!("choose one of {}", all.join(", ")),
+        ));
+    };
+    let row = kind.row();
+    let [meaning, more] = [row.meaning, row.more].map(|text| hang("", text, 0, Some(width)));
+    Ok(format!("{word}\n\n{meaning}\n{more}"))
 }
 
 /// Findings with one cause, or one without.
@@ -205,12 +218,4 @@ fn grouped<'a>(findings: &[&'a Finding]) -> Vec<Group<'a>> {
         }
     }
     groups
-}
-
-/// The distinct kinds found, in order.
-fn kinds(findings: &[&Finding]) -> Vec<FindingKind> {
-    let mut kinds: Vec<FindingKind> = findings.iter().map(|f| f.kind).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    kinds
 }

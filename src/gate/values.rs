@@ -218,14 +218,6 @@ impl During {
         is_ordered.then_some(Self { from, to })
     }
 
-    /// Its length if it is the first part of a mission: that of `..20s`.
-    pub(crate) fn length(&self) -> Option<i64> {
-        match (self.from, self.to) {
-            (None, Some(Moment::AfterStart(nanos))) => Some(nanos),
-            _ => None,
-        }
-    }
-
     /// The time range in a mission, clipped to its time.
     pub(crate) fn on(&self, mission: Span) -> Span {
         let start = self.from.map_or(mission.start, |m| m.on(mission));

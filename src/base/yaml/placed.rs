@@ -19,6 +19,15 @@ pub(crate) struct At<T> {
     pub(crate) value: T,
 }
 
+impl<T> At<T> {
+    pub(crate) fn map<U>(self, value: impl FnOnce(T) -> U) -> At<U> {
+        At {
+            at: self.at,
+            value: value(self.value),
+        }
+    }
+}
+
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let part = Spanned::<T>::deserialize(deserializer)?;

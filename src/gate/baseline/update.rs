@@ -61,7 +61,8 @@ pub(crate) fn update(text: &str, path: &Path, runs: Runs<'_>, only: &[String]) -
         .filter_map(|f| Some((f.accept.as_deref()?, f)));
     let wanted = named.filter(|(name, finding)| {
         let is_meant = |o: &String| o == name || *o == finding.name;
-        (only.is_empty() || only.iter().any(is_meant)) && seen.insert((*name, fact(finding.kind)))
+        (only.is_empty() || only.iter().any(is_meant))
+            && seen.insert((*name, finding.kind.row().key))
     });
     let wanted: Vec<(&str, &Finding)> = wanted.collect();
     if wanted.len() > MOST {
@@ -131,23 +132,6 @@ fn broken(expectation: &Expectation, runs: Runs<'_>) -> Vec<Finding> {
         .collect()
 }
 
-/// The key that a finding is about; empty for the element itself.
-fn fact(kind: FindingKind) -> &'static str {
-    match kind {
-        FindingKind::NodeGone | FindingKind::TopicGone => "may_end",
-        FindingKind::NodeLate | FindingKind::TopicLate => "within",
-        FindingKind::NodeRestarted => "restarts",
-        FindingKind::NodeLifecycle => "lifecycle",
-        FindingKind::TopicType => "type",
-        FindingKind::TopicQos => "qos",
-        FindingKind::TopicRateLow | FindingKind::TopicRateHigh => "hz",
-        FindingKind::TopicGap => "max_gap",
-        FindingKind::PublisherMissing | FindingKind::PublisherUnexpected => "by",
-        FindingKind::SubscriberMissing => "to",
-        _ => "",
-    }
-}
-
 /// An update in progress.
 struct Work<'a> {
     text: EditedText,
@@ -159,7 +143,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Rewrites the fact that a finding is about; `name` is the entry's.
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
-        let key = fact(finding.kind);
+        let key = finding.kind.row().key;
         let (section, lines) = if finding.kind.is_about_node() {
             ("nodes", &self.draft.nodes)
         } else {

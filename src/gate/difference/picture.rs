@@ -59,21 +59,8 @@ struct TopicSeen {
     hz: Option<f64>,
 }
 
-/// The ends of an edge in its direction.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct EdgeNames {
-    from: String,
-    to: String,
-}
-
-impl EdgeNames {
-    fn new(from: &str, to: &str) -> Self {
-        Self {
-            from: from.to_owned(),
-            to: to.to_owned(),
-        }
-    }
-}
+/// The names of an edge's ends in its direction.
+type EdgeNames = [String; 2];
 
 impl MissionSide {
     fn of(mission: &Mission) -> Self {
@@ -108,7 +95,7 @@ impl MissionSide {
             };
             let name = facts.topic(id);
             for peer in facts.publishers(id) {
-                let key = EdgeNames::new(facts.role(peer.node), name);
+                let key = [facts.role(peer.node), name].map(str::to_owned);
                 let edge = Seen {
                     confidence: peer.confidence,
                     evidence: elements.publishes[peer.edge].seen.evidence,
@@ -116,7 +103,7 @@ impl MissionSide {
                 seen.publishes.insert(key, edge);
             }
             for peer in facts.subscribers(id) {
-                let key = EdgeNames::new(name, facts.role(peer.node));
+                let key = [name, facts.role(peer.node)].map(str::to_owned);
                 let edge = Seen {
                     confidence: peer.confidence,
                     evidence: elements.subscribes[peer.edge].seen.evidence,
@@ -127,8 +114,9 @@ impl MissionSide {
         }
         let nodes = &seen.nodes;
         seen.publishes
-            .retain(|key, _| nodes.contains_key(&key.from));
-        seen.subscribes.retain(|key, _| nodes.contains_key(&key.to));
+            .retain(|[node, _], _| nodes.contains_key(node));
+        seen.subscribes
+            .retain(|[_, node], _| nodes.contains_key(node));
         seen
     }
 }
@@ -225,9 +213,9 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         })
     };
     let publishes = both(&a.publishes, &b.publishes).into_iter();
-    let publishes = publishes.filter_map(|(key, e)| edge(&key.from, &key.to, e));
+    let publishes = publishes.filter_map(|([node, topic], e)| edge(node, topic, e));
     let subscribes = both(&a.subscribes, &b.subscribes).into_iter();
-    let subscribes = subscribes.filter_map(|(key, e)| edge(&key.to, &key.from, e));
+    let subscribes = subscribes.filter_map(|([topic, node], e)| edge(node, topic, e));
     Elements {
         publishes: publishes.collect(),
         subscribes: subscribes.collect(),
@@ -261,8 +249,8 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
                     ..ElementState::new(what, State::default(), Confidence::default())
                 });
             }
-            Element::Publish(_) => seen.publishes.get(&EdgeNames::new(node?, topic?)),
-            Element::Subscribe(_) => seen.subscribes.get(&EdgeNames::new(topic?, node?)),
+            Element::Publish(_) => seen.publishes.get(&[node?, topic?].map(str::to_owned)),
+            Element::Subscribe(_) => seen.subscribes.get(&[topic?, node?].map(str::to_owned)),
         };
         let confidence = known?.confidence;
         Some(ElementState::new(what, State::default(), confidence))

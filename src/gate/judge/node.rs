@@ -7,14 +7,8 @@ use crate::base::words;
 use crate::gate::expectation::{At, Entry, MayEnd, Within, YamlPlace};
 use crate::gate::facts::Role;
 use crate::gate::finding::{Cause, Finding, FindingKind};
-use crate::gate::values::{During, Pattern, Range};
-use crate::mission::event_log::Kind;
-
-/// The times in which an element may end; `None` for any time.
-pub(super) fn limited(entry: &Entry) -> Option<&At<MayEnd>> {
-    let may_end = entry.may_end.as_ref();
-    may_end.filter(|may_end| may_end.value.0 != During::WHOLE)
-}
+use crate::gate::values::{Pattern, Range};
+use crate::mission::event_log::{Event, Kind};
 
 impl Judge<'_> {
     /// Checks the facts of a node other than its presence. `title` begins the titles of the facts.
@@ -23,15 +17,20 @@ impl Judge<'_> {
         let all = &Subjects {
             title,
             all: &facts.nodes(pattern),
+            entry,
         };
         let is_absent = all.all.is_empty();
         let is_untimed = is_absent || self.is_part;
-        let within = entry.within.as_ref();
-        self.check(all, "within", within, is_untimed, Self::late);
-        self.check(all, "may_end", limited(entry), is_untimed, Self::ended);
-        let (restarts, lifecycle) = (entry.restarts.as_ref(), entry.lifecycle.as_ref());
-        self.check(all, "restarts", restarts, is_absent, Self::restarted);
-        self.check(all, "lifecycle", lifecycle, is_absent, Self::lifecycle);
+        self.check(all, "within", &entry.within, is_untimed, Self::late);
+        self.check(all, "may_end", &entry.limit(), is_untimed, Self::ended);
+        self.check(all, "restarts", &entry.restarts, is_absent, Self::restarted);
+        self.check(
+            all,
+            "lifecycle",
+            &entry.lifecycle,
+            is_absent,
+            Self::lifecycle,
+        );
     }
 
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
@@ -44,7 +43,7 @@ impl Judge<'_> {
             let finding = Finding::new(FindingKind::NodeForbidden, role.name, at, text);
             let finding = finding.saw("present", "absent");
             match self.facts.lives(role.nodes).first() {
-                Some(life) => finding.at(*life).detail(self.facts.stretch(*life)),
+                Some(life) => finding.at(*life).details([self.facts.stretch(*life)]),
                 None => finding,
             }
         });
@@ -106,7 +105,7 @@ impl Judge<'_> {
             )
         };
         let text = format!("cannot tell whether {name} is present: {why}");
-        Finding::unknown(kind, name, at, text).hint(hint)
+        Finding::unknown(kind, name, at, text).hints([hint])
     }
 
     /// The finding that a node is named, but none of the topics that only it publishes has messages.
@@ -131,16 +130,14 @@ impl Judge<'_> {
     fn missing(&self, pattern: &Pattern, at: YamlPlace) -> Finding {
         let name = pattern.as_str();
         let text = format!("{name} is not in the bag");
-        let finding = Finding::new(FindingKind::NodeMissing, name, at, text);
-        let mut finding = finding.saw("absent", "present");
-        finding.cause = Some(absence(name));
-        let near = self.near(pattern, self.facts.roles().map(|role| role.name));
-        finding.help.extend(near);
-        finding
+        Finding::new(FindingKind::NodeMissing, name, at, text)
+            .saw("absent", "present")
+            .because(Some(absence(name)))
+            .hints(self.near(pattern, self.facts.roles().map(|role| role.name)))
     }
 
     /// The finding on whether a node ended in the time in which it may.
-    fn ended(&self, role: Role<'_>, may_end: &At<MayEnd>) -> Option<Finding> {
+    fn ended(&self, role: Role<'_>, _: &Entry, may_end: &At<MayEnd>) -> Option<Finding> {
         let allowed = may_end.value.0.on(self.facts.mission.span);
         let end = self.facts.ended(role.nodes, CLOSING_NS)?.time;
         let expected = format!("to end within {}", self.facts.stretch(allowed));
@@ -161,17 +158,17 @@ impl Judge<'_> {
         }
         let text = format!("{name} ended at {clock}, expected {expected}");
         let rest = words::duration(whole.end.since(end));
-        let mut finding = Finding::new(kind, name, at, text)
-            .saw(format!("ended at {clock}"), expected)
-            .at(Span::new(end, whole.end))
-            .detail(format!("{rest} before the end of the mission"));
         let around = Span::new(end.plus(-CLOSING_NS), end.plus(CLOSING_NS));
         let nodes = role.nodes.iter().copied().collect();
-        finding.cause = self.facts.cause(&nodes, around);
+        let finding = Finding::new(kind, name, at, text)
+            .saw(format!("ended at {clock}"), expected)
+            .at(Span::new(end, whole.end))
+            .details([format!("{rest} before the end of the mission")])
+            .because(self.facts.cause(&nodes, around));
         Some(finding)
     }
 
-    fn late(&self, role: Role<'_>, within: &At<Within>) -> Option<Finding> {
+    fn late(&self, role: Role<'_>, _: &Entry, within: &At<Within>) -> Option<Finding> {
         let (kind, name, at) = (FindingKind::NodeLate, role.name, within.at);
         let whole = self.facts.mission.span;
         let allowed = within.value.0.on(whole);
@@ -195,7 +192,7 @@ impl Judge<'_> {
         Some(finding.at(Span::new(whole.start, began.time)))
     }
 
-    fn restarted(&self, role: Role<'_>, range: &At<Range>) -> Option<Finding> {
+    fn restarted(&self, role: Role<'_>, _: &Entry, range: &At<Range>) -> Option<Finding> {
         let events = self.facts.events(role.nodes, Kind::Restarted);
         let At { at, value: range } = *range;
         if range.holds(events.len() as f64) {
@@ -204,25 +201,25 @@ impl Judge<'_> {
         let name = role.name;
         let many = words::count(events.len(), "time");
         let text = format!("{name} restarted {many}, expected {range}");
-        let mut finding = Finding::new(FindingKind::NodeRestarted, name, at, text)
-            .saw(&many, words::count_range(range.from, range.to));
-        for event in events.iter().take(6) {
+        let details = events.iter().take(6).map(|event| {
             let until = event.until.unwrap_or(event.time);
             let away = words::duration(until.since(event.time).max(0));
-            let text = format!("at {}, away for {away}", self.facts.clock(event.time));
-            finding = finding.detail(text);
-        }
-        if let Some(first) = events.first() {
-            finding.cause = Some(Cause {
-                time: Some(first.time),
-                text: format!("{name} restarted at {}", self.facts.clock(first.time)),
-            });
-            finding.when = Some(Span::new(first.time, first.until.unwrap_or(first.time)));
-        }
+            format!("at {}, away for {away}", self.facts.clock(event.time))
+        });
+        let cause = events.first().map(|first| Cause {
+            time: Some(first.time),
+            text: format!("{name} restarted at {}", self.facts.clock(first.time)),
+        });
+        let mut finding = Finding::new(FindingKind::NodeRestarted, name, at, text)
+            .saw(&many, words::count_range(range.from, range.to))
+            .details(details)
+            .because(cause);
+        let when = |first: &&Event| Span::new(first.time, first.until.unwrap_or(first.time));
+        finding.when = events.first().map(when);
         Some(finding)
     }
 
-    fn lifecycle(&self, role: Role<'_>, state: &At<String>) -> Option<Finding> {
+    fn lifecycle(&self, role: Role<'_>, _: &Entry, state: &At<String>) -> Option<Finding> {
         let (kind, name, at) = (FindingKind::NodeLifecycle, role.name, state.at);
         let expected = state.value.as_str();
         let Some(seen) = self.facts.lifecycle(role.nodes) else {
@@ -230,7 +227,7 @@ impl Judge<'_> {
                 "cannot tell whether {name} is {expected}: this bag has no transition of it"
             );
             let hint = format!("record {name}/transition_event");
-            return Some(Finding::unknown(kind, name, at, text).hint(hint));
+            return Some(Finding::unknown(kind, name, at, text).hints([hint]));
         };
         let text = format!("{name} ends {seen}, expected {expected}");
         let finding = Finding::new(kind, name, at, text).saw(seen, expected);

@@ -1,6 +1,5 @@
 //! Checks of topics: presence, type, publishers, subscribers, quality of service; rates, gaps and measures in every whole window.
 
-use super::node::limited;
 use super::{Judge, NAMED, Subjects, absence};
 use crate::base::name::plain_type;
 use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
@@ -28,41 +27,23 @@ impl Judge<'_> {
         let all = &Subjects {
             title,
             all: &topics,
+            entry,
         };
-        self.check(all, "type", entry.kinds.as_ref(), is_absent, Self::kind);
-        self.check(all, "by", entry.by.as_ref(), is_absent, Self::by);
-        self.check(all, "to", entry.to.as_ref(), is_absent, Self::to);
-        let within = entry.within.as_ref();
-        self.check(all, "within", within, is_untimed, |own, topic, within| {
-            own.first(topic, entry, within)
-        });
-        let may_end = limited(entry);
-        self.check(
-            all,
-            "may_end",
-            may_end,
-            is_untimed,
-            |own, topic, may_end| own.last(topic, entry, may_end),
-        );
-        self.check(all, "hz", entry.hz.as_ref(), is_unsent, |own, topic, hz| {
-            own.rate(topic, entry, hz)
-        });
-        let mean_hz = entry.mean_hz.as_ref();
-        self.check(all, "mean_hz", mean_hz, is_untimed, |own, topic, hz| {
-            own.mean(topic, entry, hz)
-        });
-        let max_gap = entry.max_gap.as_ref();
-        self.check(all, "max_gap", max_gap, is_unsent, |own, topic, most| {
-            own.gap(topic, entry, most)
-        });
-        let latched = entry.latched.as_ref();
-        self.check(all, "latched", latched, is_absent, Self::latched);
-        self.check(all, "qos", entry.qos.as_ref(), is_absent, Self::qos);
+        self.check(all, "type", &entry.kinds, is_absent, Self::kind);
+        self.check(all, "by", &entry.by, is_absent, Self::by);
+        self.check(all, "to", &entry.to, is_absent, Self::to);
+        self.check(all, "within", &entry.within, is_untimed, Self::first);
+        self.check(all, "may_end", &entry.limit(), is_untimed, Self::last);
+        self.check(all, "hz", &entry.hz, is_unsent, Self::rate);
+        self.check(all, "mean_hz", &entry.mean_hz, is_untimed, Self::mean);
+        self.check(all, "max_gap", &entry.max_gap, is_unsent, Self::gap);
+        self.check(all, "latched", &entry.latched, is_absent, Self::latched);
+        self.check(all, "qos", &entry.qos, is_absent, Self::qos);
         for (measure, range) in entry.measures() {
-            let range = range.as_ref();
-            self.check(all, measure.key, range, is_unsent, |own, topic, range| {
-                own.measured(topic, measure, range, entry)
-            });
+            let found = |own: &Self, topic, entry: &Entry, range: &At<Range>| {
+                own.measured(topic, entry, range, measure)
+            };
+            self.check(all, measure.key, &range, is_unsent, found);
         }
     }
 
@@ -73,7 +54,7 @@ impl Judge<'_> {
             let many = usize::try_from(self.facts.messages(topic)).unwrap_or(usize::MAX);
             Finding::new(FindingKind::TopicForbidden, name, at, text)
                 .saw("present", "absent")
-                .detail(words::count(many, "message"))
+                .details([words::count(many, "message")])
         });
         found.collect()
     }
@@ -97,18 +78,17 @@ impl Judge<'_> {
             ("is not in the bag", "absent", "present")
         };
         let kind = FindingKind::TopicMissing;
-        let mut finding =
-            Finding::new(kind, name, at, format!("{name} {what}")).saw(seen, expected);
         // A missing publisher is the cause.
-        let mut lost = entry
-            .publishers()
-            .filter(|by| self.facts.nodes(by).is_empty());
-        finding.cause = lost.next().map(|by| absence(by.as_str()));
-        finding.details.extend(Self::senders(entry));
+        let is_lost = |by: &&Pattern| self.facts.nodes(by).is_empty();
+        let cause = entry.publishers().find(is_lost);
         let topics = self.facts.mission.elements.topics.iter();
         let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
         let near = self.near(pattern, names).filter(|_| !is_named);
-        finding.help.extend(near);
+        let finding = Finding::new(kind, name, at, format!("{name} {what}"))
+            .saw(seen, expected)
+            .because(cause.map(|by| absence(by.as_str())))
+            .details(Self::senders(entry))
+            .hints(near);
         vec![finding]
     }
 
@@ -129,7 +109,7 @@ impl Judge<'_> {
         topics.iter().any(|topic| self.facts.messages(*topic) > 0)
     }
 
-    fn kind(&self, topic: TopicId, kinds: &At<Names>) -> Option<Finding> {
+    fn kind(&self, topic: TopicId, _: &Entry, kinds: &At<Names>) -> Option<Finding> {
         let (kind, name, at) = (FindingKind::TopicType, self.facts.topic(topic), kinds.at);
         let types = &self.facts.mission.elements.topics[topic].types;
         let expected = listed(&kinds.value);
@@ -148,7 +128,7 @@ impl Judge<'_> {
     }
 
     /// The findings on whether the publishers of a topic are these and no others.
-    fn by(&self, topic: TopicId, by: &At<Names>) -> Vec<Finding> {
+    fn by(&self, topic: TopicId, _: &Entry, by: &At<Names>) -> Vec<Finding> {
         let known = self.facts.publishers(topic);
         let names = || by.value.0.iter();
         let fits = |name: &Pattern, peer: &Peer| self.facts.fits(name, peer.node);
@@ -180,7 +160,8 @@ impl Judge<'_> {
             };
             let stretch = self.facts.stretch(span);
             let word = peer.confidence.word();
-            finding.at(span).detail(format!("{stretch}{many}; {word}"))
+            let detail = format!("{stretch}{many}; {word}");
+            finding.at(span).details([detail])
         }));
         found
     }
@@ -193,7 +174,7 @@ impl Judge<'_> {
             let text =
                 format!("cannot tell whether {who} publishes {name}: its publishers are unknown");
             let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
-            return Finding::unknown(kind, name, wanted.at, text).hint(hint);
+            return Finding::unknown(kind, name, wanted.at, text).hints([hint]);
         }
         let roles: Vec<&str> = known
             .iter()
@@ -204,14 +185,13 @@ impl Judge<'_> {
             roles => words::some_of(roles, NAMED),
         };
         let text = format!("{who} does not publish {name}, which is published by {seen}");
-        let mut finding = Finding::new(kind, name, wanted.at, text).saw(seen, who);
         let is_absent = self.facts.nodes(&wanted.value).is_empty();
-        finding.cause = is_absent.then(|| absence(who));
-        finding
+        let finding = Finding::new(kind, name, wanted.at, text).saw(seen, who);
+        finding.because(is_absent.then(|| absence(who)))
     }
 
     /// The findings on whether these nodes subscribe to a topic.
-    fn to(&self, topic: TopicId, to: &At<Names>) -> Vec<Finding> {
+    fn to(&self, topic: TopicId, _: &Entry, to: &At<Names>) -> Vec<Finding> {
         let known = self.facts.subscribers(topic);
         let is_known = |name: &Pattern| known.iter().any(|peer| self.facts.fits(name, peer.node));
         let lost = to.value.0.iter().filter(|name| !is_known(&name.value));
@@ -232,15 +212,14 @@ impl Judge<'_> {
                 "cannot tell whether {who} subscribes to {name}: this bag has no evidence of subscribers"
             );
             let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
-            return Finding::unknown(kind, name, wanted.at, text).hint(hint);
+            return Finding::unknown(kind, name, wanted.at, text).hints([hint]);
         }
         let text = format!("{who} does not subscribe to {name}");
-        let mut finding = Finding::new(kind, name, wanted.at, text).saw("nothing", who);
-        finding.cause = is_absent.then(|| absence(who));
-        finding
+        let finding = Finding::new(kind, name, wanted.at, text).saw("nothing", who);
+        finding.because(is_absent.then(|| absence(who)))
     }
 
-    fn latched(&self, topic: TopicId, wanted: &At<bool>) -> Option<Finding> {
+    fn latched(&self, topic: TopicId, _: &Entry, wanted: &At<bool>) -> Option<Finding> {
         let (kind, name) = (FindingKind::TopicQos, self.facts.topic(topic));
         let word = |is: bool| if is { "latched" } else { "not latched" };
         let expected = word(wanted.value);
@@ -253,7 +232,7 @@ impl Judge<'_> {
         (seen != wanted.value).then_some(finding)
     }
 
-    fn qos(&self, topic: TopicId, wanted: &At<String>) -> Option<Finding> {
+    fn qos(&self, topic: TopicId, _: &Entry, wanted: &At<String>) -> Option<Finding> {
         let (kind, name) = (FindingKind::TopicQos, self.facts.topic(topic));
         let expected = &wanted.value;
         let Some(seen) = &self.facts.mission.elements.topics[topic].qos else {
@@ -322,13 +301,13 @@ impl Judge<'_> {
             self.facts.clock(worst.span.start),
             words::count(count, "message"),
         );
-        let mut finding = Finding::new(off.kind, name, at, text)
-            .saw(seen, words::rate_range(range.from, range.to))
-            .at(span)
-            .detail(detail);
         let before = first.span.start.plus(-first.span.nanos() / 2);
         let around = Span::new(before, first.span.end);
-        finding.cause = self.facts.cause_for_topic(off.topic, around);
+        let finding = Finding::new(off.kind, name, at, text)
+            .saw(seen, words::rate_range(range.from, range.to))
+            .at(span)
+            .details([detail])
+            .because(self.facts.cause_for_topic(off.topic, around));
         Some(finding)
     }
 
@@ -363,7 +342,7 @@ impl Judge<'_> {
         let finding = Finding::new(kind, name, at, text)
             .saw(&hz, words::rate_range(range.from, range.to))
             .at(span)
-            .detail(self.facts.stretch(span));
+            .details([self.facts.stretch(span)]);
         Some(finding)
     }
 
@@ -372,7 +351,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let text = format!("cannot tell the rate of {name}: it has no whole window to check");
         let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, text);
-        finding.hint("use a shorter period: `period: 5s`, or `--period 5`")
+        finding.hints(["use a shorter period: `period: 5s`, or `--period 5`"])
     }
 
     /// The windows in which a topic is checked.
@@ -403,10 +382,10 @@ impl Judge<'_> {
         let clock = self.facts.clock(active.start);
         let expected = format!("within {}", self.facts.stretch(allowed));
         let text = format!("{name} began at {clock}, expected {expected}");
-        let mut finding = Finding::new(FindingKind::TopicLate, name, within.at, text)
+        let finding = Finding::new(FindingKind::TopicLate, name, within.at, text)
             .saw(format!("at {clock}"), expected)
-            .at(Span::new(whole.start, active.start));
-        finding.details.extend(Self::senders(entry));
+            .at(Span::new(whole.start, active.start))
+            .details(Self::senders(entry));
         Some(finding)
     }
 
@@ -423,12 +402,12 @@ impl Judge<'_> {
         let clock = self.facts.clock(end);
         let expected = format!("to end within {}", self.facts.stretch(allowed));
         let text = format!("{name} ended at {clock}, expected {expected}");
-        let mut finding = Finding::new(FindingKind::TopicGone, name, may_end.at, text)
-            .saw(format!("ended at {clock}"), expected)
-            .at(Span::new(end, whole.end));
-        finding.details.extend(Self::senders(entry));
         let around = Span::new(end.plus(-CLOSING_NS), end.plus(CLOSING_NS));
-        finding.cause = self.facts.cause_for_topic(topic, around);
+        let finding = Finding::new(FindingKind::TopicGone, name, may_end.at, text)
+            .saw(format!("ended at {clock}"), expected)
+            .at(Span::new(end, whole.end))
+            .details(Self::senders(entry))
+            .because(self.facts.cause_for_topic(topic, around));
         Some(finding)
     }
 
@@ -445,11 +424,11 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let (seen, expected) = (words::duration(nanos), words::duration(most.0));
         let text = format!("{name} was silent for {seen}, expected at most {expected}");
-        let mut finding = Finding::new(FindingKind::TopicGap, name, at, text)
+        let finding = Finding::new(FindingKind::TopicGap, name, at, text)
             .saw(seen, format!("at most {expected}"))
             .at(span)
-            .detail(format!("within {}", self.facts.stretch(span)));
-        finding.cause = self.facts.cause_for_topic(topic, span);
+            .details([format!("within {}", self.facts.stretch(span))])
+            .because(self.facts.cause_for_topic(topic, span));
         Some(finding)
     }
 
@@ -457,9 +436,9 @@ impl Judge<'_> {
     fn measured(
         &self,
         topic: TopicId,
-        measure: &Measure,
-        range: &At<Range>,
         entry: &Entry,
+        range: &At<Range>,
+        measure: &Measure,
     ) -> Option<Finding> {
         let At { at, value: range } = *range;
         let (key, name) = (measure.key, self.facts.topic(topic));
@@ -477,7 +456,7 @@ impl Judge<'_> {
         if known.is_empty() {
             let text = format!("cannot tell the {key} of {name}: this bag does not record it");
             let hint = "enable topic statistics, or record `/statistics`";
-            return Some(Finding::unknown(measure.kind, name, at, text).hint(hint));
+            return Some(Finding::unknown(measure.kind, name, at, text).hints([hint]));
         }
         let bad: Vec<&(Span, f64)> = known.iter().filter(|(_, v)| !range.holds(*v)).collect();
         if entry.tolerates(bad.len(), known.len()) {
@@ -496,12 +475,12 @@ impl Judge<'_> {
             words::count(known.len(), "window"),
             self.facts.clock(worst.0.start),
         );
-        let mut finding = Finding::new(measure.kind, name, at, text)
+        let around = Span::new(span.start, span.start);
+        let finding = Finding::new(measure.kind, name, at, text)
             .saw(seen, expected)
             .at(span)
-            .detail(detail);
-        let around = Span::new(span.start, span.start);
-        finding.cause = self.facts.cause_for_topic(topic, around);
+            .details([detail])
+            .because(self.facts.cause_for_topic(topic, around));
         Some(finding)
     }
 }

@@ -1,14 +1,15 @@
 //! Verdicts for programs and CI services: the whole verdict as JSON, GitLab's code quality, SARIF, and `JUnit` XML.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::{Subject, kinds};
+use super::Subject;
 use crate::base::words;
 use crate::draw::paint::xml::Xml;
-use crate::gate::finding::{Finding, KINDS, Severity};
+use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{CheckedFact, Judgement, Verdict};
 use crate::mission::info;
 
@@ -101,47 +102,24 @@ fn finding_json(finding: &Finding) -> FindingJson<'_> {
     }
 }
 
-/// A finding for GitLab.
-#[derive(Serialize)]
-struct Issue<'a> {
-    description: &'a str,
-    check_name: &'static str,
-    fingerprint: String,
-    severity: &'static str,
-    location: Location<'a>,
-}
-
-#[derive(Serialize)]
-struct Location<'a> {
-    path: &'a str,
-    lines: Lines,
-}
-
-#[derive(Serialize)]
-struct Lines {
-    begin: usize,
-}
-
 /// GitLab's code quality: a list of findings, each with a fingerprint that is independent of lines; ends in a new line.
 pub(super) fn gitlab(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
-    let issues = findings.iter().map(|finding| Issue {
-        description: &finding.text,
-        check_name: finding.kind.word(),
-        fingerprint: finding.fingerprint(),
-        severity: match finding.severity {
+    let issues = findings.iter().map(|finding| {
+        let severity = match finding.severity {
             Severity::Error => "major",
             Severity::Warning => "minor",
             Severity::Unknown => "info",
-        },
-        location: Location {
-            path: &subject.tracked,
-            lines: Lines {
-                begin: finding.place.line.max(1),
-            },
-        },
+        };
+        json!({
+            "description": finding.text,
+            "check_name": finding.kind.word(),
+            "fingerprint": finding.fingerprint(),
+            "severity": severity,
+            "location": {"path": subject.tracked, "lines": {"begin": finding.place.line.max(1)}},
+        })
     });
-    info::json(&issues.collect::<Vec<_>>())
+    info::json(&issues.collect::<Vec<Value>>())
 }
 
 /// The number of results of a run that GitHub shows; it rejects a file with more than five times as many.
@@ -151,13 +129,12 @@ const MOST: usize = 5000;
 /// Undecidable findings are notes.
 pub(super) fn sarif(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
-    let found = kinds(&findings);
-    let rules = KINDS.iter().filter(|(kind, ..)| found.contains(kind));
-    let rules = rules.map(|(_, word, meaning, more)| {
+    let found: BTreeSet<FindingKind> = findings.iter().map(|f| f.kind).collect();
+    let rules = found.into_iter().map(|kind| {
         json!({
-            "id": word,
-            "shortDescription": {"text": meaning},
-            "help": {"text": more},
+            "id": kind.word(),
+            "shortDescription": {"text": kind.row().meaning},
+            "help": {"text": kind.row().more},
         })
     });
     let shown = findings.iter().take(MOST);

@@ -250,27 +250,11 @@ const MOST_BOXES: usize = 36 << 10;
 /// The largest number of characters of a name; a longer one is cut.
 const LONGEST: usize = 80;
 
-/// A box of the chart: a node or a topic.
+/// A box of the chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct ChartBox<'a> {
-    is_topic: bool,
-    name: &'a str,
-}
-
-impl<'a> ChartBox<'a> {
-    fn node(name: &'a str) -> Self {
-        Self {
-            is_topic: false,
-            name,
-        }
-    }
-
-    fn topic(name: &'a str) -> Self {
-        Self {
-            is_topic: true,
-            name,
-        }
-    }
+enum ChartBox<'a> {
+    Node(&'a str),
+    Topic(&'a str),
 }
 
 /// An arrow from box to box.
@@ -292,9 +276,10 @@ struct BoxChange {
 fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
     let mut marked: BTreeMap<ChartBox<'_>, BoxChange> = BTreeMap::new();
     for finding in findings {
-        let Some(class) = class(finding.kind) else {
+        let class = finding.kind.row().class;
+        if class.is_empty() {
             continue;
-        };
+        }
         // The expected and the observed value.
         let label = match finding.kind {
             FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
@@ -302,9 +287,10 @@ fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
             }
             _ => String::new(),
         };
-        let own = ChartBox {
-            is_topic: !finding.kind.is_about_node(),
-            name: &finding.name,
+        let own = if finding.kind.is_about_node() {
+            ChartBox::Node(&finding.name)
+        } else {
+            ChartBox::Topic(&finding.name)
         };
         marked.entry(own).or_insert(BoxChange { class, label });
     }
@@ -314,21 +300,6 @@ fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
     (!boxes.is_empty()).then(|| written(&boxes, &marked, &arrows))
 }
 
-/// The class of a box that a finding is about, if any.
-fn class(kind: FindingKind) -> Option<&'static str> {
-    match kind {
-        FindingKind::NodeMissing | FindingKind::NodeGone | FindingKind::TopicMissing => {
-            Some("gone")
-        }
-        FindingKind::UnexpectedNode
-        | FindingKind::UnexpectedTopic
-        | FindingKind::NodeForbidden
-        | FindingKind::TopicForbidden => Some("new"),
-        FindingKind::ReactionMissing | FindingKind::TooManyChanges => None,
-        _ => Some("changed"),
-    }
-}
-
 /// The arrows that are missing, then those of marked boxes.
 fn arrows<'a>(
     facts: &Facts<'a>,
@@ -336,8 +307,8 @@ fn arrows<'a>(
     findings: &[&'a Finding],
 ) -> Vec<Arrow<'a>> {
     let missing = findings.iter().filter_map(|finding| {
-        let node = ChartBox::node(&finding.expected);
-        let topic = ChartBox::topic(&finding.name);
+        let node = ChartBox::Node(&finding.expected);
+        let topic = ChartBox::Topic(&finding.name);
         let (from, to) = match finding.kind {
             FindingKind::PublisherMissing => (node, topic),
             FindingKind::SubscriberMissing => (topic, node),
@@ -351,8 +322,8 @@ fn arrows<'a>(
     });
     let elements = &facts.mission.elements;
     let arrow = |edge: &Edge, is_sent: bool| {
-        let node = ChartBox::node(facts.role(edge.node));
-        let topic = ChartBox::topic(facts.topic(edge.topic));
+        let node = ChartBox::Node(facts.role(edge.node));
+        let topic = ChartBox::Topic(facts.topic(edge.topic));
         let is_marked = marked.contains_key(&node) || marked.contains_key(&topic);
         let is_named = !edge.seen.evidence.is_guess();
         let is_robots = !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic);
@@ -395,13 +366,12 @@ fn written(
         boxes.iter().partition(is_marked);
     order.extend(rest);
     for (at, own) in order.into_iter().enumerate() {
-        let (open, close) = if own.is_topic {
-            ("[", "]")
-        } else {
-            ("([", "])")
+        let (open, name, close) = match own {
+            ChartBox::Node(name) => ("([", name, "])"),
+            ChartBox::Topic(name) => ("[", name, "]"),
         };
         let mark = marked.get(own);
-        let name = words::shorten(own.name, LONGEST);
+        let name = words::shorten(name, LONGEST);
         let more = mark.map_or("", |mark| &mark.label);
         let text = escaped(format!("{name} {more}").trim_end());
         let class = mark.map_or_else(String::new, |mark| format!(":::{}", mark.class));
