@@ -12,7 +12,7 @@ mod judge;
 mod report;
 mod values;
 
-pub(crate) use baseline::{Runs, Written, update, write};
+pub(crate) use baseline::{Runs, update, write};
 pub use difference::{DiffFormat, DiffSubject, Difference, Where};
 pub(crate) use difference::{Side, differences, pairs, union};
 pub(crate) use expectation::{Expectation, read};

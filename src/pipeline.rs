@@ -53,7 +53,9 @@ pub use tables::arrow;
 #[cfg(feature = "render")]
 pub use tables::{Counting, Tabled, Tables, tables};
 #[cfg(feature = "cli")]
-pub(crate) use {export::check as check_outputs, read::mission_file, survey::each};
+pub(crate) use {
+    export::check as check_outputs, gate::expectation, read::mission_file, survey::each,
+};
 
 worded! {
     /// A stage of the work, for progress.

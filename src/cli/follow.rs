@@ -1,7 +1,5 @@
 //! `follow`: polls a recording, prints what is new, and writes the outputs at the end.
 
-use std::path::Path;
-
 use super::args::follow::{FollowArgs, FollowFormat};
 use super::args::{GraphArgs, Inputs, RangeArgs, RateArgs, TimeArgs};
 use super::reading::reading;
@@ -11,7 +9,6 @@ use super::terminal::Terminal;
 use super::{DONE, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
-use crate::base::{budget, file};
 use crate::export::Output;
 use crate::gate::{Expectation, FORMATS, judge};
 use crate::graph::window::Length;
@@ -92,10 +89,8 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
     crate::pipeline::check_outputs(&job)?;
-    let expectation = |path: &Path| {
-        let text = file::read_text(path, budget::USER_TEXT)?;
-        crate::gate::read(&text, path)
-    };
+    let expectation = args.expect.as_deref().map(crate::pipeline::expectation);
+    let expectation = expectation.transpose()?;
     let follow = Follow::new(reading, args.keep)?;
     if args.what.is_dir() && follow.path() != args.what {
         let newest = follow.path().display();
@@ -106,7 +101,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     }
     let follower = Follower {
         args,
-        expectation: args.expect.as_deref().map(expectation).transpose()?,
+        expectation: expectation.map(|(_, expectation)| expectation),
         follow,
         format: match args.format {
             FollowFormat::Text => LogFormat::Text,

@@ -171,7 +171,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
         ));
     };
     let mut job = Check::new(judged(&args.bags, &args.time, &args.graph)?, &expect);
-    job.tracked = tracked(&expect);
+    track(&mut job);
     let reports = args.outputs.iter().map(|output| report(output));
     job.reports = reports.collect::<Result<_>>()?;
     job.links.clone_from(&args.link);
@@ -193,7 +193,7 @@ pub(super) fn judge_closed(
     terminal: &mut Terminal,
 ) -> Result<u8> {
     let mut job = Check::new(reading, expect);
-    job.tracked = tracked(expect);
+    track(&mut job);
     job.bags = vec![what.display().to_string()];
     verdict(&job, format, terminal)
 }
@@ -224,15 +224,11 @@ fn verdict(job: &Check, format: Option<&CheckFormat>, terminal: &mut Terminal) -
     })
 }
 
-/// A path relative to the root of its repository, with slashes: the checkout of a GitHub or GitLab job, else the
-/// nearest folder with `.git`. Unchanged outside a repository.
-fn tracked(path: &Path) -> String {
-    let typed = || {
-        let typed = path.display().to_string();
-        typed.trim_start_matches("./").to_owned()
-    };
-    let Ok(whole) = path.canonicalize() else {
-        return typed();
+/// Makes the path of the expectations file relative to the root of its repository, with slashes: the checkout of a
+/// GitHub or GitLab job, else the nearest folder with `.git`. Unchanged outside a repository.
+fn track(job: &mut Check) {
+    let Ok(whole) = job.expect.canonicalize() else {
+        return;
     };
     let checkouts = ["GITHUB_WORKSPACE", "CI_PROJECT_DIR"];
     let named = checkouts.iter().filter_map(std::env::var_os);
@@ -240,11 +236,10 @@ fn tracked(path: &Path) -> String {
     let found = whole.ancestors().skip(1);
     let found = found.filter(|folder| folder.join(".git").exists());
     let mut roots = named.chain(found.map(Path::to_owned));
-    let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) else {
-        return typed();
-    };
-    let parts = below.iter().map(|part| part.to_string_lossy());
-    parts.collect::<Vec<_>>().join("/")
+    if let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) {
+        let parts = below.iter().map(|part| part.to_string_lossy());
+        job.tracked = parts.collect::<Vec<_>>().join("/");
+    }
 }
 
 /// The reading for a check. Missions in JSON have their own windows.

@@ -118,7 +118,7 @@ pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -
     let facts = &[Facts::new(first), Facts::new(second)];
     let mut all = elements(facts, rate_change);
     all.extend(events(facts));
-    if facts.iter().any(Facts::is_rewritten) {
+    if facts.iter().any(|facts| facts.is_rewritten) {
         // Senders are unknown there, and so are ends and restarts of nodes.
         let lost = ["publishes", "end", "restarts", "event"];
         for one in all.iter_mut().filter(|d| lost.contains(&d.kind)) {

@@ -24,8 +24,8 @@ pub(crate) struct Facts<'a> {
     confidences: PerElement<Confidence>,
     /// The number of messages of each topic.
     messages: ById<TopicId, u64>,
-    /// Whether a tool rewrote the bag, so that it names wrong publishers.
-    is_rewritten: bool,
+    /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
+    pub(crate) is_rewritten: bool,
     /// Present nodes by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The role of each of them.
@@ -48,6 +48,7 @@ pub(crate) struct Peer {
     pub(crate) node: NodeId,
     pub(crate) edge: EdgeId,
     pub(crate) confidence: Confidence,
+    pub(crate) evidence: Evidence,
 }
 
 impl Peer {
@@ -343,6 +344,7 @@ impl<'a> Facts<'a> {
             node: edges[*id].node,
             edge: *id,
             confidence: self.confidence(element(*id)),
+            evidence: edges[*id].seen.evidence,
         };
         own.iter().map(peer).collect()
     }
@@ -353,11 +355,6 @@ impl<'a> Facts<'a> {
             .iter()
             .filter(|peer| peer.is_sure() && !self.is_tool(&[peer.node]));
         sure.map(|peer| self.role(peer.node).to_owned()).collect()
-    }
-
-    /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
-    pub(crate) fn is_rewritten(&self) -> bool {
-        self.is_rewritten
     }
 
     /// Whether the bag names nodes reliably, so that an unnamed one is absent; `lost` expected nodes are

@@ -104,14 +104,11 @@ impl CheckFormat {
     /// The format of a file name: the one with the longest matching extension.
     pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
         let name = name.to_ascii_lowercase();
-        let fitting = |f: &&Self| {
-            let ends = f.endings.iter().filter(|e| name.ends_with(**e));
-            ends.map(|e| e.len()).max()
-        };
-        FORMATS
-            .iter()
-            .filter(|f| fitting(f).is_some())
-            .max_by_key(|f| fitting(f))
+        let endings = |f: &'static Self| f.endings.iter().map(move |ending| (*ending, f));
+        let fitting = FORMATS.iter().flat_map(endings);
+        let fitting = fitting.filter(|(ending, _)| name.ends_with(ending));
+        let longest = fitting.max_by_key(|(ending, _)| ending.len());
+        longest.map(|(_, format)| format)
     }
 }
 
@@ -136,27 +133,15 @@ impl Subject<'_> {
 }
 
 impl Verdict {
-    /// The number of errors and warnings as text: `2 errors, 1 warning`; empty without any.
-    fn broken(&self) -> String {
-        let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
-        let counts = counts.map(|(severity, word)| (self.count(severity), word));
-        let some = counts.iter().filter(|(n, _)| *n > 0);
-        let words: Vec<String> = some.map(|(n, word)| words::count(*n, word)).collect();
-        words.join(", ")
-    }
-
-    /// The number of findings as text: `2 errors, 1 warning, 1 unknown`.
-    fn summary(&self) -> String {
-        let unknown = match self.count(Severity::Unknown) {
-            0 => String::new(),
-            unknown => format!("{unknown} unknown"),
-        };
-        let mut parts = vec![self.broken(), unknown];
-        parts.retain(|words| !words.is_empty());
-        match parts.is_empty() {
-            true => "no findings".to_owned(),
-            false => parts.join(", "),
-        }
+    /// The numbers of findings as text: `2 errors`, `1 warning`, `1 unknown`.
+    fn counts(&self) -> Vec<String> {
+        let counts = Severity::ALL.map(|severity| (severity, self.count(severity)));
+        let some = counts.into_iter().filter(|(_, count)| *count > 0);
+        some.map(|(severity, count)| match severity {
+            Severity::Unknown => format!("{count} unknown"),
+            severity => words::count(count, severity.word()),
+        })
+        .collect()
     }
 }
 

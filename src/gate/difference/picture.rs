@@ -11,7 +11,7 @@ use crate::draw::figure::course::{LifeLine, LifeLines};
 use crate::draw::figure::source::FigureSource;
 use crate::draw::figure::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
 use crate::evidence::{Confidence, Evidence};
-use crate::gate::facts::{Facts, Rate, TopicIn};
+use crate::gate::facts::{Facts, Peer, Rate, TopicIn};
 use crate::gate::values::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{
@@ -49,6 +49,15 @@ struct MissionSide {
 struct Seen {
     confidence: Confidence,
     evidence: Evidence,
+}
+
+impl From<Peer> for Seen {
+    fn from(peer: Peer) -> Self {
+        Self {
+            confidence: peer.confidence,
+            evidence: peer.evidence,
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -96,19 +105,11 @@ impl MissionSide {
             let name = facts.topic(id);
             for peer in facts.publishers(id) {
                 let key = [facts.role(peer.node), name].map(str::to_owned);
-                let edge = Seen {
-                    confidence: peer.confidence,
-                    evidence: elements.publishes[peer.edge].seen.evidence,
-                };
-                seen.publishes.insert(key, edge);
+                seen.publishes.insert(key, peer.into());
             }
             for peer in facts.subscribers(id) {
                 let key = [name, facts.role(peer.node)].map(str::to_owned);
-                let edge = Seen {
-                    confidence: peer.confidence,
-                    evidence: elements.subscribes[peer.edge].seen.evidence,
-                };
-                seen.subscribes.insert(key, edge);
+                seen.subscribes.insert(key, peer.into());
             }
             seen.topics.insert(name.to_owned(), topic);
         }
@@ -422,17 +423,18 @@ pub(crate) fn pairs(
     // An edge's name is that of both its ends.
     let names: BTreeSet<&str> = known.flat_map(|d| d.element.split(" → ")).collect();
     let all = NameFilter::default();
-    let nodes = |name: &str| drawn.elements.node(name).map(Element::Node);
-    let topics = |name: &str| drawn.elements.topic(name).map(Element::Topic);
     let mut rows = Vec::new();
-    let kinds: [(TracksOf, &dyn Fn(&str) -> Option<Element>); 2] =
-        [(of_nodes, &nodes), (of_topics, &topics)];
+    let kinds: [(TracksOf, PlaceOf); 2] = [
+        (of_nodes, |all, name| all.node(name).map(Element::Node)),
+        (of_topics, |all, name| all.topic(name).map(Element::Topic)),
+    ];
     for (of, place) in kinds {
         let mut pairs: BTreeMap<String, Pair> = BTreeMap::new();
         for (side, mission) in missions.iter().enumerate() {
             for track in of(&FigureSource::new(mission, &all, &all, false)) {
                 let name = &*track.name;
-                let Some(what) = place(name).filter(|_| names.contains(name)) else {
+                let Some(what) = place(&drawn.elements, name).filter(|_| names.contains(name))
+                else {
                     continue;
                 };
                 let new = Pair {
@@ -478,6 +480,8 @@ pub(crate) fn pairs(
 
 /// The tracks of all nodes, or of all topics.
 type TracksOf = fn(&FigureSource<'_>) -> Vec<Track>;
+/// The element of a name.
+type PlaceOf = fn(&Elements, &str) -> Option<Element>;
 
 /// The row of a track, its times counted from `start`, and its highest rate drawn as `share` of all.
 fn line(label: String, what: Element, track: Option<&Track>, start: Stamp, share: f64) -> LifeLine {

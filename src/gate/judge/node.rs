@@ -89,7 +89,7 @@ impl Judge<'_> {
     fn unnamed(&self, kind: FindingKind, name: &str, at: YamlPlace) -> Finding {
         let is_sure = |role: Role<'_>| self.facts.is_sure(role.nodes);
         let as_recorded = "check the bag as it was recorded";
-        let (why, hint) = if self.facts.is_rewritten() {
+        let (why, hint) = if self.facts.is_rewritten {
             ("a tool merged the senders of this bag", as_recorded)
         } else if self.facts.is_ros1() {
             ("the connections of this bag name no senders", as_recorded)

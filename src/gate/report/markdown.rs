@@ -70,12 +70,8 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         "✅"
     };
     let kept = words::count(verdict.facts(Judgement::Kept), "rule");
-    let unknown = match verdict.count(Severity::Unknown) {
-        0 => String::new(),
-        unknown => format!("{unknown} unknown"),
-    };
-    let mut parts = vec![verdict.broken(), unknown, format!("{kept} passed")];
-    parts.retain(|words| !words.is_empty());
+    let mut parts = verdict.counts();
+    parts.push(format!("{kept} passed"));
     format!(
         "### {sign} Graph check: {} · {} against {} · {} in windows of {}",
         parts.join(", "),
@@ -204,8 +200,8 @@ fn undecidable(findings: &[&Finding], out: &mut String) {
     for (at, finding) in findings.iter().enumerate() {
         // Hints apply to all findings of a kind.
         let fresh = finding.help.iter().filter(|help| hinted.insert(*help));
-        let help: String = fresh.map(|help| format!(": {}", plain(help))).collect();
-        let line = format!("- {}{help}\n", plain(&finding.text));
+        let help: Vec<String> = fresh.map(|help| format!(": {}", plain(help))).collect();
+        let line = format!("- {}{}\n", plain(&finding.text), help.concat());
         if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);
             break;

@@ -32,11 +32,14 @@ pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
 /// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules passed`.
 fn last_line(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let kept = verdict.facts(Judgement::Kept);
+    let counts = match verdict.counts() {
+        counts if counts.is_empty() => "no findings".to_owned(),
+        counts => counts.join(", "),
+    };
     format!(
-        "{} against {}: {}, {} passed\n",
+        "{} against {}: {counts}, {} passed\n",
         subject.name(),
         subject.file,
-        verdict.summary(),
         words::count(kept, "rule")
     )
 }
@@ -82,18 +85,12 @@ pub(super) fn github(subject: &Subject<'_>, verdict: &Verdict) -> String {
     for (severity, command) in [(Severity::Error, "error"), (Severity::Warning, "warning")] {
         let own = findings.iter().filter(|f| f.severity == severity);
         let own: Vec<&&Finding> = own.collect();
-        // The last one shown states how many are not.
-        let shown = if own.len() > MOST {
-            MOST - 1
-        } else {
-            own.len()
-        };
-        for (at, finding) in own.iter().enumerate().take(shown + 1) {
+        for (at, finding) in own.iter().take(MOST).enumerate() {
+            // The last one states how many are not shown.
             let rest = own.len() - at - 1;
-            let more = match at == shown {
-                true => format!(" (and {rest} more in the log)"),
-                false => String::new(),
-            };
+            let is_last = at + 1 == MOST && rest > 0;
+            let more = is_last.then(|| format!(" (and {rest} more in the log)"));
+            let more = more.unwrap_or_default();
             annotation(subject, command, finding, &more, &mut out);
         }
     }
