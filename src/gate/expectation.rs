@@ -1,5 +1,6 @@
 //! The expectation of a mission, `graph.yaml`: its keys and values with their positions, and how they are read.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -94,9 +95,9 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Fact<T> {
     }
 }
 
-/// The keys of a node, a topic or a rule.
+/// The keys of a node, a topic or a rule. [`section`] and [`rule`] refuse those that do not belong there.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(default)]
 pub(crate) struct Entry {
     /// Whether it must be absent.
     pub(crate) forbidden: bool,
@@ -392,10 +393,7 @@ fn parse(text: &str, path: &Path) -> Result<Expectation, BadYaml> {
 fn section(pairs: Pairs<Keyed<Entry>>, known: &str) -> Result<Vec<Named>, BadYaml> {
     let known: Vec<&str> = known.split(' ').collect();
     let named = pairs.0.into_iter().map(|(name, entry)| {
-        let is_known = |key: &&At<String>| known.contains(&key.value.as_str());
-        if let Some(key) = entry.keys.iter().find(|key| !is_known(key)) {
-            return Err(BadYaml::unknown_key(key.at, &key.value, &known));
-        }
+        check_keys(&entry.keys, &known)?;
         Ok(Named {
             name: Pattern::new(&name.value),
             at: name.at,
@@ -405,11 +403,25 @@ fn section(pairs: Pairs<Keyed<Entry>>, known: &str) -> Result<Vec<Named>, BadYam
     named.collect()
 }
 
+/// Refuses keys that are none of these.
+fn check_keys(keys: &[At<String>], known: &[&str]) -> Result<(), BadYaml> {
+    let mut unknown = keys.iter().filter(|key| !known.contains(&&*key.value));
+    let bad = unknown
+        .next()
+        .map(|key| BadYaml::unknown_key(key.at, &key.value, known));
+    bad.map_or(Ok(()), Err)
+}
+
 fn rule(At { at, value }: At<Keyed<Entry>>) -> Result<Rule, BadYaml> {
     let Keyed {
         keys,
         value: mut entry,
     } = value;
+    let known = FORMS
+        .iter()
+        .flat_map(|(form, with)| with.split(' ').chain([*form]));
+    let known: BTreeSet<&str> = known.chain(["id"]).collect();
+    check_keys(&keys, &known.into_iter().collect::<Vec<_>>())?;
     let Some(At { value: id, .. }) = entry.id.0.take() else {
         let hint = "every rule has an `id: a-name`";
         return Err(BadYaml::new(at, "`id` is missing", hint));
@@ -517,6 +529,10 @@ mod tests {
             ("nodes:\n  /a: {}\n  /a: {}", "line 4"),
             ("rules:\n  - {node: /a, restarts: ..1}", "`id` is missing"),
             ("rules:\n  - {id: x}", "the rule has no subject"),
+            (
+                "rules:\n  - {id: x, note: /a}",
+                "line 3, column 13: unknown key `note`; the nearest is `node`",
+            ),
             ("rules:\n  - {id: x, node: /a}", "has no condition"),
             (
                 "rules:\n  - {id: x, node: /a, hz: 5..}",
