@@ -9,12 +9,10 @@ mod expectation;
 mod facts;
 mod finding;
 mod judge;
-mod measure;
-mod pattern;
-mod range;
 mod report;
+mod values;
 
-pub(crate) use baseline::{Written, update, write};
+pub(crate) use baseline::{Runs, update, write};
 pub use difference::{DiffFormat, DiffSubject, Difference, Where};
 pub(crate) use difference::{Side, differences, pairs, union};
 pub(crate) use expectation::{Expectation, read};

@@ -51,7 +51,9 @@ pub use survey::{Survey, is_survey, survey, survey_file};
 #[cfg(feature = "render")]
 pub use tables::{Counted, Counting, Tabled, Tables, count, tables};
 #[cfg(feature = "cli")]
-pub(crate) use {export::check as check_outputs, read::mission_file, survey::each};
+pub(crate) use {
+    export::check as check_outputs, gate::expectation, read::mission_file, survey::each,
+};
 
 worded! {
     /// A stage of the work, for progress.

@@ -4,20 +4,40 @@
 mod placed;
 
 use serde::de::Deserialize;
-use serde_saphyr::Location;
+use serde_saphyr::{Error, Location};
 
 use super::budget::{YAML, YAML_VALUES};
+use super::nearest::suggestion;
 
 #[cfg(feature = "render")]
-pub(crate) use placed::{YamlData, YamlPart, parse_placed};
+pub(crate) use placed::{At, Keyed, Pairs, YamlData, YamlNode, YamlPair};
 pub(crate) use serde_json::Value;
 
 /// A mistake in a YAML document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct BadYaml {
     pub(crate) at: YamlPlace,
-    /// The mistake, as reported by the parser, on one line.
+    /// The mistake on one line.
     pub(crate) reason: String,
+    /// How to write it; empty for a mistake in the syntax of YAML.
+    pub(crate) hint: String,
+}
+
+impl BadYaml {
+    pub(crate) fn new(at: YamlPlace, reason: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self {
+            at,
+            reason: reason.into(),
+            hint: hint.into(),
+        }
+    }
+
+    /// The mistake of a key that is none of these.
+    pub(crate) fn unknown_key(at: YamlPlace, key: &str, known: &[&str]) -> Self {
+        let near = suggestion(key, known.iter().copied());
+        let reason = format!("unknown key `{key}`{near}");
+        Self::new(at, reason, format!("expected one of {}", known.join(", ")))
+    }
 }
 
 /// The document as JSON data: mappings as objects with keys in order, scalars typed as in YAML 1.2.
@@ -29,12 +49,13 @@ pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
     read(text)
 }
 
-fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
+/// The document as this type, whose errors are hints on how to write a value.
+///
+/// # Errors
+/// As for [`parse`], and for unknown keys and values of another type.
+pub(crate) fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
     if text.len() > YAML {
-        return Err(BadYaml {
-            at: YamlPlace::default(),
-            reason: "longer than 8 MiB".to_owned(),
-        });
+        return Err(BadYaml::new(YamlPlace::default(), "longer than 8 MiB", ""));
     }
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! { max_nodes: YAML_VALUES },
@@ -44,10 +65,71 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
             max_alias_expansions_per_anchor: 10_000,
         },
     };
-    serde_saphyr::from_str_with_options(text, options).map_err(|e| BadYaml {
-        at: e.location().map_or(YamlPlace::default(), YamlPlace::from),
-        reason: reason(&e),
-    })
+    serde_saphyr::from_str_with_options(text, options).map_err(|error| mistake(text, &error))
+}
+
+/// The mistake that the parser or a type found, with a hint for a value of another type.
+fn mistake(text: &str, error: &Error) -> BadYaml {
+    let location = error.location();
+    let at = location.map_or(YamlPlace::default(), YamlPlace::from);
+    let mut inner = error.without_snippet();
+    while let Error::AliasError { error, .. } = inner {
+        inner = error;
+    }
+    let (key, pair) = location.map_or_else(Default::default, |at| pair_at(text, at));
+    let key = match key {
+        "" => "this".to_owned(),
+        key => format!("`{key}`"),
+    };
+    let is_not = |what: &str, hint: &str| BadYaml::new(at, format!("{key} is not {what}"), hint);
+    let is_invalid = |hint: &str| BadYaml::new(at, format!("`{pair}` is not valid"), hint);
+    match inner {
+        Error::SerdeUnknownField {
+            field, expected, ..
+        } => BadYaml::unknown_key(at, field, expected),
+        Error::Unexpected { expected, .. } if expected.starts_with("mapping") => {
+            is_not("a mapping", "write `key: value`")
+        }
+        Error::Unexpected { expected, .. } if expected.starts_with("sequence") => {
+            is_not("a list", "write `[one, two]`")
+        }
+        Error::SerdeInvalidType { expected, .. } => is_not(expected, "write `[one, two]`"),
+        Error::Unexpected { .. } => is_not("a string", "write one value"),
+        Error::NullIntoString { .. } => {
+            BadYaml::new(at, format!("{key} has no value"), "write one value")
+        }
+        Error::InvalidScalar { ty: "boolean", .. } => is_invalid("write `true` or `false`"),
+        Error::Message { msg, .. } => is_invalid(msg),
+        _ => BadYaml::new(at, reason(error), ""),
+    }
+}
+
+/// The key before a value, and both as written: `hz` and `hz: 5..4`. The key of a value in a list is empty.
+fn pair_at(text: &str, value: Location) -> (&str, &str) {
+    let span = value.span();
+    let [start, bytes] = [span.byte_offset(), span.byte_len()]
+        .map(|bytes| bytes.and_then(|n| usize::try_from(n).ok()).unwrap_or(0));
+    let (Some(before), Some(from)) = (text.get(..start), text.get(start..)) else {
+        return Default::default();
+    };
+    let before = before.trim_end();
+    // A missing value is where the colon is.
+    let colon = before.strip_suffix(':');
+    let key = colon.or_else(|| from.starts_with(':').then_some(before));
+    let key = key.map_or("", |key| {
+        let begin = key.rfind([' ', '\n', '{', ',']).map_or(0, |at| at + 1);
+        &key[begin..]
+    });
+    let begin = match key {
+        "" => start,
+        key => before.rfind(key).unwrap_or(start),
+    };
+    let pair = text.get(begin..start.saturating_add(bytes));
+    (
+        key,
+        pair.and_then(|pair| pair.lines().next())
+            .unwrap_or_default(),
+    )
 }
 
 /// A position in a document.

@@ -1,7 +1,5 @@
 //! `follow`: polls a recording, prints what is new, and writes the outputs at the end.
 
-use std::path::Path;
-
 use super::args::follow::FollowArgs;
 use super::render;
 use super::show::NO_EVENTS;
@@ -10,7 +8,6 @@ use super::{DONE, code, gate};
 use crate::bag::Growth;
 use crate::base::error::Result;
 use crate::base::time::Period;
-use crate::base::{budget, file};
 use crate::export::Output;
 use crate::gate::{Expectation, FORMATS, judge};
 use crate::graph::window::Length;
@@ -84,10 +81,8 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     let outputs = args.outputs.iter().map(|o| Output::named(o, None));
     let job = Render::new(reading.clone(), outputs.collect::<Result<_>>()?)?;
     crate::pipeline::check_outputs(&job)?;
-    let expectation = |path: &Path| {
-        let text = file::read_text(path, budget::USER_TEXT)?;
-        crate::gate::read(&text, path)
-    };
+    let expectation = args.expect.as_deref().map(crate::pipeline::expectation);
+    let expectation = expectation.transpose()?;
     let follow = Follow::new(reading, KEPT)?;
     if args.what.is_dir() && follow.path() != args.what {
         let newest = follow.path().display();
@@ -98,7 +93,7 @@ pub(super) fn follow(args: &FollowArgs, terminal: &mut Terminal) -> Result<u8> {
     }
     let follower = Follower {
         args,
-        expectation: args.expect.as_deref().map(expectation).transpose()?,
+        expectation: expectation.map(|(_, expectation)| expectation),
         follow,
         format: args.format,
         feed: Feed::default(),

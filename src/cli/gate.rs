@@ -11,7 +11,6 @@ use super::reading::reading;
 use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code};
 use crate::base::error::{Error, Result};
-use crate::base::nearest::suggestion;
 use crate::base::notice::Notices;
 use crate::base::words;
 use crate::export::target::Target;
@@ -161,10 +160,7 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
 pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     if let Some(word) = &args.explain {
         let width = terminal.width().unwrap_or(80).min(80);
-        let Some(text) = explain(word, width) else {
-            return Err(unknown_kind(word));
-        };
-        terminal.results(&text)?;
+        terminal.results(&explain(word, width)?)?;
         return Ok(DONE);
     }
     let Some(expect) = args.expect.clone() else {
@@ -174,7 +170,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
         ));
     };
     let mut job = Check::new(judged(&args.bags, args.range, &args.graph)?, &expect);
-    job.tracked = tracked(&expect);
+    track(&mut job);
     let reports = args.outputs.iter().map(|output| report(output));
     job.reports = reports.collect::<Result<_>>()?;
     job.is_strict = args.undecidable == Undecidable::Error;
@@ -193,7 +189,7 @@ pub(super) fn judge_closed(
     terminal: &mut Terminal,
 ) -> Result<u8> {
     let mut job = Check::new(reading, expect);
-    job.tracked = tracked(expect);
+    track(&mut job);
     job.bags = vec![what.display().to_string()];
     verdict(&job, format, terminal)
 }
@@ -224,15 +220,11 @@ fn verdict(job: &Check, format: Option<&CheckFormat>, terminal: &mut Terminal) -
     })
 }
 
-/// A path relative to the root of its repository, with slashes: the checkout of a GitHub or GitLab job, else the
-/// nearest folder with `.git`. Unchanged outside a repository.
-fn tracked(path: &Path) -> String {
-    let typed = || {
-        let typed = path.display().to_string();
-        typed.trim_start_matches("./").to_owned()
-    };
-    let Ok(whole) = path.canonicalize() else {
-        return typed();
+/// Makes the path of the expectations file relative to the root of its repository, with slashes: the checkout of a
+/// GitHub or GitLab job, else the nearest folder with `.git`. Unchanged outside a repository.
+fn track(job: &mut Check) {
+    let Ok(whole) = job.expect.canonicalize() else {
+        return;
     };
     let checkouts = ["GITHUB_WORKSPACE", "CI_PROJECT_DIR"];
     let named = checkouts.iter().filter_map(std::env::var_os);
@@ -240,21 +232,10 @@ fn tracked(path: &Path) -> String {
     let found = whole.ancestors().skip(1);
     let found = found.filter(|folder| folder.join(".git").exists());
     let mut roots = named.chain(found.map(Path::to_owned));
-    let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) else {
-        return typed();
-    };
-    let parts = below.iter().map(|part| part.to_string_lossy());
-    parts.collect::<Vec<_>>().join("/")
-}
-
-fn unknown_kind(word: &str) -> Error {
-    let words = || crate::gate::FindingKind::words();
-    let near = suggestion(word, words());
-    let all: Vec<&str> = words().collect();
-    Error::usage(
-        format!("unknown kind of finding `{word}`{near}"),
-        format!("choose one of {}", all.join(", ")),
-    )
+    if let Some(below) = roots.find_map(|root| Some(whole.strip_prefix(root).ok()?.to_owned())) {
+        let parts = below.iter().map(|part| part.to_string_lossy());
+        job.tracked = parts.collect::<Vec<_>>().join("/");
+    }
 }
 
 /// The reading for a check. Missions in JSON have their own windows.

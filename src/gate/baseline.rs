@@ -1,22 +1,46 @@
 //! Generates an expectation from healthy runs: the strictest one that all of them meet, one line per element.
 
-mod draft;
-mod edit;
 mod update;
 
-use super::expectation::SCHEMA;
-use crate::base::budget;
-use crate::base::time::Period;
-use crate::base::words::{self, visible_json};
-use crate::mission::Mission;
+use std::collections::{BTreeMap, BTreeSet};
 
-pub(super) use draft::{Draft, Line};
-pub(crate) use update::update;
+use super::expectation::SCHEMA;
+use super::facts::{Facts, Rate, Role, TopicIn};
+use super::values::Range;
+use crate::base::budget;
+use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN, GAP_NS};
+use crate::base::time::{Period, Stamp};
+use crate::base::words::{self, visible_json};
+use crate::graph::history::Bound;
+use crate::mission::Mission;
+use crate::mission::event_log::Kind;
+
+pub(crate) use update::{Runs, update};
 
 /// The longest name in the file, in bytes; longer ones are left out: YAML allows no longer keys, and ROS allows 255.
 const LONGEST: usize = 1000;
 /// The share of a document's limits reserved for the lines before the first name.
 const HEAD: usize = 1 << 16;
+
+/// The fraction by which a rate may differ between runs.
+const SHARE: f64 = 0.1;
+/// The fraction by which the mean rate of an uneven topic may differ between runs.
+const MEAN_SHARE: f64 = 0.15;
+/// The allowed silence, as a multiple of the longest in the runs.
+const GAPS: i64 = 2;
+/// This many usual intervals are added, since one or two messages are lost now and then.
+const INTERVALS: i64 = 4;
+/// A rate may also differ by this multiple of the spread between windows.
+const SPREADS: f64 = 3.0;
+
+/// What is silent for longer before the end of a run may end: with a little less of it, in the next run, it would be
+/// missed.
+const ENDED_NS: i64 = CLOSING_NS / 2;
+
+/// The time range for a first message at any time.
+const ANY_TIME: &str = "0..";
+
+const SECOND: i64 = 1_000_000_000;
 
 /// A generated expectation.
 #[derive(Debug, Default)]
@@ -115,14 +139,388 @@ impl Room {
     }
 }
 
+/// The facts that are true in all runs.
+#[derive(Debug, Default)]
+struct Draft {
+    nodes: BTreeMap<String, Line>,
+    topics: BTreeMap<String, Line>,
+}
+
+/// The common facts of a node or topic: the keys of its line with their values in YAML, and the comment after it.
+#[derive(Clone, Debug, Default)]
+struct Line {
+    facts: Vec<(&'static str, String)>,
+    comment: String,
+}
+
+impl Line {
+    fn of<const N: usize>(facts: [(&'static str, Option<String>); N]) -> Self {
+        let facts = facts
+            .into_iter()
+            .filter_map(|(key, value)| Some((key, value?)));
+        Self {
+            facts: facts.collect(),
+            comment: String::new(),
+        }
+    }
+
+    /// The value of a key.
+    fn get(&self, key: &str) -> Option<String> {
+        let own = self.facts.iter().find(|(own, _)| *own == key);
+        own.map(|(_, value)| value.clone())
+    }
+
+    /// The text after the name: its facts as a mapping of YAML.
+    fn text(&self) -> String {
+        let pairs = self.facts.iter();
+        let pairs: Vec<String> = pairs
+            .map(|(key, value)| format!("{key}: {value}"))
+            .collect();
+        format!("{{{}}}", pairs.join(", "))
+    }
+}
+
+/// The value of an optional key.
+fn flag(is_set: bool, word: &str) -> Option<String> {
+    is_set.then(|| word.to_owned())
+}
+
+impl Draft {
+    /// The facts that all of these runs have in common; without times if each `is_part` of a recording.
+    fn of(runs: &[Mission], is_part: bool) -> Self {
+        let runs: Vec<Facts<'_>> = runs.iter().map(Facts::new).collect();
+        let times = Times::of(&runs, is_part);
+        Self {
+            nodes: nodes(&runs, &times),
+            topics: topics(&runs, &times),
+        }
+    }
+}
+
+fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
+    let mut all: BTreeMap<&str, Vec<Role<'_>>> = BTreeMap::new();
+    for facts in runs {
+        for role in facts.robot_roles() {
+            all.entry(role.name).or_default().push(role);
+        }
+    }
+    let line = |(name, seen): (&str, Vec<Role<'_>>)| {
+        let is_optional = seen.len() < runs.len();
+        (name.to_owned(), node(&seen, times, is_optional))
+    };
+    all.into_iter().map(line).collect()
+}
+
+fn node(seen: &[Role<'_>], times: &Times, is_optional: bool) -> Line {
+    let since = |run: &Role<'_>, at| run.facts.mission.offset(at);
+    // Known to within seconds.
+    let is_sure = |bound: &Bound| bound.latest.since(bound.earliest) <= CLOSING_NS;
+    let ended = |s: &Role<'_>| s.facts.ended(s.nodes, ENDED_NS);
+    let are_ends_sure = seen.iter().filter_map(ended).all(|end| is_sure(&end));
+    let ends = seen.iter().filter_map(|s| Some(since(s, ended(s)?.time)));
+    let ends: Vec<i64> = ends.collect();
+    let began = seen.iter().map(|s| {
+        let began = s.facts.began(s.nodes)?;
+        // A node may have run before the recorder.
+        let is_sure = began.earliest != Stamp::MIN && is_sure(&began);
+        is_sure.then(|| since(s, began.time))
+    });
+    let began: Option<Vec<i64>> = began.collect();
+    let state = |s: &Role<'_>| s.facts.lifecycle(s.nodes).map(str::to_owned);
+    let restarts = seen
+        .iter()
+        .map(|s| s.facts.events(s.nodes, Kind::Restarted).len());
+    let is_logged = seen.iter().all(|s| s.facts.is_logged_only(s.nodes));
+    Line::of([
+        ("lifecycle", common(seen, state).map(|state| scalar(&state))),
+        ("within", began.and_then(|began| times.within(&began))),
+        ("may_end", times.may_end(&ends, are_ends_sure)),
+        ("known_by", flag(is_logged, "log")),
+        ("optional", flag(is_optional, "true")),
+        (
+            "restarts",
+            Some(format!("..{}", restarts.max().unwrap_or(0))),
+        ),
+    ])
+}
+
+/// The value that all runs have in common.
+fn common<R, T: PartialEq>(runs: &[R], value: impl Fn(&R) -> Option<T>) -> Option<T> {
+    let first = runs.first().and_then(&value)?;
+    let is_same = runs.iter().all(|run| value(run).as_ref() == Some(&first));
+    is_same.then_some(first)
+}
+
+/// How starts and ends differ between runs.
+struct Times {
+    /// The shortest of the runs.
+    shortest: i64,
+    runs: usize,
+    /// Whether each run is a part of a recording, whose times are meaningless.
+    is_part: bool,
+}
+
+impl Times {
+    fn of(runs: &[Facts<'_>], is_part: bool) -> Self {
+        let lengths = runs.iter().map(|facts| facts.mission.span.nanos());
+        Self {
+            shortest: lengths.min().unwrap_or(0),
+            runs: runs.len(),
+            is_part,
+        }
+    }
+
+    /// These times with headroom on both sides: a tenth of the time, as runs vary; at least 5 s, less in a short
+    /// mission; and the difference between runs, which a single run does not show.
+    fn wide(&self, times: &[i64]) -> Option<WideTimes> {
+        let (first, last) = (*times.iter().min()?, *times.iter().max()?);
+        let usual = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
+        let room = usual.max(last / 10).max(last - first);
+        let room = if self.runs > 1 { room } else { 2 * room };
+        let from = (first - room) / SECOND * SECOND;
+        Some(WideTimes {
+            from: (from > 0).then(|| length(from)),
+            to: last + room,
+        })
+    }
+
+    /// The time range for the start of an element that started at these times.
+    fn within(&self, times: &[i64]) -> Option<String> {
+        let times = self.wide(times).filter(|_| !self.is_part)?;
+        let from = times.from.unwrap_or_default();
+        Some(format!("{from}..{}", length(whole(times.to))))
+    }
+
+    /// The time range for the end of an element that was silent for at most `tail` nanoseconds at the end.
+    fn stays(&self, tail: i64) -> Option<String> {
+        let room = (self.shortest / 10).max(SECOND);
+        let room = tail + if self.runs > 1 { room } else { 2 * room };
+        let is_some = room < self.shortest / 2 && !self.is_part;
+        is_some.then(|| format!("-{}..", length(whole(room))))
+    }
+
+    /// The time range for the end of an element that ended at these times; `None` if it never did.
+    fn may_end(&self, times: &[i64], is_sure: bool) -> Option<String> {
+        let from = self.wide(times)?.from;
+        let from = from.filter(|_| is_sure && !self.is_part);
+        Some(from.map_or_else(|| "true".to_owned(), |from| format!("{from}..")))
+    }
+}
+
+/// A time range of runs: its start in whole seconds unless it is open, and its end in nanoseconds.
+struct WideTimes {
+    from: Option<String>,
+    to: i64,
+}
+
+fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, Line> {
+    let mut all: BTreeMap<&str, Vec<TopicIn<'_>>> = BTreeMap::new();
+    for facts in runs {
+        for id in facts.robot_topics() {
+            let own = all.entry(facts.topic(id)).or_default();
+            own.push(TopicIn { facts, id });
+        }
+    }
+    let line = |(name, seen): (&str, Vec<TopicIn<'_>>)| {
+        let is_optional = seen.len() < runs.len();
+        (name.to_owned(), topic(&seen, times, is_optional))
+    };
+    all.into_iter().map(line).collect()
+}
+
+fn topic(seen: &[TopicIn<'_>], times: &Times, is_optional: bool) -> Line {
+    let since = |s: &TopicIn<'_>, at| s.facts.mission.offset(at);
+    let received = || {
+        seen.iter()
+            .filter_map(|s| Some((s, s.facts.received(s.id)?)))
+    };
+    let ends: Vec<i64> = received()
+        .filter(|(s, _)| s.ends(ENDED_NS))
+        .map(|(s, received)| since(s, received.end))
+        .collect();
+    let began: Vec<i64> = received()
+        .map(|(s, received)| since(s, received.start))
+        .collect();
+    let ends_somewhere = !ends.is_empty();
+    let mut to = seen.first().map(TopicIn::to).unwrap_or_default();
+    for other in seen.iter().skip(1) {
+        let other = other.to();
+        to.retain(|name| other.contains(name));
+    }
+    let judged = |s: &TopicIn<'_>| s.rates(ends_somewhere);
+    let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
+    let is_rated = rates.iter().all(|own| !own.is_empty());
+    let is_even = rates.iter().all(|own| Rate::are_even(own));
+    let hz = band(&rates.concat(), is_even).filter(|_| is_rated);
+    let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
+    // Messages sent once, on request or for late subscribers, have no times of their own.
+    let is_many = |s: &TopicIn<'_>| s.facts.messages(s.id) >= FEWEST_OF_MEAN;
+    let is_timed = hz.is_some() || !is_latched && seen.iter().all(is_many);
+    // An even topic stays; for others, the last message shows whether they do.
+    let tails = received().map(|(s, received)| s.facts.mission.span.end.since(received.end));
+    let stays = times
+        .stays(tails.max().unwrap_or(0))
+        .filter(|_| hz.is_none());
+    let mean_hz = mean(seen, hz).filter(|_| is_timed);
+    let names = |names: BTreeSet<String>| (!names.is_empty()).then(|| list(names.iter()));
+    let types = common(seen, |s| Some(s.types())).unwrap_or_default();
+    let types = match types.first() {
+        Some(one) if types.len() == 1 => Some(scalar(one)),
+        _ => names(types),
+    };
+    let within = times.within(&began);
+    let may_end = times.may_end(&ends, true).or(stays);
+    let max_gap = longest(seen, ends_somewhere)
+        .map(length)
+        .filter(|_| is_timed);
+    let within = within.filter(|_| is_timed).or_else(|| {
+        // A topic without such a fact is only required to send at all.
+        let is_required = hz.is_some() || mean_hz.is_some() || max_gap.is_some();
+        (!is_required && !times.is_part).then(|| ANY_TIME.to_owned())
+    });
+    let mut line = Line::of([
+        ("type", types),
+        ("by", common(seen, TopicIn::by).and_then(names)),
+        ("to", names(to)),
+        ("hz", hz.map(|hz| hz.to_string())),
+        ("mean_hz", mean_hz.map(|hz| hz.to_string())),
+        ("max_gap", max_gap),
+        ("within", within),
+        ("may_end", may_end.filter(|_| is_timed)),
+        ("latched", flag(is_latched, "true")),
+        ("optional", flag(is_optional, "true")),
+    ]);
+    if hz.is_none() && mean_hz.is_none() && !is_latched {
+        line.comment = format!("  # {}: rate not checked", unjudged(seen, &rates.concat()));
+    }
+    line
+}
+
+/// The range of a topic's rate from its first to its last message, if the one for each window is too wide to detect the
+/// loss of a fifth of the messages.
+fn mean(seen: &[TopicIn<'_>], hz: Option<Range>) -> Option<Range> {
+    let rates = seen.iter().map(|s| s.facts.mean(s.id));
+    let rates: Vec<Rate> = rates.collect::<Option<_>>()?;
+    let fewest = rates.iter().map(|r| r.count).min()?;
+    let (least, most) = extremes(&rates);
+    let is_shown = hz
+        .and_then(|hz| hz.from)
+        .is_some_and(|from| from >= least * (1.0 - MEAN_SHARE));
+    if is_shown || fewest + 1 < FEWEST_OF_MEAN {
+        return None;
+    }
+    // One run does not show how much runs differ; random variation is the minimum.
+    let chance = if rates.len() > 1 {
+        0.0
+    } else {
+        SPREADS / libm::sqrt(fewest as f64)
+    };
+    let room = (most * MEAN_SHARE.max(chance)).max(SPREADS * (most - least));
+    (least > room).then(|| Range {
+        from: Some(rounded(least - room, libm::floor)),
+        to: Some(rounded(most + room, libm::ceil)),
+    })
+}
+
+/// The lowest and the highest of these rates.
+fn extremes(rates: &[Rate]) -> (f64, f64) {
+    let values = rates.iter().map(Rate::hz);
+    values.fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)))
+}
+
+/// The lowest and highest rates of a topic; if they are meaningless, the number of its messages.
+fn unjudged(seen: &[TopicIn<'_>], rates: &[Rate]) -> String {
+    let (least, most) = extremes(rates);
+    let counts = seen.iter().map(|s| s.facts.messages(s.id));
+    let count = counts.max().unwrap_or(0);
+    if count < FEWEST || rates.len() < 2 {
+        return words::count(usize::try_from(count).unwrap_or(usize::MAX), "message");
+    }
+    let [least, most] = [least, most].map(|hz| Some(words::significant(hz, 2)));
+    words::rate_range(least, most)
+}
+
+/// The longest silence of the runs with headroom, in nanoseconds, unless it is too long to be meaningful.
+fn longest(seen: &[TopicIn<'_>], may_end: bool) -> Option<i64> {
+    let silence = |s: &TopicIn<'_>| s.facts.longest_of(s.id, may_end);
+    let longest = seen.iter().map(silence).collect::<Option<Vec<i64>>>()?;
+    let usual = |s: &TopicIn<'_>| {
+        let mean = s.facts.mean(s.id)?;
+        i64::try_from(mean.count)
+            .ok()
+            .map(|count| mean.span.nanos() / count)
+    };
+    let usual = seen
+        .iter()
+        .filter_map(usual)
+        .max()?
+        .saturating_mul(INTERVALS);
+    let longest = longest.into_iter().max()?.saturating_mul(GAPS);
+    let gap = longest.max(usual).max(GAP_NS);
+    let life = seen
+        .iter()
+        .filter_map(|s| s.facts.received(s.id))
+        .map(|h| h.nanos());
+    (gap < life.min()? / 2).then(|| two_digits(gap))
+}
+
+/// The range around the median rate that covers noise and every window seen; `None` for bursty topics, where it would
+/// cover everything. The count of an uneven topic may differ by its square root.
+fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
+    let count = Rate::count(rates);
+    let mut values: Vec<f64> = rates.iter().map(Rate::hz).collect();
+    values.sort_by(f64::total_cmp);
+    let (least, most) = (*values.first()?, *values.last()?);
+    let median = values[values.len() / 2];
+    if count < FEWEST || median <= 0.0 {
+        return None;
+    }
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
+    let typical = rates
+        .iter()
+        .map(|r| r.hz() / (r.count as f64).max(1.0))
+        .fold(0.0, f64::max);
+    let chance = libm::sqrt(median * typical);
+    let spread = libm::sqrt(variance).max(if is_even { 0.0 } else { chance });
+    let margin = (median * SHARE).max(spread * SPREADS);
+    let (from, to) = ((median - margin).min(least), (median + margin).max(most));
+    (from > 0.0).then(|| Range {
+        from: Some(rounded(from, libm::floor)),
+        to: Some(rounded(to, libm::ceil)),
+    })
+}
+
+/// The value to three digits, rounded by `round`.
+fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
+    let power = 2.0 - libm::floor(libm::log10(value));
+    let scale = libm::pow(10.0, libm::fabs(power));
+    // A sum of 110.00000000000001 is 110, whichever way it is rounded.
+    let whole = |digits: f64| match libm::round(digits) {
+        near if (digits - near).abs() < 1e-9 * near => near,
+        _ => round(digits),
+    };
+    // Dividing by a power of ten keeps 0.3 exact.
+    if power >= 0.0 {
+        whole(value * scale) / scale
+    } else {
+        whole(value / scale) * scale
+    }
+}
+
 /// A length of time in the command line's syntax.
 fn length(nanos: i64) -> String {
-    const SECOND: i64 = 1_000_000_000;
     if nanos % SECOND == 0 {
         format!("{}s", nanos / SECOND)
     } else {
         format!("{}s", nanos as f64 / 1e9)
     }
+}
+
+/// The nanoseconds rounded up to a whole second.
+fn whole(nanos: i64) -> i64 {
+    nanos.saturating_add(SECOND - 1) / SECOND * SECOND
 }
 
 /// The nanoseconds rounded up to two digits.
@@ -149,15 +547,6 @@ fn scalar(text: &str) -> String {
     visible_json(&serde_json::to_string(text).unwrap_or_default()).into_owned()
 }
 
-/// Pairs as a mapping on one line.
-fn mapping(pairs: &[(&str, String)]) -> String {
-    let pairs: Vec<String> = pairs
-        .iter()
-        .map(|(key, value)| format!("{key}: {value}"))
-        .collect();
-    format!("{{{}}}", pairs.join(", "))
-}
-
 /// Names as a list on one line.
 fn list<'a>(names: impl Iterator<Item = &'a String>) -> String {
     let names: Vec<String> = names.map(|name| scalar(name)).collect();
@@ -169,10 +558,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::base::time::Span;
     use crate::gate::read;
 
     /// An expectation of `nodes` nodes, and of topics with these names, which must be readable.
-    fn of(nodes: usize, topics: &[String]) -> (Written, usize) {
+    fn file_of(nodes: usize, topics: &[String]) -> (Written, usize) {
         let mut draft = Draft::default();
         for n in 0..nodes {
             draft.nodes.insert(format!("/n{n}"), Line::default());
@@ -180,7 +570,7 @@ mod tests {
         for name in topics {
             draft.topics.insert(name.clone(), Line::default());
         }
-        let written = written(
+        let written = super::written(
             &draft,
             "run.bag",
             Period::from_nanos(1_000_000_000).unwrap(),
@@ -192,10 +582,10 @@ mod tests {
 
     #[test]
     fn expectations_with_any_number_of_names_can_be_read() {
-        let (small, kept) = of(2, &["/a".to_owned()]);
+        let (small, kept) = file_of(2, &["/a".to_owned()]);
         assert_eq!((small.left_out, kept), (0, 3));
         assert!(small.text.contains("unexpected_nodes: warn") && !small.text.contains("no room"));
-        let (large, kept) = of(1 << 17, &[]);
+        let (large, kept) = file_of(1 << 17, &[]);
         assert!(kept > 20_000 && large.left_out + kept == 1 << 17, "{kept}");
         assert!(large.text.contains("unexpected_nodes: allow"));
         assert!(large.text.contains(" more names did not fit.\n"));
@@ -206,7 +596,7 @@ mod tests {
         let signs = "\u{fffe}\u{ffff}\u{feff}\u{2028}\u{85}\u{7f}\u{1}\u{9b}\u{a0}\u{202e}\u{e0001}\u{1f600}\u{10ffff}\t\n\r\"'\\:#&*!|>%@`,[]{}?-~=<^$+ ß";
         for sign in signs.chars() {
             let name = format!("/a{sign}b");
-            let (written, kept) = of(0, std::slice::from_ref(&name));
+            let (written, kept) = file_of(0, std::slice::from_ref(&name));
             assert_eq!((written.left_out, kept), (0, 1), "{name:?}");
             let read = read(&written.text, Path::new("graph.yaml")).unwrap();
             let back = format!("{:?}", read.topics);
@@ -222,7 +612,7 @@ mod tests {
             "/a".repeat(505),
             format!("/{}", "\u{202e}".repeat(300)),
         ];
-        let (written, kept) = of(0, &names);
+        let (written, kept) = file_of(0, &names);
         assert_eq!((written.left_out, kept), (2, 1));
     }
 
@@ -241,5 +631,40 @@ mod tests {
             (length(60_000_000_000), length(500_000_000)),
             ("60s".to_owned(), "0.5s".to_owned())
         );
+    }
+
+    fn rates(counts: &[u64]) -> Vec<Rate> {
+        let rate = |(window, count): (usize, &u64)| Rate {
+            window,
+            span: Span::new(Stamp(0), Stamp(10_000_000_000)),
+            count: *count,
+            median_s: None,
+        };
+        counts.iter().enumerate().map(rate).collect()
+    }
+
+    fn band_of(counts: &[u64], is_even: bool) -> Option<String> {
+        band(&rates(counts), is_even).map(|range| range.to_string())
+    }
+
+    #[test]
+    fn a_steady_rate_has_ten_percent_headroom() {
+        assert_eq!(band_of(&[100, 100, 100], true).as_deref(), Some("9..11"));
+        assert_eq!(band_of(&[10, 10, 10], true).as_deref(), Some("0.9..1.1"));
+    }
+
+    #[test]
+    fn every_window_seen_is_in_range() {
+        assert_eq!(
+            band_of(&[100, 100, 100, 100, 100, 100, 60], true).as_deref(),
+            Some("5.8..14.2")
+        );
+    }
+
+    #[test]
+    fn bursts_have_no_rate() {
+        assert_eq!(band_of(&[1, 8, 0, 3], false), None);
+        assert_eq!(band_of(&[2, 2], true), None);
+        assert_eq!(band_of(&[7, 7, 7], false), None);
     }
 }

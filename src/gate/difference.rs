@@ -1,21 +1,44 @@
-//! The differences between two missions: in nodes, topics and edges, in rates, and in the events and their order.
+//! The differences between two missions: in nodes, topics and edges, in rates and times of messages, and in events.
 
-mod elements;
-mod happened;
-mod pairs;
+mod picture;
 mod report;
-mod sending;
-mod union;
 
-use super::facts::Facts;
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use super::facts::{Facts, Rate, Role, TopicIn};
+use super::values::Pattern;
+use crate::base::rhythm::{CLOSING_NS, FEWEST, FEWEST_OF_MEAN};
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
+use crate::graph::history::Bound;
+use crate::graph::{Element, NodeId};
 use crate::mission::Mission;
+use crate::mission::event_log::{Event, Kind};
 
-pub(crate) use pairs::pairs;
+pub(crate) use picture::{Side, pairs, union};
 pub use report::{DiffFormat, DiffSubject};
-pub(crate) use union::{Side, union};
+
+/// An end is certain if the silence after it is this many times its uncertainty.
+const DOUBTS: i64 = 8;
+/// The difference in nanoseconds up to which times of two runs count as equal: nodes of one launch file start in any
+/// order, a second apart.
+const APART_NS: i64 = 2_000_000_000;
+/// The part of the time since the start by which two runs may drift: a fiftieth.
+const PACE: i64 = 50;
+/// The number of standard deviations beyond which rates differ significantly.
+const SIGMAS: f64 = 3.0;
+/// The fraction by which the mean rate of an uneven topic may differ: such a topic depends on what happens in a run.
+const UNEVEN_CHANGE: f64 = 0.5;
+/// The fewest messages of a topic whose first and last are compared: with fewer, silences do not show a rhythm.
+const FEWEST_OF_TIMES: u64 = 20;
+/// The longest silence of a topic, times this, is the uncertainty of its first and its last message.
+const SILENCES: i64 = 2;
 
 /// Which of two missions contain an element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Where {
     /// Only in the first.
@@ -34,7 +57,7 @@ impl Where {
 }
 
 /// One difference.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Difference {
     /// The kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
@@ -42,14 +65,17 @@ pub struct Difference {
     /// The name of the node or topic it is about, or both names of an edge.
     pub name: String,
     /// The node or topic, or both as in `name`; the name of an event contains more.
+    #[serde(skip)]
     pub element: String,
     /// The missions that contain it.
+    #[serde(rename = "in")]
     pub side: Where,
     /// The value in the first mission; empty for none.
     pub first: String,
     /// The value in the second mission; empty for none.
     pub second: String,
     /// Whether it is observable in both missions. An element without evidence in one is not absent from it.
+    #[serde(rename = "known")]
     pub is_known: bool,
 }
 
@@ -57,12 +83,12 @@ impl Difference {
     /// A difference in something that only one mission has.
     fn only(kind: &'static str, name: impl Into<String>, side: Where, what: &str) -> Self {
         let (first, second) = match side {
-            Where::Second => (String::new(), what.to_owned()),
-            _ => (what.to_owned(), String::new()),
+            Where::Second => ("", what),
+            _ => (what, ""),
         };
         Self {
             side,
-            ..Self::changed(kind, name, first, second)
+            ..Self::changed(kind, name, [first, second])
         }
     }
 
@@ -70,17 +96,17 @@ impl Difference {
     fn changed(
         kind: &'static str,
         name: impl Into<String>,
-        first: impl Into<String>,
-        second: impl Into<String>,
+        values: [impl Into<String>; 2],
     ) -> Self {
         let name = name.into();
+        let [first, second] = values.map(Into::into);
         Self {
             kind,
             element: name.clone(),
             name,
             side: Where::Both,
-            first: first.into(),
-            second: second.into(),
+            first,
+            second,
             is_known: true,
         }
     }
@@ -89,24 +115,447 @@ impl Difference {
 /// All differences: elements, then events, then times of topics. A rate must differ by more than the fraction
 /// `rate_change`, and significantly.
 pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
-    let (a, b) = (Facts::new(first), Facts::new(second));
-    let mut all = elements::differences(&a, &b, rate_change);
-    all.extend(happened::differences(&a, &b));
-    if a.is_rewritten() || b.is_rewritten() {
+    let facts = &[Facts::new(first), Facts::new(second)];
+    let mut all = elements(facts, rate_change);
+    all.extend(events(facts));
+    if facts.iter().any(|facts| facts.is_rewritten) {
         // Senders are unknown there, and so are ends and restarts of nodes.
         let lost = ["publishes", "end", "restarts", "event"];
         for one in all.iter_mut().filter(|d| lost.contains(&d.kind)) {
             one.is_known = false;
         }
     }
-    let times = sending::times(&a, &b, &all);
+    let times = times(facts, &all);
     // A topic that ends earlier is also silent.
     let ends = |d: &Difference| {
-        times
-            .iter()
-            .any(|t| t.kind == "end" && t.element == d.element)
+        let mut ends = times.iter().filter(|t| t.kind == "end");
+        ends.any(|t| t.element == d.element)
     };
     all.retain(|d| !(d.kind == "event" && d.name.ends_with(" silent") && ends(d)));
     all.extend(times);
     all
+}
+
+/// The nodes, topics and edges in only one mission, and the differences between those in both.
+fn elements(facts: &[Facts<'_>; 2], rate_change: f64) -> Vec<Difference> {
+    let nodes = facts.each_ref().map(|facts| {
+        let roles = facts.robot_roles();
+        roles
+            .map(|role| (role.name, role))
+            .collect::<BTreeMap<&str, Role<'_>>>()
+    });
+    let mut all = presence("node", &nodes);
+    // Whether the mission that lacks a node would name it.
+    let lost = |side| all.iter().filter(|one| one.side == side).count();
+    let in_second = facts[1].names_nodes(lost(Where::First));
+    let in_first = facts[0].names_nodes(lost(Where::Second));
+    for one in &mut all {
+        one.is_known = if one.side == Where::First {
+            in_second
+        } else {
+            in_first
+        };
+    }
+    let topics = facts.each_ref().map(topics);
+    all.extend(presence("topic", &topics));
+    for (name, first) in &nodes[0] {
+        if let Some(second) = nodes[1].get(name) {
+            node(name, [*first, *second], &mut all);
+        }
+    }
+    let in_both = |role: &str| nodes.iter().all(|own| own.contains_key(role));
+    for (name, first) in &topics[0] {
+        if let Some(second) = topics[1].get(name) {
+            let both = [*first, *second];
+            values(name, both, &mut all);
+            all.extend(rate(name, both, rate_change));
+            edges(name, both, in_both, &mut all);
+        }
+    }
+    all
+}
+
+/// The topics with messages, without housekeeping.
+fn topics<'a>(facts: &'a Facts<'a>) -> BTreeMap<&'a str, TopicIn<'a>> {
+    let all = facts.robot_topics();
+    all.map(|id| (facts.topic(id), TopicIn { facts, id }))
+        .collect()
+}
+
+/// The names in only one of these.
+fn presence<T>(kind: &'static str, both: &[BTreeMap<&str, T>; 2]) -> Vec<Difference> {
+    let [first, second] = both
+        .each_ref()
+        .map(|own| own.keys().copied().collect::<BTreeSet<&str>>());
+    let only = first.symmetric_difference(&second).map(|name| {
+        let side = Where::only(first.contains(name));
+        Difference::only(kind, *name, side, "present")
+    });
+    only.collect()
+}
+
+/// The differences of a node in both missions.
+fn node(name: &str, both: [Role<'_>; 2], all: &mut Vec<Difference>) {
+    let restarts = both.map(|own| own.facts.events(own.nodes, Kind::Restarted).len());
+    if restarts[0] != restarts[1] {
+        let restarts = restarts.map(|many| many.to_string());
+        all.push(Difference::changed("restarts", name, restarts));
+    }
+    let states = both.map(|own| own.facts.lifecycle(own.nodes));
+    if let [Some(first), Some(second)] = states
+        && first != second
+    {
+        all.push(Difference::changed("lifecycle", name, [first, second]));
+    }
+    let ends = both.map(|own| own.facts.ended(own.nodes, CLOSING_NS));
+    // An intermittent topic may be silent at the end: it only ended if the silence far exceeds the uncertainty.
+    let is_over = |side: usize, end: Bound| {
+        let rest = both[side].facts.mission.span.end.since(end.time);
+        let doubt = end.latest.since(end.earliest);
+        doubt <= CLOSING_NS || doubt.saturating_mul(DOUBTS) <= rest
+    };
+    let has_ended = match ends {
+        [Some(end), None] => is_over(0, end),
+        [None, Some(end)] => is_over(1, end),
+        _ => false,
+    };
+    if has_ended {
+        let ends = [0, 1].map(|side| outcome(both[side].facts, ends[side].map(|end| end.time)));
+        all.push(Difference::changed("end", name, ends));
+    }
+}
+
+/// How something ends in a mission, as text.
+fn outcome(facts: &Facts<'_>, end: Option<Stamp>) -> String {
+    match end {
+        Some(end) => format!("ends at {}", facts.clock(end)),
+        None => "stays".to_owned(),
+    }
+}
+
+/// The different types and quality of service of a topic in both missions.
+fn values(name: &str, both: [TopicIn<'_>; 2], all: &mut Vec<Difference>) {
+    let topics = both.map(|own| &own.facts.mission.elements.topics[own.id]);
+    let types = topics.map(|topic| {
+        let types: Vec<&str> = topic.types.iter().map(|t| &**t).collect();
+        types.join(", ")
+    });
+    let [first, second] = types.each_ref().map(|types| types.replace("/msg/", "/"));
+    if first != second {
+        all.push(Difference::changed("type", name, types));
+    }
+    if let [Some(first), Some(second)] = topics.map(|topic| topic.qos.as_deref())
+        && first != second
+    {
+        all.push(Difference::changed("qos", name, [first, second]));
+    }
+}
+
+/// The publications and subscriptions of a topic in only one mission, by nodes in both.
+fn edges(
+    name: &str,
+    both: [TopicIn<'_>; 2],
+    in_both: impl Fn(&str) -> bool,
+    all: &mut Vec<Difference>,
+) {
+    let kinds = [
+        ("publishes", both.map(|own| own.publishers())),
+        ("subscribes", both.map(|own| own.to())),
+    ];
+    for (kind, [first, second]) in kinds {
+        let roles = first.symmetric_difference(&second);
+        for role in roles.filter(|role| in_both(role)) {
+            let is_first = first.contains(role);
+            // Whether the edge would be observable in the mission that lacks it.
+            let TopicIn { facts, id } = both[usize::from(is_first)];
+            let (edge, is_known) = if kind == "publishes" {
+                (format!("{role} → {name}"), facts.lists_publishers(id))
+            } else {
+                let roles = facts.nodes(&Pattern::new(role));
+                let nodes: Vec<NodeId> =
+                    roles.iter().flat_map(|role| role.nodes.to_vec()).collect();
+                (format!("{name} → {role}"), facts.lists_subscribers(&nodes))
+            };
+            all.push(Difference {
+                is_known,
+                ..Difference::only(kind, edge, Where::only(is_first), "present")
+            });
+        }
+    }
+}
+
+/// The difference in the rate of a topic, if any.
+fn rate(name: &str, both: [TopicIn<'_>; 2], rate_change: f64) -> Option<Difference> {
+    let rates = both.map(|own| own.rates(true));
+    let in_windows = apart(rates.each_ref().map(|own| mean(own)), rate_change);
+    let is_uneven = !rates.iter().all(|own| Rate::are_even(own));
+    let different = in_windows.or_else(|| {
+        let [first, second] = both.map(|own| own.facts.mean(own.id));
+        let whole = [first?, second?];
+        let is_enough = is_uneven && whole.iter().all(|r| r.count + 1 >= FEWEST_OF_MEAN);
+        let change = rate_change.max(UNEVEN_CHANGE);
+        is_enough.then(|| apart(whole.map(|r| mean(&[r])), change))?
+    });
+    let rates = different?.map(|mean| words::rate(mean.hz));
+    Some(Difference::changed("rate", name, rates))
+}
+
+/// The mean rate of a topic.
+#[derive(Clone, Copy)]
+struct MeanRate {
+    hz: f64,
+    /// Its uncertainty.
+    doubt: f64,
+}
+
+/// The mean rate of a topic; `None` with too few messages.
+fn mean(rates: &[Rate]) -> Option<MeanRate> {
+    let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
+    let (count, seconds) = (Rate::count(rates), nanos.max(1) as f64 / 1e9);
+    // The count of an even topic is exact to a message; a random one varies by its square root, bursts by more.
+    let chance = if Rate::are_even(rates) {
+        1.0
+    } else {
+        libm::sqrt(count as f64)
+    };
+    (count >= FEWEST).then(|| MeanRate {
+        hz: count as f64 / seconds,
+        doubt: (chance / seconds).max(spread(rates)),
+    })
+}
+
+/// Two rates that differ by more than the fraction `change`, and significantly.
+fn apart([first, second]: [Option<MeanRate>; 2], change: f64) -> Option<[MeanRate; 2]> {
+    let (first, second) = (first?, second?);
+    let noise = SIGMAS * libm::sqrt(first.doubt * first.doubt + second.doubt * second.doubt);
+    let apart = libm::fabs(second.hz - first.hz);
+    let is_apart = apart > change * first.hz.min(second.hz) && apart > noise;
+    is_apart.then_some([first, second])
+}
+
+/// The standard error of the mean rate, by how windows differ; 0 with fewer than two.
+fn spread(rates: &[Rate]) -> f64 {
+    let n = rates.len() as f64;
+    if rates.len() < 2 {
+        return 0.0;
+    }
+    let mean = rates.iter().map(Rate::hz).sum::<f64>() / n;
+    let squares = rates.iter().map(|r| (r.hz() - mean) * (r.hz() - mean));
+    libm::sqrt(squares.sum::<f64>() / (n - 1.0) / n)
+}
+
+/// The key of an event: its kind, the name it is about, and its number among the events of both, counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct EventKey {
+    kind: Kind,
+    name: String,
+    nth: usize,
+}
+
+impl EventKey {
+    fn text(&self) -> String {
+        let word = self.kind.word().replace('_', " ");
+        match self.nth {
+            1 => format!("{} {word}", self.name),
+            n => format!("{} {word} ({n})", self.name),
+        }
+    }
+}
+
+/// An event with names instead of ids.
+struct NamedEvent {
+    key: EventKey,
+    /// The time as text for people.
+    clock: String,
+    moment: Moment,
+    /// Whether it is the silence of a robot's shutdown at the very end.
+    is_closing: bool,
+}
+
+/// A time since the start of a mission and its uncertainty, in nanoseconds.
+#[derive(Clone, Copy)]
+struct Moment {
+    at: i64,
+    doubt: i64,
+}
+
+/// All differences in events: those in only one mission, or at another time.
+fn events(facts: &[Facts<'_>; 2]) -> Vec<Difference> {
+    let [first, second] = &facts.each_ref().map(named_events);
+    let mut all = only(first, second, Where::First);
+    all.extend(only(second, first, Where::Second));
+    let places: BTreeMap<&EventKey, &NamedEvent> = second.iter().map(|t| (&t.key, t)).collect();
+    let mut shift = 0;
+    for one in first {
+        if let Some(other) = places.get(&one.key)
+            && is_moved([one.moment, other.moment], &mut shift)
+        {
+            let clocks = [&one.clock, &other.clock];
+            all.push(Difference {
+                element: one.key.name.clone(),
+                ..Difference::changed("time", one.key.text(), clocks)
+            });
+        }
+    }
+    all
+}
+
+/// The headlines that two runs can have in common.
+fn named_events(facts: &Facts<'_>) -> Vec<NamedEvent> {
+    let mission = facts.mission;
+    let mut many: BTreeMap<(Kind, &str), usize> = BTreeMap::new();
+    let mut all = Vec::new();
+    for (_, event) in mission.log.headlines(mission.span) {
+        let Some(name) = about(facts, event) else {
+            continue;
+        };
+        let nth = many.entry((event.kind, name)).or_default();
+        *nth += 1;
+        all.push(NamedEvent {
+            key: EventKey {
+                kind: event.kind,
+                name: name.to_owned(),
+                nth: *nth,
+            },
+            clock: facts.clock(event.time),
+            moment: Moment {
+                at: mission.offset(event.time),
+                doubt: event.latest.since(event.earliest),
+            },
+            is_closing: mission.span.end.since(event.time) <= CLOSING_NS,
+        });
+    }
+    all
+}
+
+/// The node or topic that an event is about; rates, and connections, are compared elsewhere.
+fn about<'a>(facts: &Facts<'a>, event: &Event) -> Option<&'a str> {
+    match (event.kind, event.what) {
+        // The number of restarts is compared, not their times.
+        (Kind::Rate | Kind::Type | Kind::Qos | Kind::Restarted, _) => None,
+        (_, Element::Node(id)) => Some(facts.role(id)),
+        (_, Element::Topic(id)) => Some(facts.topic(id)),
+        _ => None,
+    }
+}
+
+/// The events in only one mission about elements of both. Starts and stops are reported for the elements.
+fn only(own: &[NamedEvent], other: &[NamedEvent], side: Where) -> Vec<Difference> {
+    let known: BTreeSet<&EventKey> = other.iter().map(|t| &t.key).collect();
+    let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
+    let alone = own.iter().filter(|t| {
+        // Silence at the very end is due to the robot's shutdown, if the other recording lasts that long.
+        wanted.contains(&t.key.kind) && !known.contains(&t.key) && !t.is_closing
+    });
+    let differences = alone.map(|t| Difference {
+        element: t.key.name.clone(),
+        ..Difference::only("event", t.key.text(), side, &format!("at {}", t.clock))
+    });
+    differences.collect()
+}
+
+/// Whether something is at another time in the second mission. If it has the same `shift` as the previous one,
+/// everything is delayed, which was reported for the first one.
+fn is_moved([first, second]: [Moment; 2], shift: &mut i64) -> bool {
+    let later = second.at.saturating_sub(first.at);
+    let since_before = later.saturating_sub(*shift);
+    let doubt = first.doubt.saturating_add(second.doubt);
+    if doubt <= APART_NS {
+        *shift = later;
+    }
+    let apart = later.saturating_abs().min(since_before.saturating_abs());
+    apart > tolerance(doubt, first.at.max(second.at))
+}
+
+/// The nanoseconds by which times of this uncertainty, this long since the start, may differ between two runs.
+fn tolerance(doubt: i64, since: i64) -> i64 {
+    let tolerance = APART_NS.saturating_add(doubt);
+    tolerance.saturating_add(since / PACE)
+}
+
+/// A topic of both missions with enough messages, and the times of the first and the last one in each.
+struct Sent<'a> {
+    name: &'a str,
+    facts: [&'a Facts<'a>; 2],
+    received: [Span; 2],
+    /// The uncertainty of both times, in nanoseconds.
+    doubt: i64,
+}
+
+/// The topics that begin or end at another time, unless a difference of a publisher, or in an event, shows that.
+fn times(facts: &[Facts<'_>; 2], known: &[Difference]) -> Vec<Difference> {
+    let theirs = topics(&facts[1]);
+    let mut sent: Vec<Sent<'_>> = Vec::new();
+    let mut all = Vec::new();
+    for (name, first) in topics(&facts[0]) {
+        let second = theirs.get(name).copied();
+        let Some(one) = second.and_then(|second| Sent::of(name, [first, second])) else {
+            continue;
+        };
+        let publishers = first.facts.publishers(first.id).into_iter();
+        let roles: Vec<&str> = publishers.map(|peer| first.facts.role(peer.node)).collect();
+        let is_reported = |kind: &str| {
+            let own = |d: &&Difference| d.element == name || roles.contains(&&*d.element);
+            known.iter().filter(own).any(|d| d.kind == kind)
+        };
+        if !is_reported("end") {
+            all.extend(one.end());
+        }
+        if !is_reported("time") {
+            sent.push(one);
+        }
+    }
+    sent.sort_by_key(|s| s.received[0].start);
+    let mut shift = 0;
+    for one in &sent {
+        all.extend(one.begin(&mut shift));
+    }
+    all.sort_by(|x, y| (x.kind, &x.name).cmp(&(y.kind, &y.name)));
+    all
+}
+
+impl<'a> Sent<'a> {
+    fn of(name: &'a str, both: [TopicIn<'a>; 2]) -> Option<Self> {
+        let received = both.map(|TopicIn { facts, id }| {
+            let is_enough = facts.messages(id) >= FEWEST_OF_TIMES;
+            facts.received(id).filter(|_| is_enough)
+        });
+        let [Some(first), Some(second)] = received else {
+            return None;
+        };
+        let silences = both.map(|own| own.facts.longest_silence(own.id));
+        Some(Self {
+            name,
+            facts: both.map(|own| own.facts),
+            received: [first, second],
+            doubt: silences[0].max(silences[1]).saturating_mul(SILENCES),
+        })
+    }
+
+    /// The difference in the first message.
+    fn begin(&self, shift: &mut i64) -> Option<Difference> {
+        let starts = self.received.map(|span| span.start);
+        let moments = [0, 1].map(|side| Moment {
+            at: self.facts[side].mission.offset(starts[side]),
+            doubt: self.doubt / 2,
+        });
+        let clocks = [0, 1].map(|side| self.facts[side].clock(starts[side]));
+        is_moved(moments, shift).then(|| Difference::changed("begin", self.name, clocks))
+    }
+
+    /// The difference in the last message. One at the end of a recording shows nothing of the time after it.
+    fn end(&self) -> Option<Difference> {
+        let received = self.received.map(|span| span.end);
+        let missions = self.facts.map(|facts| facts.mission);
+        let ends = [0, 1].map(|side| {
+            let rest = missions[side].span.end.since(received[side]);
+            (rest > CLOSING_NS.max(self.doubt)).then_some(received[side])
+        });
+        let [first, second] = [0, 1].map(|side| missions[side].offset(received[side]));
+        let apart = first.saturating_sub(second).saturating_abs();
+        let is_moved = apart > tolerance(self.doubt, first.max(second));
+        let is_earlier = ends[usize::from(second < first)].is_some();
+        let texts = [0, 1].map(|side| outcome(self.facts[side], ends[side]));
+        (is_moved && is_earlier).then(|| Difference::changed("end", self.name, texts))
+    }
 }

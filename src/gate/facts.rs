@@ -1,22 +1,21 @@
-//! The facts of a mission by name: its nodes and topics, their times and rates, and whether they are observable.
-
-mod cause;
-mod tempo;
+//! The facts of a mission by name: its nodes and topics, their times and rates, whether they are observable, and causes in
+//! the event log.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::pattern::Pattern;
+use super::finding::Cause;
+use super::values::Pattern;
+use crate::base::cast;
 use crate::base::name::is_quiet;
 use crate::base::notice::NoticeKind;
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Confidence, Evidence};
-use crate::graph::history::Bound;
-use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, State, Topic, TopicId};
-use crate::mission::Mission;
+use crate::graph::history::{Bound, Sending};
+use crate::graph::{ById, Edge, EdgeId, Element, NodeId, PerElement, Row, State, Topic, TopicId};
 use crate::mission::event_log::{Event, Kind};
-
-pub(crate) use tempo::{Rate, TopicSilence};
+use crate::mission::{Mission, Window};
 
 /// A mission with precomputed facts.
 pub(crate) struct Facts<'a> {
@@ -25,15 +24,79 @@ pub(crate) struct Facts<'a> {
     confidences: PerElement<Confidence>,
     /// The number of messages of each topic.
     messages: ById<TopicId, u64>,
-    /// Whether a tool rewrote the bag, so that it names wrong publishers.
-    is_rewritten: bool,
+    /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
+    pub(crate) is_rewritten: bool,
     /// Present nodes by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The role of each of them.
     names: BTreeMap<&'a str, &'a str>,
-    topics: BTreeMap<&'a str, TopicId>,
     /// The publications and the subscriptions of each topic.
     edges: [ById<TopicId, Vec<EdgeId>>; 2],
+}
+
+/// A role of a mission and its nodes.
+#[derive(Clone, Copy)]
+pub(crate) struct Role<'a> {
+    pub(crate) facts: &'a Facts<'a>,
+    pub(crate) name: &'a str,
+    pub(crate) nodes: &'a [NodeId],
+}
+
+/// A publisher or subscriber of a topic; one known only from code and launch files is declared.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Peer {
+    pub(crate) node: NodeId,
+    pub(crate) edge: EdgeId,
+    pub(crate) confidence: Confidence,
+    pub(crate) evidence: Evidence,
+}
+
+impl Peer {
+    /// Whether it is measured or stated, not only inferred.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.confidence <= Confidence::Stated
+    }
+}
+
+/// A topic of one of several missions.
+#[derive(Clone, Copy)]
+pub(crate) struct TopicIn<'a> {
+    pub(crate) facts: &'a Facts<'a>,
+    pub(crate) id: TopicId,
+}
+
+impl TopicIn<'_> {
+    /// Whether its last message is longer before the mission's end than these nanoseconds.
+    pub(crate) fn ends(&self, closing: i64) -> bool {
+        let received = self.facts.received(self.id);
+        received.is_some_and(|own| self.facts.mission.span.end.since(own.end) > closing)
+    }
+
+    pub(crate) fn types(&self) -> BTreeSet<String> {
+        let own = &self.facts.mission.elements.topics[self.id];
+        own.types.iter().map(|t| (**t).to_owned()).collect()
+    }
+
+    /// The nodes that publish it; `None` unless all of them are known.
+    pub(crate) fn by(&self) -> Option<BTreeSet<String>> {
+        let is_listed = self.facts.lists_publishers(self.id);
+        is_listed.then(|| self.publishers())
+    }
+
+    /// The nodes that publish it, if measured or stated.
+    pub(crate) fn publishers(&self) -> BTreeSet<String> {
+        self.facts.sure_roles(&self.facts.publishers(self.id))
+    }
+
+    /// The nodes that subscribe to it, if measured or stated.
+    pub(crate) fn to(&self) -> BTreeSet<String> {
+        self.facts.sure_roles(&self.facts.subscribers(self.id))
+    }
+
+    /// Its rates in the whole mission.
+    pub(crate) fn rates(&self, may_end: bool) -> Vec<Rate> {
+        self.facts.rates(self.id, may_end, self.facts.mission.span)
+    }
 }
 
 /// Kinds of evidence for what should have run, not for what did. The user's topology file states what did.
@@ -60,19 +123,68 @@ fn has(evidence: Evidence, words: &[&str]) -> bool {
     words.iter().any(|word| evidence.has(word))
 }
 
+/// The rate of a topic in a window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rate {
+    /// The window's index.
+    pub(crate) window: usize,
+    /// The part of it that counts.
+    pub(crate) span: Span,
+    pub(crate) count: u64,
+    /// The median time between its messages in seconds.
+    pub(crate) median_s: Option<f64>,
+}
+
+impl Rate {
+    fn seconds(&self) -> f64 {
+        self.span.nanos().max(1) as f64 / 1e9
+    }
+
+    /// Messages per second.
+    pub(crate) fn hz(&self) -> f64 {
+        self.count as f64 / self.seconds()
+    }
+
+    /// Messages per second with one more message, which may have just missed this window.
+    pub(crate) fn at_most(&self) -> f64 {
+        (self.count + 1) as f64 / self.seconds()
+    }
+
+    /// Messages per second with one message less.
+    pub(crate) fn at_least(&self) -> f64 {
+        self.count.saturating_sub(1) as f64 / self.seconds()
+    }
+
+    /// The number of messages in all of these.
+    pub(crate) fn count(rates: &[Self]) -> u64 {
+        rates.iter().map(|rate| rate.count).sum()
+    }
+
+    /// Messages per second in all of these.
+    pub(crate) fn mean_hz(rates: &[Self]) -> f64 {
+        let nanos: i64 = rates.iter().map(|rate| rate.span.nanos()).sum();
+        Self::count(rates) as f64 / (nanos.max(1) as f64 / 1e9)
+    }
+
+    /// Whether messages are evenly spaced, judged by the median interval in each of these windows.
+    pub(crate) fn are_even(rates: &[Self]) -> bool {
+        let share = |rate: &Self| Some(rate.median_s? * rate.hz());
+        let mut shares = rates.iter().filter_map(share).peekable();
+        shares.peek().is_some() && shares.all(|share| (0.8..=1.25).contains(&share))
+    }
+}
+
 impl<'a> Facts<'a> {
     /// The facts of a mission.
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let elements = &mission.elements;
         let confidences = mission.graphs.confidences(elements);
         let is_there = |id| confidences.of(Element::Node(id)) < Some(&Confidence::Declared);
-        let count = |id| {
-            let rows = mission.graphs.rows(Element::Topic(id));
-            rows.filter_map(|(_, row)| row.count).sum()
-        };
-        let topics = elements.topics.with_ids();
+        let count = |id| messages(mission, Element::Topic(id));
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
         let mut names = BTreeMap::new();
+        let mut notices = mission.notices.iter();
+        let is_rewritten = notices.any(|notice| notice.kind == NoticeKind::Rewritten);
         for (id, node) in elements.nodes.with_ids() {
             // Elements in no window are outside the part that is checked.
             if is_there(id) && is_seen(node.seen.evidence) {
@@ -84,50 +196,47 @@ impl<'a> Facts<'a> {
             mission,
             confidences,
             messages: elements.topics.ids().map(count).collect(),
-            is_rewritten: mission
-                .notices
-                .iter()
-                .any(|n| n.kind == NoticeKind::Rewritten),
+            is_rewritten,
             roles,
             names,
-            topics: topics
-                .map(|(id, topic)| (topic.name.as_str(), id))
-                .collect(),
             edges: [&elements.publishes, &elements.subscribes]
                 .map(|edges| by_topic(edges, &elements.topics)),
         }
     }
 
-    /// The present roles, each with its nodes.
-    pub(crate) fn roles(&self) -> impl Iterator<Item = (&'a str, &[NodeId])> {
+    /// The present roles.
+    pub(crate) fn roles(&self) -> impl Iterator<Item = Role<'_>> {
         self.roles
             .iter()
-            .map(|(role, nodes)| (*role, nodes.as_slice()))
+            .map(|(name, nodes)| self.role_of(name, nodes))
+    }
+
+    fn role_of<'s>(&'s self, name: &'s str, nodes: &'s [NodeId]) -> Role<'s> {
+        Role {
+            facts: self,
+            name,
+            nodes,
+        }
     }
 
     /// The roles that a pattern matches; a node name matches its role too.
-    pub(crate) fn nodes(&self, pattern: &Pattern) -> Vec<(&'a str, &[NodeId])> {
+    pub(crate) fn nodes(&self, pattern: &Pattern) -> Vec<Role<'_>> {
+        let name = pattern.as_str();
         if pattern.is_name() {
-            let name = pattern.as_str();
-            let own = self.roles.get_key_value(name).map(|(role, _)| *role);
-            let roles: BTreeSet<&str> = own
-                .into_iter()
-                .chain(self.names.get(name).copied())
-                .collect();
+            let own = self.names.get(name).copied();
+            let roles: BTreeSet<&str> = own.into_iter().chain([name]).collect();
             let found = roles
                 .into_iter()
                 .filter_map(|role| self.roles.get_key_value(role));
             return found
-                .map(|(role, nodes)| (*role, nodes.as_slice()))
+                .map(|(name, nodes)| self.role_of(name, nodes))
                 .collect();
         }
-        let own = |nodes: &[NodeId]| {
-            let names = nodes.iter().map(|id| self.node(*id));
-            names.into_iter().any(|name| pattern.matches(name))
+        let fits = |role: &Role<'_>| {
+            pattern.matches(role.name)
+                || role.nodes.iter().any(|id| pattern.matches(self.node(*id)))
         };
-        self.roles()
-            .filter(|(role, nodes)| pattern.matches(role) || own(nodes))
-            .collect()
+        self.roles().filter(fits).collect()
     }
 
     /// Whether a pattern matches a node.
@@ -138,7 +247,7 @@ impl<'a> Facts<'a> {
     /// The present topics that a pattern matches.
     pub(crate) fn topics(&self, pattern: &Pattern) -> Vec<TopicId> {
         if pattern.is_name() {
-            let own = self.topics.get(pattern.as_str()).copied();
+            let own = self.mission.elements.topic(pattern.as_str());
             return own.into_iter().filter(|id| self.is_there(*id)).collect();
         }
         let topics = self.mission.elements.topics.with_ids();
@@ -201,38 +310,51 @@ impl<'a> Facts<'a> {
         nodes.iter().any(sure)
     }
 
-    /// The publishers of a topic: the node, the publication, and its confidence; one known only from code and launch
-    /// files is declared.
-    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, EdgeId, Confidence)> {
-        let own = self.edges[0][topic].iter();
-        own.map(|id| {
-            let edge = &self.mission.elements.publishes[*id];
-            (edge.node, *id, self.confidence(Element::Publish(*id)))
-        })
-        .collect()
+    /// The measured or stated roles, without tools.
+    pub(crate) fn robot_roles(&self) -> impl Iterator<Item = Role<'_>> {
+        let sure = |role: &Role<'_>| self.is_sure(role.nodes) && !self.is_tool(role.nodes);
+        self.roles().filter(sure)
     }
 
-    /// The subscribers of a topic, in the same form.
-    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, EdgeId, Confidence)> {
-        let own = self.edges[1][topic].iter();
-        own.map(|id| {
-            let edge = &self.mission.elements.subscribes[*id];
-            (edge.node, *id, self.confidence(Element::Subscribe(*id)))
-        })
-        .collect()
+    /// The topics with messages, without housekeeping.
+    pub(crate) fn robot_topics(&self) -> impl Iterator<Item = TopicId> {
+        let all = self.topics(&Pattern::new("**")).into_iter();
+        all.filter(|id| !self.is_housekeeping(*id) && self.messages(*id) > 0)
     }
 
-    /// The roles of the nodes of these edges, without tools and without what is only inferred.
-    pub(crate) fn sure_roles(&self, edges: &[(NodeId, EdgeId, Confidence)]) -> BTreeSet<String> {
-        let sure = edges
+    /// The publishers of a topic.
+    pub(crate) fn publishers(&self, topic: TopicId) -> Vec<Peer> {
+        let edges = &self.mission.elements.publishes;
+        self.peers(&self.edges[0][topic], edges, Element::Publish)
+    }
+
+    /// The subscribers of a topic.
+    pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<Peer> {
+        let edges = &self.mission.elements.subscribes;
+        self.peers(&self.edges[1][topic], edges, Element::Subscribe)
+    }
+
+    fn peers(
+        &self,
+        own: &[EdgeId],
+        edges: &ById<EdgeId, Edge>,
+        element: fn(EdgeId) -> Element,
+    ) -> Vec<Peer> {
+        let peer = |id: &EdgeId| Peer {
+            node: edges[*id].node,
+            edge: *id,
+            confidence: self.confidence(element(*id)),
+            evidence: edges[*id].seen.evidence,
+        };
+        own.iter().map(peer).collect()
+    }
+
+    /// The roles of these, without tools and without what is only inferred.
+    pub(crate) fn sure_roles(&self, peers: &[Peer]) -> BTreeSet<String> {
+        let sure = peers
             .iter()
-            .filter(|(node, _, known)| *known <= Confidence::Stated && !self.is_tool(&[*node]));
-        sure.map(|(node, ..)| self.role(*node).to_owned()).collect()
-    }
-
-    /// Whether a tool rewrote the bag, so that merged publishers cannot be distinguished.
-    pub(crate) fn is_rewritten(&self) -> bool {
-        self.is_rewritten
+            .filter(|peer| peer.is_sure() && !self.is_tool(&[peer.node]));
+        sure.map(|peer| self.role(peer.node).to_owned()).collect()
     }
 
     /// Whether the bag names nodes reliably, so that an unnamed one is absent; `lost` expected nodes are
@@ -240,11 +362,10 @@ impl<'a> Facts<'a> {
     /// never write. ROS 2 bags name nodes that start during the recording: if more are missing than named,
     /// they ran before the recorder.
     pub(crate) fn names_nodes(&self, lost: usize) -> bool {
-        let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
-        let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
+        let named: Vec<Role<'_>> = self.robot_roles().collect();
         let any = |words: &[&str]| {
             let has_any = |id: &NodeId| has(self.mission.elements.nodes[*id].seen.evidence, words);
-            named.iter().any(|nodes| nodes.iter().any(has_any))
+            named.iter().any(|role| role.nodes.iter().any(has_any))
         };
         !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
     }
@@ -258,12 +379,8 @@ impl<'a> Facts<'a> {
     /// Whether the bag names all publishers of a topic.
     pub(crate) fn lists_publishers(&self, topic: TopicId) -> bool {
         let unknown = self.mission.elements.topics[topic].unknown_publishers;
-        let known = self.publishers(topic);
-        !self.is_rewritten
-            && unknown.unwrap_or(0) == 0
-            && known
-                .iter()
-                .any(|(.., confidence)| *confidence <= Confidence::Stated)
+        let is_known = self.publishers(topic).iter().any(Peer::is_sure);
+        !self.is_rewritten && unknown.unwrap_or(0) == 0 && is_known
     }
 
     /// Whether the bag lists all subscribers, in general or for these nodes, so that an unlisted node is not a
@@ -281,18 +398,15 @@ impl<'a> Facts<'a> {
         for id in nodes {
             let runs = &self.mission.elements.seen(Element::Node(*id)).lives;
             if runs.is_empty() {
-                all.extend(self.windows_of(*id));
+                // A mission without finer times.
+                let rows = self.mission.graphs.rows(Element::Node(*id));
+                let windows = rows.filter_map(|(at, _)| self.mission.windows.get(at));
+                all.extend(windows.map(|window| window.span));
             } else {
                 all.extend(runs);
             }
         }
         Span::joined(all, 0)
-    }
-
-    /// The windows that contain a node, for a mission without finer times.
-    fn windows_of(&self, node: NodeId) -> impl Iterator<Item = Span> + use<'a> {
-        let rows = self.mission.graphs.rows(Element::Node(node));
-        rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
     /// The time in which a node published a topic, if known, and the number of its messages.
@@ -303,8 +417,7 @@ impl<'a> Facts<'a> {
             runs => runs.to_vec(),
         };
         let span = Span::new(runs.first()?.start, runs.last()?.end);
-        let rows = mission.graphs.rows(Element::Publish(edge));
-        Some((span, rows.filter_map(|(_, row)| row.count).sum()))
+        Some((span, messages(mission, Element::Publish(edge))))
     }
 
     /// Entries of the event log about any of these nodes, but not about their edges.
@@ -391,9 +504,183 @@ impl<'a> Facts<'a> {
         let edges = self.mission.elements.publishes.with_ids();
         let mut own = edges.filter(|(_, e)| nodes.contains(&e.node));
         own.any(|(id, e)| {
-            let rows = self.mission.graphs.rows(Element::Publish(id));
-            let count: u64 = rows.filter_map(|(_, row)| row.count).sum();
-            count > 0 && !self.is_housekeeping(e.topic)
+            messages(self.mission, Element::Publish(id)) > 0 && !self.is_housekeeping(e.topic)
+        })
+    }
+
+    /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
+    pub(crate) fn received(&self, topic: TopicId) -> Option<Span> {
+        let (first, last) = Sending::bounds(self.mission.sending.of_topic(topic).iter())?;
+        Some(Span::new(first, last.plus(1)))
+    }
+
+    /// The windows that contain a topic, each with its row of the graph.
+    pub(crate) fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
+        let windows = &self.mission.windows;
+        let rows = self.mission.graphs.rows(Element::Topic(topic));
+        rows.filter_map(|(at, row)| Some((windows.get(at)?, row)))
+    }
+
+    /// The rates by which a topic is checked: of every window, and of the last if it is longer than half of one or has
+    /// enough expected messages of one sender, from its first message to the mission's end, or to its last if it `may_end`.
+    pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
+        let Some(received) = self.received(topic) else {
+            return Vec::new();
+        };
+        let mut rows = self.rows(topic).peekable();
+        // Several senders end one after the other when the robot shuts down.
+        let ends_in_turn = self.mission.sending.of_topic(topic).len() > 1;
+        let (mut all, mut first) = (Vec::new(), None);
+        for window in &self.mission.windows {
+            let row = rows.next_if(|(own, _)| own.index == window.index);
+            let row = row.as_ref().map(|(_, row)| row);
+            let inside = during.start <= window.span.start && window.span.end <= during.end;
+            // A window cut by the mission's end has a rate if it is long enough, or the topic was even until then.
+            let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
+            let is_cut = window.partial && is_short;
+            if is_cut && (ends_in_turn || !is_enough(&all, window.span)) || !inside {
+                continue;
+            }
+            let rate = |span| Rate {
+                window: window.index,
+                span,
+                count: row.and_then(|row| row.count).unwrap_or(0),
+                median_s: row.and_then(|row| row.median.value()),
+            };
+            if let Some(span) = self.counted(window.span, received, may_end) {
+                all.push(rate(span));
+            } else if first.is_none() && received.end >= window.span.end {
+                first = begun(window.span, received.start).map(rate);
+            }
+        }
+        // A topic that exists for little more than a window rarely fills one, so a part is used.
+        if all.is_empty() {
+            first.into_iter().collect()
+        } else {
+            all
+        }
+    }
+
+    /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than
+    /// two.
+    pub(crate) fn mean(&self, topic: TopicId) -> Option<Rate> {
+        let received = self.received(topic)?;
+        let count = self.messages(topic).checked_sub(1)?;
+        (count > 0).then_some(Rate {
+            window: 0,
+            span: received,
+            count,
+            median_s: None,
+        })
+    }
+
+    /// The part of a window in which a topic with messages in `received` counts; `None` if it is too short.
+    fn counted(&self, window: Span, received: Span, may_end: bool) -> Option<Span> {
+        let whole = self.mission.span;
+        let mut span = window;
+        if received.start > span.start {
+            // A topic that exists when the recorder starts is received a moment later; others have a partial window.
+            let found =
+                span.start == whole.start && received.start.since(whole.start) <= DISCOVERY_NS;
+            span.start = found.then_some(received.start)?;
+        }
+        if received.end < span.end {
+            let is_over = whole.end.since(received.end) <= CLOSING_NS;
+            match (is_over, may_end) {
+                (true, _) => span.end = received.end,
+                (false, true) => return None,
+                (false, false) => {}
+            }
+        }
+        (span.nanos() >= window.nanos() / 2).then_some(span)
+    }
+
+    /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond if message times
+    /// are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's end.
+    pub(crate) fn silences(
+        &self,
+        topic: TopicId,
+        may_end: bool,
+        during: Span,
+    ) -> Vec<TopicSilence> {
+        let mut all = Vec::new();
+        for (window, row) in self.rows(topic) {
+            let inside = during.start <= window.span.start && window.span.end <= during.end;
+            if let (true, Some(gap)) = (inside, row.gap.value()) {
+                all.push(TopicSilence {
+                    span: window.span,
+                    nanos: cast::to_i64(libm::round(gap * 1e9)),
+                });
+            }
+        }
+        all.extend(self.pauses(topic).filter_map(|gap| clipped(gap, during)));
+        let whole = self.mission.span;
+        if let (Some(received), false) = (self.received(topic), may_end) {
+            let span = Span::new(received.end.plus(-1), whole.end);
+            // An end at the robot's shutdown is not a silence.
+            if span.nanos() > CLOSING_NS {
+                all.extend(clipped(span, during));
+            }
+        }
+        all
+    }
+
+    /// The longest silence of a topic between its first and its last message, in nanoseconds; at least a window's length
+    /// if single messages are unknown.
+    pub(crate) fn longest_silence(&self, topic: TopicId) -> i64 {
+        let longest = self.longest_of(topic, true).unwrap_or(0);
+        if self.mission.sending.pauses.is_empty() {
+            longest.max(self.mission.period.nanos())
+        } else {
+            longest
+        }
+    }
+
+    /// The longest of the topic's silences in the mission, in nanoseconds.
+    pub(crate) fn longest_of(&self, topic: TopicId, may_end: bool) -> Option<i64> {
+        let silences = self.silences(topic, may_end, self.mission.span);
+        silences.iter().map(|silence| silence.nanos).max()
+    }
+
+    /// The longest times between two messages, if single messages are known.
+    fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
+        let pauses = self.mission.sending.pauses.get(topic);
+        pauses.into_iter().flatten().copied()
+    }
+
+    /// The cause in the event log for the change of a topic around a time: an event of its publishers, or of the nodes
+    /// that feed them.
+    pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
+        let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.node).collect();
+        let fed: BTreeSet<TopicId> = {
+            let edges = self.mission.elements.subscribes.iter();
+            let own = edges.filter(|e| direct.contains(&e.node) && e.topic != topic);
+            own.map(|e| e.topic).collect()
+        };
+        let feeders: BTreeSet<NodeId> = fed
+            .iter()
+            .flat_map(|topic| self.publishers(*topic))
+            .map(|p| p.node)
+            .filter(|node| !direct.contains(node))
+            .collect();
+        self.cause(&direct, around)
+            .or_else(|| self.cause(&feeders, around))
+    }
+
+    /// The first event of one of these nodes in a time range.
+    pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
+        let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
+        let events = self.mission.log.inside(around).map(|(_, event)| event);
+        let mut events = events.filter(|e| wanted.contains(&e.kind));
+        let event = events.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
+        self.mission.elements.ends(event.what).0.map(|node| Cause {
+            time: Some(event.time),
+            text: format!(
+                "{} {} at {}",
+                self.role(node),
+                event.kind.word(),
+                self.clock(event.time)
+            ),
         })
     }
 
@@ -406,6 +693,12 @@ impl<'a> Facts<'a> {
     pub(crate) fn stretch(&self, span: Span) -> String {
         format!("{}–{}", self.clock(span.start), self.clock(span.end))
     }
+}
+
+/// The number of messages of an element.
+fn messages(mission: &Mission, what: Element) -> u64 {
+    let rows = mission.graphs.rows(what);
+    rows.filter_map(|(_, row)| row.count).sum()
 }
 
 /// The edges of each topic, except those of unnamed nodes.
@@ -421,4 +714,36 @@ fn by_topic(
         all[edge.topic].push(id);
     }
     all
+}
+
+/// The fewest expected messages of an even topic by which a window cut by the mission's end is checked: one more or
+/// less is a twentieth.
+const ENOUGH: f64 = 20.0;
+
+/// Whether a topic with these rates before was even, and enough of its messages are expected in this time.
+fn is_enough(before: &[Rate], span: Span) -> bool {
+    let expected = |last: &Rate| last.hz() * span.nanos() as f64 / 1e9;
+    before.last().is_some_and(|last| expected(last) >= ENOUGH) && Rate::are_even(before)
+}
+
+/// The part of a window from a topic's first message on; `None` if that is less than half of it.
+fn begun(window: Span, first: Stamp) -> Option<Span> {
+    let span = Span::new(first.max(window.start), window.end);
+    (span.nanos() >= window.nanos() / 2).then_some(span)
+}
+
+/// A time without messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TopicSilence {
+    /// The time of the silence, or the window that it is in.
+    pub(crate) span: Span,
+    /// Its length in nanoseconds.
+    pub(crate) nanos: i64,
+}
+
+/// The part of a silence within a time range.
+fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
+    let span = Span::new(gap.start.max(during.start), gap.end.min(during.end));
+    let nanos = span.end.since(span.start);
+    (nanos > 0).then_some(TopicSilence { span, nanos })
 }

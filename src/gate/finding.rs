@@ -9,9 +9,22 @@ use crate::base::words::visible;
 use crate::base::words::worded;
 use crate::base::yaml::YamlPlace;
 
-/// The kinds of findings: the name, the meaning, and how it is decided.
+/// A kind of finding in [`KINDS`].
+pub(crate) struct KindRow {
+    pub(crate) kind: FindingKind,
+    pub(crate) word: &'static str,
+    /// The key in the file that it is about; empty for the element itself, or for none.
+    pub(crate) key: &'static str,
+    /// The class in charts of the node or topic that it is about; empty if it is about neither.
+    pub(crate) class: &'static str,
+    pub(crate) meaning: &'static str,
+    /// How it is decided.
+    pub(crate) more: &'static str,
+}
+
+/// The kinds of findings: the word, the key, the class, the meaning, and how it is decided.
 macro_rules! kinds {
-    ($($kind:ident $word:literal: $meaning:literal, $more:literal;)+) => {
+    ($($kind:ident $word:literal $key:literal $class:literal: $meaning:literal, $more:literal;)+) => {
         /// A kind of finding.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         #[non_exhaustive]
@@ -19,146 +32,132 @@ macro_rules! kinds {
             $(#[doc = $meaning] $kind,)+
         }
 
-        /// All kinds in order: the name, the meaning, and how it is decided.
-        pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] =
-            &[$((FindingKind::$kind, $word, $meaning, $more),)+];
+        /// All kinds in order.
+        pub(crate) const KINDS: &[KindRow] = &[$(KindRow {
+            kind: FindingKind::$kind,
+            word: $word,
+            key: $key,
+            class: $class,
+            meaning: $meaning,
+            more: $more,
+        },)+];
     };
 }
 
 kinds! {
-    NodeMissing "node-missing":
+    NodeMissing "node-missing" "" "gone":
         "An expected node is not in the bag.",
         "Any evidence counts except source code and launch files, under the node's name or its role (anonymous suffixes \
          folded). Undecidable if the bag names no node or only those that wrote a log, if a tool has merged its senders, for \
          nodes with `known_by: log`, and if the recorder of a ROS 2 bag seems to have started late: more nodes are missing \
          than are named. `optional: true` requires nothing.";
-    NodeForbidden "node-forbidden":
+    NodeForbidden "node-forbidden" "" "new":
         "A forbidden node is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.";
-    NodeLate "node-late":
+    NodeLate "node-late" "within" "changed":
         "A node appeared later, or earlier, than it should have.",
-        "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have existed before its \
+        "`within: 40s..1:10` counts from the first message; `within: 20s` is short for `within: ..20s`. Undecidable where the node may have existed before its \
          first sign.";
-    NodeGone "node-gone":
+    NodeGone "node-gone" "may_end" "gone":
         "A node ended before the mission did.",
         "An expected node is expected to stay. Its end is inferred from regular messages that stopped for good, or stated by a log or snapshot; the last 5 s, in which robots are shut down, do not count. `may_end: true` permits an end at any time, `may_end: 1:30..` from then on.";
-    NodeRestarted "node-restarted":
+    NodeRestarted "node-restarted" "restarts" "changed":
         "A node restarted more or less often than allowed.",
         "`restarts: ..0`. A restart is detected by sequence numbers, a new process, or a new anonymous name of the same role.";
-    NodeLifecycle "node-lifecycle":
+    NodeLifecycle "node-lifecycle" "lifecycle" "changed":
         "A node is in another lifecycle state at the end.",
         "`lifecycle: active`. Undecidable without the node's transition events.";
-    TopicMissing "topic-missing":
+    TopicMissing "topic-missing" "" "gone":
         "An expected topic is not in the bag.",
         "A topic is present if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
          messages. `optional: true` requires nothing.";
-    TopicForbidden "topic-forbidden":
+    TopicForbidden "topic-forbidden" "" "new":
         "A forbidden topic is in the bag.",
         "Written as `forbidden: true`, mostly for a pattern.";
-    TopicType "topic-type":
+    TopicType "topic-type" "type" "changed":
         "A topic has another type than expected.",
         "`type: sensor_msgs/LaserScan`, or a list of several; the `/msg/` of ROS 2 makes no difference.";
-    TopicQos "topic-qos":
+    TopicQos "topic-qos" "qos" "changed":
         "A topic is offered with another quality of service.",
         "`qos: reliable` requires each of its words; `latched: true` requires a latched last message. Undecidable where \
          the bag does not record it.";
-    TopicRateLow "topic-rate-low":
+    TopicRateLow "topic-rate-low" "hz" "changed":
         "A topic had fewer messages per second than expected.",
         "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
          95` of them at least. One message more or less at the edge of a window is ignored. `mean_hz: 2..3` is judged from the \
          first to the last message, for topics with an uneven rate.";
-    TopicRateHigh "topic-rate-high":
+    TopicRateHigh "topic-rate-high" "hz" "changed":
         "A topic had more messages per second than expected.",
         "As `topic-rate-low`, above the range.";
-    TopicGap "topic-gap":
+    TopicGap "topic-gap" "max_gap" "changed":
         "A topic was silent for longer than allowed.",
         "`max_gap: 0.5s` applies between any two messages, and from the last one to the end of the mission unless it `may_end`.";
-    TopicLate "topic-late":
+    TopicLate "topic-late" "within" "changed":
         "A topic's first message came later, or earlier, than it should have.",
         "`within: 40s..1:10` counts from the first message of the bag. A message within 2.5 s of the recorder's start is never early: there may have been others before.";
-    TopicGone "topic-gone":
+    TopicGone "topic-gone" "may_end" "changed":
         "A topic ended too early.",
         "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.";
-    TopicAge "topic-age":
+    TopicAge "topic-age" "" "changed":
         "The messages of a topic were older than allowed when they arrived.",
         "`age: ..0.2s` is checked against the mean age in every window, from statistics or, where they are read, from the stamps \
          in headers. Undecidable in a bag without either.";
-    TopicBytes "topic-bytes":
+    TopicBytes "topic-bytes" "" "changed":
         "A topic had more, or fewer, bytes per second than allowed.",
         "`bytes: ..5MB/s` is checked in every window.";
-    TopicDrops "topic-drops":
+    TopicDrops "topic-drops" "" "changed":
         "More messages of a topic were lost than allowed.",
         "`drops: ..0` is checked in every window, by the drops that statistics report. Undecidable in a bag without them.";
-    PublisherMissing "publisher-missing":
+    PublisherMissing "publisher-missing" "by" "changed":
         "A node does not publish an expected topic.",
         "`by: [/a, /b]`. Undecidable where the publishers of the topic are unknown.";
-    PublisherUnexpected "publisher-unexpected":
+    PublisherUnexpected "publisher-unexpected" "by" "changed":
         "A topic has a publisher that is not listed.",
         "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` turns it into a warning. Only publishers that are \
          measured or stated count.";
-    SubscriberMissing "subscriber-missing":
+    SubscriberMissing "subscriber-missing" "to" "changed":
         "A node does not subscribe to an expected topic.",
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
          discovery, or this node's log of its connections.";
-    OrderBroken "order-broken":
-        "Nodes did not appear in the expected order.",
-        "`appear_in_order: [/a, /b]`. Undecidable where the uncertain times overlap.";
-    ReactionMissing "reaction-missing":
-        "An expected reaction did not happen.",
-        "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second must follow; the uncertainty of both times is taken into account.";
-    TooManyChanges "too-many-changes":
+    TooManyChanges "too-many-changes" "" "":
         "There were more, or fewer, reconfigurations than allowed.",
         "`during: -30s.., changes: ..0` counts the events that `bagreel events` prints.";
-    UnexpectedNode "unexpected-node":
+    UnexpectedNode "unexpected-node" "" "new":
         "A node in the bag is not in the file.",
         "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.";
-    UnexpectedTopic "unexpected-topic":
+    UnexpectedTopic "unexpected-topic" "" "new":
         "A topic in the bag is not in the file.",
         "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.";
-    Starved "starved":
+    Starved "starved" "" "changed":
         "A subscriber receives nothing because it requests a higher quality of service than is offered.",
         "A warning wherever a log or `/rosgraph` reports it; `policy: {starved: error}` or `allow`.";
-    DuplicateName "duplicate-name":
+    DuplicateName "duplicate-name" "" "changed":
         "Two nodes have the same name.",
         "A warning wherever a log or `/rosgraph` reports it; `policy: {duplicate_names: error}` or `allow`.";
-    MessagesLost "messages-lost":
+    MessagesLost "messages-lost" "" "changed":
         "The recorder lost messages, so that gaps and low rates may be its own.",
         "A warning wherever the recorder reports it; `policy: {messages_lost: error}` or `allow`.";
-    AllowUnused "allow-unused":
-        "An allowance matched no finding.",
-        "Remove it, so that it does not hide another finding later.";
 }
 
 impl FindingKind {
+    pub(crate) fn row(self) -> &'static KindRow {
+        &KINDS[self as usize]
+    }
+
     /// Its word.
     pub fn word(self) -> &'static str {
-        let row = KINDS.iter().find(|(kind, ..)| *kind == self);
-        row.map_or("", |(_, word, ..)| word)
+        self.row().word
     }
 
     /// The kind of a word.
     pub fn from_word(word: &str) -> Option<Self> {
-        let row = KINDS.iter().find(|(_, own, ..)| *own == word);
-        row.map(|(kind, ..)| *kind)
+        let row = KINDS.iter().find(|row| row.word == word);
+        row.map(|row| row.kind)
     }
 
     /// Whether it is about a node rather than a topic or several elements.
     pub(crate) fn is_about_node(self) -> bool {
-        matches!(
-            self,
-            Self::NodeMissing
-                | Self::NodeGone
-                | Self::NodeForbidden
-                | Self::NodeLate
-                | Self::NodeRestarted
-                | Self::NodeLifecycle
-                | Self::UnexpectedNode
-        )
-    }
-
-    /// All words.
-    pub(crate) fn words() -> impl Iterator<Item = &'static str> + Clone {
-        KINDS.iter().map(|(_, word, ..)| *word)
+        matches!(self.word().split_once('-'), Some(("node", _) | (_, "node")))
     }
 }
 
@@ -173,8 +172,6 @@ worded! {
         Warning = "warning",
         /// Not observable in the bag.
         Unknown = "unknown",
-        /// Known and accepted.
-        Allowed = "allowed",
     }
 }
 
@@ -224,8 +221,6 @@ pub struct Finding {
     pub help: Vec<String>,
     /// The name in the file that `baseline --update` would rewrite.
     pub accept: Option<String>,
-    /// The reason why it is accepted.
-    pub why: Option<String>,
     /// The number of earlier findings in the file with the same [`Self::fingerprint`] input.
     pub(crate) nth: usize,
 }
@@ -251,14 +246,23 @@ impl Finding {
             cause: None,
             help: Vec::new(),
             accept: None,
-            why: None,
             nth: 0,
         }
     }
 
-    /// The finding as one that is not observable, with the reason in its text.
-    pub(crate) fn unknown(mut self) -> Self {
-        self.severity = Severity::Unknown;
+    /// A finding that is not observable, with the reason in its text.
+    pub(crate) fn unknown(
+        kind: FindingKind,
+        name: &str,
+        place: YamlPlace,
+        text: impl fmt::Display,
+    ) -> Self {
+        Self::new(kind, name, place, text).severe(Severity::Unknown)
+    }
+
+    /// The finding with another severity.
+    pub(crate) fn severe(mut self, severity: Severity) -> Self {
+        self.severity = severity;
         self
     }
 
@@ -269,21 +273,31 @@ impl Finding {
         self
     }
 
+    /// The finding with its cause, if known.
+    pub(crate) fn because(mut self, cause: Option<Cause>) -> Self {
+        self.cause = cause;
+        self
+    }
+
     /// The finding with its time.
     pub(crate) fn at(mut self, when: Span) -> Self {
         self.when = Some(when);
         self
     }
 
-    /// The finding with one more line.
-    pub(crate) fn detail(mut self, text: impl fmt::Display) -> Self {
-        self.details.push(visible(&text.to_string()).into_owned());
+    /// The finding with more lines.
+    pub(crate) fn details<T: fmt::Display>(mut self, lines: impl IntoIterator<Item = T>) -> Self {
+        let lines = lines.into_iter().map(|line| line.to_string());
+        self.details
+            .extend(lines.map(|line| visible(&line).into_owned()));
         self
     }
 
-    /// The finding with one more hint.
-    pub(crate) fn hint(mut self, text: impl fmt::Display) -> Self {
-        self.help.push(visible(&text.to_string()).into_owned());
+    /// The finding with hints.
+    pub(crate) fn hints<T: fmt::Display>(mut self, hints: impl IntoIterator<Item = T>) -> Self {
+        let hints = hints.into_iter().map(|hint| hint.to_string());
+        self.help
+            .extend(hints.map(|hint| visible(&hint).into_owned()));
         self
     }
 
@@ -330,7 +344,7 @@ mod tests {
 
     #[test]
     fn every_kind_has_its_index_and_a_unique_name() {
-        for (at, (kind, word, ..)) in KINDS.iter().enumerate() {
+        for (at, KindRow { kind, word, .. }) in KINDS.iter().enumerate() {
             assert_eq!(*kind as usize, at, "{word}");
             assert_eq!(FindingKind::from_word(word), Some(*kind));
             assert_eq!(kind.word(), *word);

@@ -1,23 +1,20 @@
-//! Checks a mission against an expectation: every fact of the file separately.
+//! Checks a mission against an expectation: every fact and rule of the file separately, then what is not in the file.
 
-mod allow;
-mod event;
-mod measure;
 mod node;
-mod policy;
-mod rate;
-mod rule;
 mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{At, Expectation, Unlisted, YamlPlace};
+use super::expectation::{At, Demand, Entry, Expectation, Fact, Named, Rule, Unlisted, YamlPlace};
 use super::facts::Facts;
-use super::finding::{Cause, Finding, Severity, number};
-use super::pattern::Pattern;
+use super::finding::{Cause, Finding, FindingKind, Severity, number};
+use super::values::{During, NamePatterns, Pattern, Range};
 use crate::base::nearest::nearest;
-use crate::base::words::visible;
+use crate::base::time::Span;
+use crate::base::words::{self, visible, worded};
 use crate::mission::Mission;
+use crate::mission::event_log::Kind;
+use crate::mission::events::sentence;
 
 /// One checked fact of an expectations file.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,18 +30,20 @@ pub struct CheckedFact {
     pub is_moot: bool,
 }
 
-/// The judgement of a fact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Judgement {
-    /// The mission meets it.
-    Kept,
-    /// It has an error or a warning.
-    Broken,
-    /// The bag does not show whether it is met.
-    Undecidable,
-    /// There is nothing to check.
-    Moot,
+worded! {
+    /// The judgement of a fact.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum Judgement {
+        /// The mission meets it.
+        Kept = "kept",
+        /// It has an error or a warning.
+        Broken = "broken",
+        /// The bag does not show whether it is met.
+        Undecidable = "undecidable",
+        /// There is nothing to check.
+        Moot = "moot",
+    }
 }
 
 impl CheckedFact {
@@ -118,16 +117,15 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool)
         searched: Cell::new(0),
     };
     for named in &expectation.nodes {
-        judge.node(named);
+        judge.named(named, &NODES);
     }
     for named in &expectation.topics {
-        judge.topic(named);
+        judge.named(named, &TOPICS);
     }
     for rule in &expectation.rules {
         judge.rule(rule);
     }
     judge.policy();
-    judge.allow();
     let mut checks = judge.checks;
     number(checks.iter_mut().flat_map(|check| &mut check.findings));
     Verdict { checks }
@@ -153,6 +151,33 @@ struct Judge<'a> {
     searched: Cell<usize>,
 }
 
+/// How the elements of a section are checked.
+struct Section {
+    word: &'static str,
+    forbidden: fn(&Judge<'_>, &Pattern, YamlPlace) -> Vec<Finding>,
+    presence: fn(&Judge<'_>, &Pattern, YamlPlace, &Entry) -> Vec<Finding>,
+    /// The facts other than presence, whose titles begin with this text.
+    facts: fn(&mut Judge<'_>, &str, &Pattern, &Entry),
+}
+
+const NODES: Section = Section {
+    word: "node",
+    forbidden: |judge, name, at| judge.forbidden_nodes(name, at),
+    presence: |judge, name, at, entry| judge.node_presence(name, at, entry),
+    facts: |judge, title, name, entry| judge.node_facts(title, name, entry),
+};
+const TOPICS: Section = Section {
+    word: "topic",
+    forbidden: |judge, name, at| judge.forbidden_topics(name, at),
+    presence: |judge, name, at, entry| judge.topic_presence(name, at, entry),
+    facts: |judge, title, name, entry| judge.topic_facts(title, name, entry),
+};
+
+/// The number of events that are written out.
+const MOST_LISTED: usize = 6;
+/// The number of names that are reported in one line.
+const NAMED: usize = 6;
+
 /// The most missing names for which the nearest one is reported; with more, the file is for another robot.
 const NEAR: usize = 50;
 
@@ -162,6 +187,24 @@ impl Judge<'_> {
         self.searched.set(self.searched.get() + 1);
         let near = (self.searched.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
         Some(format!("the nearest name in the bag is `{}`", near??))
+    }
+
+    /// Checks an element of the file.
+    fn named(&mut self, named: &Named, section: &Section) {
+        let (name, at, entry) = (&named.name, named.at, &named.facts);
+        let title = format!("{} {name}", section.word);
+        let before = self.checks.len();
+        if entry.forbidden {
+            let found = (section.forbidden)(self, name, at);
+            self.note(title + " forbidden", at, found);
+        } else {
+            let found = (section.presence)(self, name, at, entry);
+            self.note(&title, at, found);
+            (section.facts)(self, &title, name, entry);
+        }
+        for finding in self.found_since(before) {
+            finding.accept = Some(name.to_string());
+        }
     }
 
     /// The findings of all checks but the first ones.
@@ -180,34 +223,223 @@ impl Judge<'_> {
         });
     }
 
-    /// Checks a fact of these nodes or topics, if the file has it; with nothing to check it is moot.
-    fn check<S: ?Sized, T>(
+    /// Checks a fact of each of these nodes or topics, if the file has it; with nothing to check it is moot.
+    fn check<S: Copy, T, F: IntoIterator<Item = Finding>>(
         &mut self,
-        (title, all): (&str, &S),
+        subjects: &Subjects<'_, S>,
         key: &str,
-        wanted: Option<&At<T>>,
+        wanted: &Fact<T>,
         is_moot: bool,
-        found: impl Fn(&Self, &S, &At<T>) -> Vec<Finding>,
+        found: impl Fn(&Self, S, &Entry, &At<T>) -> F,
     ) {
-        let Some(wanted) = wanted else { return };
-        let title = format!("{title} {key}");
-        if is_moot {
-            self.moot(title, wanted.at);
-        } else {
-            let found = found(self, all, wanted);
-            self.note(title, wanted.at, found);
+        let Some(wanted) = &**wanted else { return };
+        let all = subjects.all.iter().filter(|_| !is_moot);
+        let findings = all.flat_map(|subject| found(self, *subject, subjects.entry, wanted));
+        let check = CheckedFact {
+            title: format!("{} {key}", subjects.title),
+            place: wanted.at,
+            findings: findings.collect(),
+            is_moot,
+        };
+        self.checks.push(check);
+    }
+
+    /// Checks a rule.
+    fn rule(&mut self, rule: &Rule) {
+        let before = self.checks.len();
+        match &rule.demand {
+            Demand::Nodes(names, entry) => {
+                for name in names {
+                    self.node_rule(rule, name, entry);
+                }
+            }
+            Demand::Topic(name, entry) => self.topic_rule(rule, name, entry),
+            Demand::Changes { during, many } => {
+                let found = self.changes(rule.at, *during, *many);
+                self.note(&rule.id, rule.at, found.into_iter().collect());
+            }
+        }
+        let detail = format!("rule {}", words::visible(&rule.id));
+        for finding in self.found_since(before) {
+            finding.details.push(detail.clone());
         }
     }
 
-    /// Adds a fact about an absent element.
-    fn moot(&mut self, title: impl Into<String>, place: YamlPlace) {
-        self.checks.push(CheckedFact {
-            title: title.into(),
-            place,
-            findings: Vec::new(),
-            is_moot: true,
-        });
+    fn node_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
+        let title = format!("{}: {}", rule.id, name.value);
+        // A deadline implies presence.
+        let within = entry.within.as_ref();
+        let found = if entry.forbidden {
+            self.forbidden_nodes(&name.value, name.at)
+        } else if let Some(within) = within.filter(|_| self.facts.nodes(&name.value).is_empty()) {
+            if within.value.0.is_beyond(self.facts.mission.span) {
+                vec![self.too_short(name)]
+            } else {
+                self.node_presence(&name.value, name.at, &Entry::default())
+            }
+        } else {
+            return self.node_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
     }
+
+    /// The finding that the mission ended before a node had to be present.
+    fn too_short(&self, name: &At<Pattern>) -> Finding {
+        let (name, at) = (name.value.as_str(), name.at);
+        let long = words::duration(self.facts.mission.span.nanos());
+        let text = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
+        Finding::unknown(FindingKind::NodeLate, name, at, text)
+    }
+
+    fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, entry: &Entry) {
+        let title = format!("{}: {}", rule.id, name.value);
+        let topics = self.facts.topics(&name.value);
+        let found = if entry.forbidden {
+            self.forbidden_topics(&name.value, name.at)
+        } else if topics.is_empty() || self.is_owed(entry) && !self.is_sent(&topics) {
+            self.topic_presence(&name.value, name.at, entry)
+        } else {
+            return self.topic_facts(&title, &name.value, entry);
+        };
+        self.note(title, name.at, found);
+    }
+
+    fn changes(&self, at: YamlPlace, during: During, many: Range) -> Option<Finding> {
+        let span = during.on(self.facts.mission.span);
+        let headlines = self.facts.mission.log.headlines(span);
+        let events: Vec<_> = headlines.filter(|(_, e)| !e.kind.is_remark()).collect();
+        if many.holds(events.len() as f64) {
+            return None;
+        }
+        let seen = words::count(events.len(), "reconfiguration");
+        let [from, to] = [span.start, span.end].map(|time| self.facts.clock(time));
+        let text = format!("{seen} from {from} to {to}, expected {many}");
+        let parts = self.facts.mission.log.all_parts();
+        let listed = events.iter().take(MOST_LISTED).map(|(id, event)| {
+            let text = sentence(self.facts.mission, &parts, *id, event);
+            format!("{}  {text}", self.facts.clock(event.time))
+        });
+        let rest = events.len().saturating_sub(MOST_LISTED);
+        let rest = (rest > 0).then(|| format!("and {rest} more"));
+        let finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, text)
+            .saw(events.len(), words::count_range(many.from, many.to))
+            .at(span)
+            .details(listed.chain(rest));
+        Some(finding)
+    }
+
+    /// Checks the elements that are not in the file, and the remarks of the event log.
+    fn policy(&mut self) {
+        let At { at, value: policy } = self.expectation.policy;
+        if let Some(severity) = policy.unexpected_nodes.severity() {
+            let found = self.strange_nodes(severity);
+            self.note("unexpected nodes", at, found);
+        }
+        if let Some(severity) = policy.unexpected_topics.severity() {
+            let found = self.strange_topics(severity);
+            self.note("unexpected topics", at, found);
+        }
+        let (starved, duplicates) = (policy.starved, policy.duplicate_names);
+        for (title, kind, finding, unlisted) in [
+            ("starved", Kind::Starved, FindingKind::Starved, starved),
+            (
+                "duplicate names",
+                Kind::Duplicate,
+                FindingKind::DuplicateName,
+                duplicates,
+            ),
+            (
+                "messages lost",
+                Kind::Lost,
+                FindingKind::MessagesLost,
+                policy.messages_lost,
+            ),
+        ] {
+            let severity = unlisted.severity();
+            let found = severity.map(|severity| self.remarks(kind, finding, severity));
+            if let Some(found) = found.filter(|found| !found.is_empty()) {
+                self.note(title, at, found);
+            }
+        }
+    }
+
+    /// The findings of one kind of remark in the event log.
+    fn remarks(&self, kind: Kind, finding: FindingKind, severity: Severity) -> Vec<Finding> {
+        let mission = self.facts.mission;
+        let parts = mission.log.all_parts();
+        let own = mission.log.events.with_ids();
+        let own = own.filter(|(_, event)| event.kind == kind && !event.quiet);
+        let found = own.map(|(id, event)| {
+            let (node, topic) = mission.elements.names(event.what);
+            let text = sentence(mission, &parts, id, event);
+            let name = topic.or(node).unwrap_or_default();
+            let until = event.until.unwrap_or(event.time).plus(1);
+            Finding::new(finding, name, self.expectation.policy.at, text)
+                .severe(severity)
+                .at(Span::new(event.time, until))
+        });
+        found.collect()
+    }
+
+    /// The finding of an element that is not in the file, which `text` names.
+    fn strange(&self, kind: FindingKind, name: &str, text: &str, severity: Severity) -> Finding {
+        let text = format!("{text} is not in {}", self.expectation.file.display());
+        let finding = Finding::new(kind, name, self.expectation.policy.at, text);
+        let mut finding = finding.saw("present", "not named").severe(severity);
+        finding.accept = Some(name.to_owned());
+        finding
+    }
+
+    fn strange_nodes(&self, severity: Severity) -> Vec<Finding> {
+        let known = self.named_nodes();
+        let strange = self.facts.robot_roles().filter(|role| {
+            let mut names = role.nodes.iter().map(|id| self.facts.node(*id));
+            !known.hold(role.name) && !names.any(|name| known.hold(name))
+        });
+        let found = strange.map(|role| {
+            let name = role
+                .nodes
+                .first()
+                .map_or(role.name, |id| self.facts.node(*id));
+            let text = match role.name {
+                own if own == name => name.to_owned(),
+                own => format!("{name} (role {own})"),
+            };
+            let mut finding = self.strange(FindingKind::UnexpectedNode, role.name, &text, severity);
+            finding.when = self.facts.lives(role.nodes).first().copied();
+            finding
+        });
+        found.collect()
+    }
+
+    /// Every node name in the file.
+    fn named_nodes(&self) -> NamePatterns<'_> {
+        let own = self.expectation.nodes.iter().map(|named| &named.name);
+        let topics = self.expectation.topics.iter();
+        let peers = topics.flat_map(|topic| topic.facts.named_nodes());
+        let rules = self.expectation.rules.iter();
+        let rules = rules.filter_map(|rule| match &rule.demand {
+            Demand::Nodes(names, _) => Some(names.iter().map(|name| &name.value)),
+            _ => None,
+        });
+        own.chain(peers).chain(rules.flatten()).collect()
+    }
+
+    fn strange_topics(&self, severity: Severity) -> Vec<Finding> {
+        let known: NamePatterns<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
+        let names = self.facts.robot_topics().map(|id| self.facts.topic(id));
+        let strange = names.filter(|name| !known.hold(name));
+        strange
+            .map(|name| self.strange(FindingKind::UnexpectedTopic, name, name, severity))
+            .collect()
+    }
+}
+
+/// Nodes or topics that are checked, what is expected of them, and the beginning of the titles of their facts.
+struct Subjects<'a, S> {
+    title: &'a str,
+    all: &'a [S],
+    entry: &'a Entry,
 }
 
 /// The absence of a node as a cause of findings.

@@ -1,12 +1,7 @@
 //! Verdicts in formats for people, for programs, and for CI services.
 
-mod github;
-mod gitlab;
-mod json;
-mod junit;
+mod data;
 mod markdown;
-mod mermaid;
-mod sarif;
 mod text;
 
 use std::collections::BTreeMap;
@@ -14,6 +9,8 @@ use std::collections::BTreeMap;
 use super::finding::{Finding, FindingKind, KINDS, Severity};
 use super::judge::Verdict;
 use crate::base::columns::hang;
+use crate::base::error::{Error, Result};
+use crate::base::nearest::suggestion;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
 
@@ -47,7 +44,7 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
         word: "text",
         endings: &[".txt"],
         what: "for people: findings with file and line, grouped by cause",
-        write: text::write,
+        write: text::text,
     },
     CheckFormat {
         word: "gitlab",
@@ -57,13 +54,13 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
             "code-quality.json",
         ],
         what: "GitLab's code quality; also called codequality",
-        write: gitlab::write,
+        write: data::gitlab,
     },
     CheckFormat {
         word: "json",
         endings: &[".json"],
         what: "everything, for programs",
-        write: json::write,
+        write: data::json,
     },
     CheckFormat {
         word: "markdown",
@@ -75,19 +72,19 @@ pub(crate) const FORMATS: &[CheckFormat] = &[
         word: "junit",
         endings: &[".xml"],
         what: "a test case for every fact of the file",
-        write: junit::write,
+        write: data::junit,
     },
     CheckFormat {
         word: "sarif",
         endings: &[".sarif", ".sarif.json"],
         what: "SARIF 2.1.0, for code scanning",
-        write: sarif::write,
+        write: data::sarif,
     },
     CheckFormat {
         word: "github",
         endings: &[],
         what: "GitHub's annotations, then the text",
-        write: github::write,
+        write: text::github,
     },
 ];
 
@@ -105,14 +102,11 @@ impl CheckFormat {
     /// The format of a file name: the one with the longest matching extension.
     pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
         let name = name.to_ascii_lowercase();
-        let fitting = |f: &&Self| {
-            let ends = f.endings.iter().filter(|e| name.ends_with(**e));
-            ends.map(|e| e.len()).max()
-        };
-        FORMATS
-            .iter()
-            .filter(|f| fitting(f).is_some())
-            .max_by_key(|f| fitting(f))
+        let endings = |f: &'static Self| f.endings.iter().map(move |ending| (*ending, f));
+        let fitting = FORMATS.iter().flat_map(endings);
+        let fitting = fitting.filter(|(ending, _)| name.ends_with(ending));
+        let longest = fitting.max_by_key(|(ending, _)| ending.len());
+        longest.map(|(_, format)| format)
     }
 }
 
@@ -137,32 +131,15 @@ impl Subject<'_> {
 }
 
 impl Verdict {
-    /// The number of errors and warnings as text: `2 errors, 1 warning`; empty without any.
-    fn broken(&self) -> String {
-        let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
-        let counts = counts.map(|(severity, word)| (self.count(severity), word));
-        let some = counts.iter().filter(|(n, _)| *n > 0);
-        let words: Vec<String> = some.map(|(n, word)| words::count(*n, word)).collect();
-        words.join(", ")
-    }
-
-    /// The number of findings as text: `2 errors, 1 warning, 1 unknown`.
-    fn summary(&self) -> String {
-        let broken = self.broken();
-        let mut parts: Vec<String> = Some(broken).into_iter().filter(|b| !b.is_empty()).collect();
-        for (severity, word) in [
-            (Severity::Unknown, "unknown"),
-            (Severity::Allowed, "allowed"),
-        ] {
-            let n = self.count(severity);
-            if n > 0 {
-                parts.push(format!("{n} {word}"));
-            }
-        }
-        if parts.is_empty() {
-            parts.push("no findings".to_owned());
-        }
-        parts.join(", ")
+    /// The numbers of findings as text: `2 errors`, `1 warning`, `1 unknown`.
+    fn counts(&self) -> Vec<String> {
+        let counts = Severity::ALL.map(|severity| (severity, self.count(severity)));
+        let some = counts.into_iter().filter(|(_, count)| *count > 0);
+        some.map(|(severity, count)| match severity {
+            Severity::Unknown => format!("{count} unknown"),
+            severity => words::count(count, severity.word()),
+        })
+        .collect()
     }
 }
 
@@ -176,35 +153,52 @@ fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
-/// The meaning of a kind of finding, for `--explain`, in lines of at most `width` characters; `None` for an unknown
-/// word.
-pub(crate) fn explain(word: &str, width: usize) -> Option<String> {
-    let (_, word, meaning, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
-    let [meaning, more] = [meaning, more].map(|text| hang("", text, 0, Some(width)));
-    Some(format!(
-        "{word}\n\n{meaning}\n{more}\nTo allow it:\n\nallow:\n  - finding: {word}\n    name: /name\n    until: 2027-01-31\n    why: \"…\"\n"
-    ))
+/// The meaning of a kind of finding, for `--explain`, in lines of at most `width` characters.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown word.
+pub(crate) fn explain(word: &str, width: usize) -> Result<String> {
+    let words = || KINDS.iter().map(|row| row.word);
+    let Some(kind) = FindingKind::from_word(word) else {
+        let near = suggestion(word, words());
+        let all: Vec<&str> = words().collect();
+        return Err(Error::usage(
+            format!("unknown kind of finding `{word}`{near}"),
+            format!("choose one of {}", all.join(", ")),
+        ));
+    };
+    let row = kind.row();
+    let [meaning, more] = [row.meaning, row.more].map(|text| hang("", text, 0, Some(width)));
+    Ok(format!("{word}\n\n{meaning}\n{more}"))
+}
+
+/// Findings with one cause, or one without.
+struct Group<'a> {
+    cause: Option<&'a str>,
+    findings: Vec<&'a Finding>,
+}
+
+impl Group<'_> {
+    /// The worst severity.
+    fn worst(&self) -> Option<Severity> {
+        self.findings.first().map(|finding| finding.severity)
+    }
 }
 
 /// The findings grouped by cause, ordered by the worst of each; those without a cause are separate.
-fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
-    let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
+fn grouped<'a>(findings: &[&'a Finding]) -> Vec<Group<'a>> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();
     for finding in findings {
         let cause = finding.cause.as_ref().map(|c| c.text.as_str());
         let place = cause.map(|cause| *places.entry(cause).or_insert(groups.len()));
         match place.and_then(|place| groups.get_mut(place)) {
-            Some((_, group)) => group.push(finding),
-            None => groups.push((cause, vec![finding])),
+            Some(group) => group.findings.push(finding),
+            None => groups.push(Group {
+                cause,
+                findings: vec![finding],
+            }),
         }
     }
     groups
-}
-
-/// The distinct kinds found, in order.
-fn kinds(findings: &[&Finding]) -> Vec<FindingKind> {
-    let mut kinds: Vec<FindingKind> = findings.iter().map(|f| f.kind).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    kinds
 }

@@ -8,14 +8,15 @@ use std::path::{Path, PathBuf};
 use super::{Body, Drawing, Reading, Render, Watch, read, show};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
+use crate::base::time::Period;
 use crate::base::{budget, file, words};
 use crate::export::Output;
 use crate::export::check as places;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
-    CheckFormat, DiffFormat, DiffSubject, Difference, Side, Subject, Verdict, Written, differences,
-    judge, pairs, union, update, write,
+    CheckFormat, DiffFormat, DiffSubject, Difference, Expectation, Runs, Side, Subject, Verdict,
+    differences, judge, pairs, union, update, write,
 };
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
@@ -121,21 +122,36 @@ fn plain(path: &Path) -> String {
     given.trim_start_matches("./").to_owned()
 }
 
+/// Reads an expectations file: its text, and what it says.
+///
+/// # Errors
+/// If it cannot be read, or has a mistake.
+pub(crate) fn expectation(path: &Path) -> Result<(String, Expectation)> {
+    let text = file::read_text(path, budget::USER_TEXT)?;
+    let expectation = crate::gate::read(&text, path)?;
+    Ok((text, expectation))
+}
+
+/// A reading with windows of this length, unless it has its own.
+fn in_windows(reading: &Reading, period: Option<Period>) -> Reading {
+    let mut reading = reading.clone();
+    if let (Length::Auto, Some(period)) = (reading.division.length, period) {
+        reading.division.length = Length::Fixed(period);
+    }
+    reading
+}
+
 /// Checks a mission and writes every report.
 ///
 /// # Errors
 /// If the expectations file, the mission or an output cannot be read or written.
 pub fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
-    let text = file::read_text(&job.expect, budget::USER_TEXT)?;
-    let expectation = crate::gate::read(&text, &job.expect)?;
+    let (_, expectation) = expectation(&job.expect)?;
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
     let mut kept = job.reading.files();
     kept.push(job.expect.clone());
     places::check(&targets, &kept)?;
-    let mut reading = job.reading.clone();
-    if let (Length::Auto, Some(period)) = (reading.division.length, expectation.period) {
-        reading.division.length = Length::Fixed(period);
-    }
+    let reading = in_windows(&job.reading, expectation.period);
     let mission = read(&reading, watch)?;
     let mut verdict = judge(&expectation, &mission, is_part(&reading));
     if job.is_strict {
@@ -345,26 +361,18 @@ pub struct BaselineWritten {
 /// # Errors
 /// If the expectations file or a run cannot be read, or the output cannot be written.
 pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten> {
-    let old = job.update.as_deref().map(|path| {
-        let text = file::read_text(path, budget::USER_TEXT)?;
-        let expectation = crate::gate::read(&text, path)?;
-        Ok((path, text, expectation.period))
-    });
-    let old = old.transpose()?;
+    let old = job.update.as_deref();
+    let old = old.map(|path| Ok((path, expectation(path)?))).transpose()?;
     let kept = files(&job.runs);
     let target = match &old {
-        Some((path, ..)) => Target::Path((*path).to_owned()),
+        Some((path, _)) => Target::Path((*path).to_owned()),
         None => job.output.clone(),
     };
     places::check(std::slice::from_ref(&target), &kept)?;
-    let mut period = old.as_ref().and_then(|(.., period)| *period);
+    let mut period = old.as_ref().and_then(|(_, (_, old))| old.period);
     let mut missions: Vec<Mission> = Vec::new();
     for run in &job.runs {
-        let mut reading = run.clone();
-        if let (Length::Auto, Some(period)) = (reading.division.length, period) {
-            reading.division.length = Length::Fixed(period);
-        }
-        let mission = read(&reading, watch)?;
+        let mission = read(&in_windows(run, period), watch)?;
         // All runs use the period of the first.
         period = period.or(Some(mission.period));
         missions.push(mission);
@@ -373,13 +381,19 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
         missions,
         ..BaselineWritten::default()
     };
-    let text = if let Some((path, text, _)) = old {
-        let is_part = job.runs.iter().any(is_part);
-        let new = update(&text, path, (&done.missions, is_part), &job.only)?;
+    let is_part = job.runs.iter().any(is_part);
+    let text = if let Some((path, (text, _))) = old {
+        let runs = Runs {
+            missions: &done.missions,
+            is_part,
+        };
+        let new = update(&text, path, runs, &job.only)?;
         (done.changed, done.left) = (new.changed, new.left);
         new.text
     } else {
-        let new = written(&done.missions, job.runs.iter().any(is_part));
+        let names = done.missions.iter().filter_map(|run| run.bags.first());
+        let names: Vec<&str> = names.map(|bag| bag.name.as_str()).collect();
+        let new = write(&done.missions, is_part, &words::some_of(&names, 3));
         (done.nodes, done.topics, done.left_out) = (new.nodes, new.topics, new.left_out);
         new.text
     };
@@ -390,20 +404,6 @@ pub fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten
 /// Whether only a part of a recording is read, in which start times differ from those in the whole.
 fn is_part(reading: &Reading) -> bool {
     reading.division.start.is_some() || reading.division.end.is_some()
-}
-
-/// The expectation that all of these runs meet.
-fn written(missions: &[Mission], is_part: bool) -> Written {
-    let names: Vec<String> = missions.iter().map(name).collect();
-    let from = words::some_of(&names, 3);
-    write(missions, is_part, &from)
-}
-
-fn name(mission: &Mission) -> String {
-    mission
-        .bags
-        .first()
-        .map_or_else(String::new, |bag| bag.name.clone())
 }
 
 fn files(readings: &[Reading]) -> Vec<PathBuf> {

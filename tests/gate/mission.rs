@@ -14,19 +14,18 @@ nodes:
   /probe: {}
   /camera_backup: {}
 rules:
-  - {id: localizer-starts, node: /localizer, present_within: 1s}
-  - {id: planner-starts, node: /planner, present_within: 50s}
-  - {id: controller-starts, node: /controller, present_within: 80s}
-  - {id: backup-takes-over, when: {removed: /camera_driver}, expect: {handed_over: /image_small, to: /camera_backup}, within: 20s}
-  - {id: probe-starts, node: /probe, present_within: 160s}
+  - {id: localizer-starts, node: /localizer, within: 1s}
+  - {id: planner-starts, node: /planner, within: 50s}
+  - {id: controller-starts, node: /controller, within: 80s}
+  - {id: backup-starts, node: /camera_backup, within: 100s}
+  - {id: probe-starts, node: /probe, within: 160s}
   - {id: planner-restarts, node: /planner, restarts: ..0}
   - {id: probe-restarts, node: /probe, restarts: ..0}
-  - {id: successor-starts, node: /controller_v2, present_within: 200s}
-  - {id: joystick-starts, node: /joystick, present_within: 200s}
+  - {id: successor-starts, node: /controller_v2, within: 200s}
+  - {id: joystick-starts, node: /joystick, within: 200s}
   - {id: localizer-restarts, node: /localizer, restarts: ..0}
   - {id: quiet-at-end, during: -30s.., changes: ..0}
-  - {id: kept-order, appear_in_order: [/localizer, /planner, /controller]}
-  - {id: kept-takeover, when: {removed: /camera_driver}, expect: {added: /camera_backup}, within: 40s}
+  - {id: kept-takeover, topic: /image_small, by: [/camera_driver, /camera_backup]}
   - {id: kept-rate, topic: /scan_small, hz: 4..6}
   - {id: kept-restarts, node: /probe, restarts: ..1}
 ";
@@ -71,7 +70,7 @@ fn each_reconfiguration_breaks_the_rule_written_for_it() {
         ("localizer-starts", "node-late"),
         ("planner-starts", "node-late"),
         ("controller-starts", "node-late"),
-        ("backup-takes-over", "reaction-missing"),
+        ("backup-starts", "node-late"),
         ("probe-starts", "node-late"),
         ("planner-restarts", "node-restarted"),
         ("probe-restarts", "node-restarted"),
@@ -97,7 +96,6 @@ rules:
   - {id: localizer-starts, node: /localizer, forbidden: true}
   - {id: planner-starts, node: /planner, forbidden: true}
   - {id: controller-starts, node: /controller, forbidden: true}
-  - {id: camera-is-replaced, when: {removed: /camera_driver}, expect: {handed_over: /image_small}, within: 20s}
   - {id: backup-starts, node: /camera_backup, forbidden: true}
   - {id: probe-starts, node: /probe, forbidden: true}
   - {id: planner-restarts, node: /planner, restarts: ..0}
@@ -121,13 +119,11 @@ fn each_reconfiguration_breaks_exactly_its_rule() {
     };
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("graph.yaml"), STEPS).unwrap();
-    let steps: [Step; 16] = [
+    let steps: [Step; 15] = [
         ("50", &["localizer-starts"], &[]),
         ("80", &["planner-starts"], &[]),
         ("110", &["controller-starts"], &[]),
-        // Whether the camera is replaced in time is not known yet.
         ("130", &["node /camera_driver"], &[]),
-        ("140", &["camera-is-replaced"], &[]),
         ("160", &["backup-starts"], &[]),
         ("174", &["probe-starts"], &[]),
         ("184", &["node /planner"], &[]),

@@ -192,11 +192,6 @@ fn a_node_named_only_by_its_log_is_unknown_without_it() {
     let (code, said) = check("{}");
     assert!(code == 1 && said.contains("error[node-missing]"), "{said}");
     assert_eq!(check("{known_by: rumour}").0, 2);
-    let (code, said) = check("{within: ..5s, present_within: 5s}");
-    assert!(
-        code == 2 && said.contains("`within: ..5s`") || said.contains("cannot be combined with"),
-        "{said}"
-    );
 }
 
 #[test]

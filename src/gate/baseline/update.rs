@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::edit::EditedText;
-use super::{Draft, Line, length, scalar, two_digits};
+use super::{Draft, Line, length, scalar, two_digits, whole};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::suggestion;
 use crate::base::words;
-use crate::base::yaml::BadYaml;
-use crate::gate::facts::Facts;
+use crate::base::yaml::{self, BadYaml, YamlData, YamlNode, YamlPair};
+use crate::gate::facts::{Facts, Role};
 use crate::gate::finding::{Finding, FindingKind, Severity};
-use crate::gate::pattern::Pattern;
+use crate::gate::values::Pattern;
 use crate::gate::{Expectation, judge, read};
 use crate::mission::Mission;
 
@@ -30,18 +29,21 @@ pub(crate) struct Update {
     pub(crate) left: usize,
 }
 
-/// Rewrites the facts that these runs, or parts of runs, break: for all names, or for those in `only`.
+/// The runs by which an expectation is updated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Runs<'a> {
+    pub(crate) missions: &'a [Mission],
+    /// Whether each is a part of a recording, whose times are meaningless.
+    pub(crate) is_part: bool,
+}
+
+/// Rewrites the facts that these runs break: for all names, or for those in `only`.
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be edited in place.
-pub(crate) fn update(
-    text: &str,
-    path: &Path,
-    (runs, is_part): (&[Mission], bool),
-    only: &[String],
-) -> Result<Update> {
+pub(crate) fn update(text: &str, path: &Path, runs: Runs<'_>, only: &[String]) -> Result<Update> {
     let expectation = read(text, path)?;
-    let draft = Draft::of(runs, is_part);
+    let draft = Draft::of(runs.missions, runs.is_part);
     for name in only {
         known(name, &expectation, &draft)?;
     }
@@ -49,9 +51,9 @@ pub(crate) fn update(
         text: EditedText(text.to_owned()),
         expectation: &expectation,
         draft: &draft,
-        runs,
+        runs: runs.missions,
     };
-    let findings = broken(&expectation, runs, is_part);
+    let findings = broken(&expectation, runs);
     let left = findings.iter().filter(|f| f.accept.is_none()).count();
     let mut seen = BTreeSet::new();
     let named = findings
@@ -59,7 +61,8 @@ pub(crate) fn update(
         .filter_map(|f| Some((f.accept.as_deref()?, f)));
     let wanted = named.filter(|(name, finding)| {
         let is_meant = |o: &String| o == name || *o == finding.name;
-        (only.is_empty() || only.iter().any(is_meant)) && seen.insert((*name, fact(finding.kind)))
+        (only.is_empty() || only.iter().any(is_meant))
+            && seen.insert((*name, finding.kind.row().key))
     });
     let wanted: Vec<(&str, &Finding)> = wanted.collect();
     if wanted.len() > MOST {
@@ -118,33 +121,15 @@ fn unchanged(path: &Path, bad: &BadYaml) -> Error {
 }
 
 /// The findings of these runs.
-fn broken(expectation: &Expectation, runs: &[Mission], is_part: bool) -> Vec<Finding> {
-    let verdicts = runs.iter().map(|run| judge(expectation, run, is_part));
+fn broken(expectation: &Expectation, runs: Runs<'_>) -> Vec<Finding> {
+    let missions = runs.missions.iter();
+    let verdicts = missions.map(|run| judge(expectation, run, runs.is_part));
     let findings = verdicts
         .flat_map(|verdict| verdict.checks)
         .flat_map(|check| check.findings);
-    let is_broken = |f: &Finding| {
-        matches!(f.severity, Severity::Error | Severity::Warning)
-            && f.kind != FindingKind::AllowUnused
-    };
-    findings.filter(is_broken).collect()
-}
-
-/// The key that a finding is about; empty for the element itself.
-fn fact(kind: FindingKind) -> &'static str {
-    match kind {
-        FindingKind::NodeGone | FindingKind::TopicGone => "may_end",
-        FindingKind::NodeLate | FindingKind::TopicLate => "within",
-        FindingKind::NodeRestarted => "restarts",
-        FindingKind::NodeLifecycle => "lifecycle",
-        FindingKind::TopicType => "type",
-        FindingKind::TopicQos => "qos",
-        FindingKind::TopicRateLow | FindingKind::TopicRateHigh => "hz",
-        FindingKind::TopicGap => "max_gap",
-        FindingKind::PublisherMissing | FindingKind::PublisherUnexpected => "by",
-        FindingKind::SubscriberMissing => "to",
-        _ => "",
-    }
+    findings
+        .filter(|f| f.severity != Severity::Unknown)
+        .collect()
 }
 
 /// An update in progress.
@@ -158,7 +143,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Rewrites the fact that a finding is about; `name` is the entry's.
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
-        let key = fact(finding.kind);
+        let key = finding.kind.row().key;
         let (section, lines) = if finding.kind.is_about_node() {
             ("nodes", &self.draft.nodes)
         } else {
@@ -167,7 +152,7 @@ impl Work<'_> {
         match finding.kind {
             FindingKind::UnexpectedNode | FindingKind::UnexpectedTopic => {
                 match lines.get(name).map(Line::text) {
-                    Some(line) => self.text.insert(section, name, &scalar(name), &line),
+                    Some(line) => self.text.insert(section, name, &line),
                     None => Ok(()),
                 }
             }
@@ -184,40 +169,35 @@ impl Work<'_> {
             | FindingKind::NodeRestarted
             | FindingKind::NodeLifecycle => {
                 let value = self.of_node(name, key);
-                if key == "within" {
-                    self.text.unset("nodes", name, "present_within")?;
-                }
                 self.write("nodes", name, key, value)
             }
             FindingKind::TopicRateLow | FindingKind::TopicRateHigh => {
-                let mut own = self.expectation.topics.iter();
-                let own = own
-                    .find(|own| own.name.as_str() == name)
-                    .map(|own| &own.facts);
-                let is_there = [
-                    ("hz", own.is_some_and(|own| own.hz.is_some())),
-                    ("mean_hz", own.is_some_and(|own| own.mean_hz.is_some())),
-                ];
-                for (key, _) in is_there.into_iter().filter(|(_, is_there)| *is_there) {
-                    let value = self.of_topic(name, key);
-                    self.write("topics", name, key, value)?;
+                let mut topics = self.expectation.topics.iter();
+                let own = topics.find(|own| own.name.as_str() == name);
+                let own = own.map(|own| &own.facts);
+                if own.is_some_and(|own| own.hz.is_some()) {
+                    self.write_topic(name, "hz")?;
+                }
+                if own.is_some_and(|own| own.mean_hz.is_some()) {
+                    self.write_topic(name, "mean_hz")?;
                 }
                 self.let_end(name)
             }
             FindingKind::TopicGap => {
-                let value = self.of_topic(name, key);
-                self.write("topics", name, key, value)?;
+                self.write_topic(name, key)?;
                 self.let_end(name)
             }
             FindingKind::TopicQos => {
                 self.text.unset("topics", name, "qos")?;
                 self.text.unset("topics", name, "latched")
             }
-            _ => {
-                let value = self.of_topic(name, key);
-                self.write("topics", name, key, value)
-            }
+            _ => self.write_topic(name, key),
         }
+    }
+
+    fn write_topic(&mut self, name: &str, key: &str) -> Result<(), BadYaml> {
+        let value = self.of_topic(name, key);
+        self.write("topics", name, key, value)
     }
 
     fn write(
@@ -264,7 +244,7 @@ impl Work<'_> {
         let mut latest = 0;
         for run in self.runs {
             let facts = Facts::new(run);
-            for (_, nodes) in facts.nodes(pattern) {
+            for Role { nodes, .. } in facts.nodes(pattern) {
                 let began = facts.began(nodes)?;
                 latest = latest.max(began.time.since(run.span.start));
             }
@@ -295,8 +275,8 @@ impl Work<'_> {
         for run in self.runs {
             let facts = Facts::new(run);
             for topic in facts.topics(pattern) {
-                let silences = facts.silences(topic, self.may_end(pattern), run.span);
-                longest = silences.iter().map(|s| s.nanos).fold(longest, i64::max);
+                let own = facts.longest_of(topic, self.may_end(pattern));
+                longest = longest.max(own.unwrap_or(0));
             }
         }
         (longest > 0).then(|| length(two_digits(longest)))
@@ -324,8 +304,261 @@ impl Work<'_> {
     }
 }
 
-/// The nanoseconds rounded up to a whole second.
-fn whole(nanos: i64) -> i64 {
-    const SECOND: i64 = 1_000_000_000;
-    nanos.saturating_add(SECOND - 1) / SECOND * SECOND
+/// A YAML text in which single values are changed; every other character stays as it is.
+#[derive(Clone, Debug)]
+struct EditedText(String);
+
+impl EditedText {
+    /// Sets `key` of an entry to `value`, both as YAML; does nothing without such an entry.
+    fn set(&mut self, section: &str, entry: &str, key: &str, value: &str) -> Result<(), BadYaml> {
+        let whole: YamlNode = yaml::read(&self.0)?;
+        let Some(pair) = find(&whole, section).and_then(|s| find(&s.value, entry)) else {
+            return Ok(());
+        };
+        match (&pair.value.data, find(&pair.value, key)) {
+            (_, Some(own)) => self.replace(own, value),
+            (YamlData::Map(pairs), None) => self.add(&pair.value, pairs, key, value),
+            _ => {
+                let colon = self.after_key(pair);
+                self.0.insert_str(colon, &format!(" {{{key}: {value}}}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes `key` of an entry.
+    fn unset(&mut self, section: &str, entry: &str, key: &str) -> Result<(), BadYaml> {
+        let whole: YamlNode = yaml::read(&self.0)?;
+        if let Some(entry) = find(&whole, section).and_then(|s| find(&s.value, entry))
+            && let Some(pair) = find(&entry.value, key)
+        {
+            self.remove(&entry.value, pair);
+        }
+        Ok(())
+    }
+
+    /// Removes an entry.
+    fn drop_entry(&mut self, section: &str, entry: &str) -> Result<(), BadYaml> {
+        let whole: YamlNode = yaml::read(&self.0)?;
+        if let Some(section) = find(&whole, section)
+            && let Some(pair) = find(&section.value, entry)
+        {
+            self.remove(&section.value, pair);
+        }
+        Ok(())
+    }
+
+    /// Adds an entry in sorted position.
+    fn insert(&mut self, section: &str, entry: &str, value: &str) -> Result<(), BadYaml> {
+        let whole: YamlNode = yaml::read(&self.0)?;
+        let key = &scalar(entry);
+        let Some(part) = find(&whole, section) else {
+            let end = self.0.len();
+            self.insert_line(end, &format!("{section}:\n  {key}: {value}\n"));
+            return Ok(());
+        };
+        let YamlData::Map(pairs) = &part.value.data else {
+            let end = self.line_end(self.after_key(part));
+            self.insert_line(end, &format!("  {key}: {value}\n"));
+            return Ok(());
+        };
+        let (Some(first), Some(last)) = (pairs.first(), pairs.last()) else {
+            self.add(&part.value, pairs, key, value);
+            return Ok(());
+        };
+        if self.is_flow(&part.value) {
+            self.add(&part.value, pairs, key, value);
+            return Ok(());
+        }
+        let next = pairs.iter().find(|pair| pair.key.as_str() > entry);
+        let line = format!("{}{key}: {value}\n", self.indent(first));
+        let at = match next {
+            Some(next) => self.line_start(next.bytes.start),
+            None => self.line_end(self.end(last)),
+        };
+        self.insert_line(at, &line);
+        Ok(())
+    }
+
+    /// Puts a whole line at `at`, which begins one.
+    fn insert_line(&mut self, at: usize, line: &str) {
+        let open = at > 0 && !self.0[..at].ends_with('\n');
+        let before = if open { "\n" } else { "" };
+        self.0.insert_str(at, &format!("{before}{line}"));
+    }
+
+    fn replace(&mut self, pair: &YamlPair, value: &str) {
+        let colon = self.after_key(pair);
+        let start = pair.value.bytes.start.max(colon);
+        let end = self.end(pair).max(colon);
+        // An inline value stays inline; a block list becomes inline.
+        let is_inline = start <= end && !self.0[colon..start].contains('\n');
+        let start = if is_inline { start } else { colon };
+        let gap = if start == colon { " " } else { "" };
+        self.0.replace_range(start..end, &format!("{gap}{value}"));
+    }
+
+    fn add(&mut self, body: &YamlNode, pairs: &[YamlPair], key: &str, value: &str) {
+        if self.is_flow(body) {
+            let close = self.end_of(body).saturating_sub(1);
+            let comma = if pairs.is_empty() { "" } else { ", " };
+            self.0.insert_str(close, &format!("{comma}{key}: {value}"));
+        } else if let Some(first) = pairs.first() {
+            let line = format!("{}{key}: {value}\n", self.indent(first));
+            let start = self.line_start(first.bytes.start);
+            self.0.insert_str(start, &line);
+        }
+    }
+
+    fn remove(&mut self, body: &YamlNode, pair: &YamlPair) {
+        let (start, end) = (pair.bytes.start, self.end(pair));
+        let range = if !self.is_flow(body) {
+            self.line_start(start)..self.line_end(end)
+        } else if let Some(after) = self.0[end..].trim_start().strip_prefix(',') {
+            start..self.0.len() - after.trim_start().len()
+        } else {
+            let before = self.0[..start].trim_end();
+            before.strip_suffix(',').map_or(start, str::len)..end
+        };
+        self.0.replace_range(range, "");
+    }
+
+    /// The byte at which the value of a pair ends.
+    fn end(&self, pair: &YamlPair) -> usize {
+        self.end_of(&pair.value).max(self.after_key(pair))
+    }
+
+    /// The byte at which a value ends; 0 for none.
+    fn end_of(&self, value: &YamlNode) -> usize {
+        let inside = match &value.data {
+            YamlData::Scalar if value.bytes.is_empty() => return 0,
+            YamlData::Scalar => return value.bytes.end,
+            YamlData::List(list) => list.last().map(|last| self.end_of(last)),
+            YamlData::Map(pairs) => pairs.last().map(|last| self.end(last)),
+        };
+        let inside = inside.unwrap_or(value.bytes.start);
+        if !self.is_flow(value) {
+            return inside;
+        }
+        // After the last member come only a comma and comments.
+        let mut is_comment = false;
+        let bracket = self.0[inside..].char_indices().find(|(at, c)| {
+            is_comment = match c {
+                '#' => is_comment || self.0[..inside + at].ends_with([' ', '\n']),
+                '\n' => false,
+                _ => is_comment,
+            };
+            !is_comment && matches!(c, ']' | '}')
+        });
+        bracket.map_or(self.0.len(), |(at, _)| inside + at + 1)
+    }
+
+    fn is_flow(&self, part: &YamlNode) -> bool {
+        self.0[part.bytes.start..].starts_with(['{', '['])
+    }
+
+    /// The byte after the colon of a key.
+    fn after_key(&self, pair: &YamlPair) -> usize {
+        let colon = self.0[pair.bytes.end..].find(':');
+        colon.map_or(self.0.len(), |at| pair.bytes.end + at + 1)
+    }
+
+    fn indent(&self, pair: &YamlPair) -> String {
+        let start = self.line_start(pair.bytes.start);
+        " ".repeat(self.0[start..pair.bytes.start].chars().count())
+    }
+
+    fn line_start(&self, at: usize) -> usize {
+        self.0[..at].rfind('\n').map_or(0, |end| end + 1)
+    }
+
+    /// The beginning of the line after `at`.
+    fn line_end(&self, at: usize) -> usize {
+        let end = self.0[at..].find('\n');
+        end.map_or(self.0.len(), |end| at + end + 1)
+    }
+}
+
+fn find<'a>(part: &'a YamlNode, key: &str) -> Option<&'a YamlPair> {
+    match &part.data {
+        YamlData::Map(pairs) => pairs.iter().find(|pair| pair.key == key),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = "\
+# ours
+nodes:
+  /a: {} # first
+  /c:   {restarts: ..0}   # kept
+
+topics:
+  /scan: {hz: 9..11, by: [/a, \"/b: x\"]} # fast
+  /block:
+    # slow, but even
+    hz: 1..2   # rate
+    by:
+      - /a
+      - /c
+  /null:
+";
+
+    fn edited(edit: impl Fn(&mut EditedText) -> Result<(), BadYaml>) -> String {
+        let mut text = EditedText(FILE.to_owned());
+        edit(&mut text).unwrap();
+        yaml::read::<YamlNode>(&text.0).unwrap();
+        text.0
+    }
+
+    /// The lines that are not in both.
+    fn differing(text: &str) -> (Vec<&str>, Vec<&str>) {
+        let gone = FILE.lines().filter(|l| !text.lines().any(|o| o == *l));
+        let new = text.lines().filter(|l| !FILE.lines().any(|o| o == *l));
+        (gone.collect(), new.collect())
+    }
+
+    /// Checks that an edit replaces only this part of the file.
+    fn replaces(edit: impl Fn(&mut EditedText) -> Result<(), BadYaml>, old: &str, new: &str) {
+        assert_eq!(edited(edit), FILE.replace(old, new));
+    }
+
+    #[test]
+    fn only_the_value_is_changed() {
+        let topic = |name, key, value| move |t: &mut EditedText| t.set("topics", name, key, value);
+        replaces(topic("/scan", "hz", "5..6"), "9..11", "5..6");
+        replaces(topic("/scan", "by", "[/z]"), "[/a, \"/b: x\"]", "[/z]");
+        replaces(topic("/block", "hz", "5..6"), "1..2", "5..6");
+        let list = "by:\n      - /a\n      - /c";
+        replaces(topic("/block", "by", "[/z]"), list, "by: [/z]");
+    }
+
+    #[test]
+    fn keys_are_added_to_entries_with_or_without_keys() {
+        let ends = |name| move |t: &mut EditedText| t.set("nodes", name, "may_end", "true");
+        replaces(ends("/a"), "/a: {} #", "/a: {may_end: true} #");
+        replaces(ends("/c"), "..0}", "..0, may_end: true}");
+        let rate = |t: &mut EditedText| t.set("topics", "/null", "hz", "1..");
+        replaces(rate, "/null:", "/null: {hz: 1..}");
+        let text = edited(|t| t.set("topics", "/block", "latched", "true"));
+        let added = differing(&text);
+        assert_eq!(added, (vec![], vec!["    latched: true"]));
+    }
+
+    #[test]
+    fn entries_are_added_and_removed_with_their_lines() {
+        replaces(|t| t.drop_entry("nodes", "/a"), "  /a: {} # first\n", "");
+        replaces(|t| t.drop_entry("topics", "/null"), "  /null:\n", "");
+        replaces(|t| t.unset("topics", "/scan", "hz"), "hz: 9..11, ", "");
+        let by = ", by: [/a, \"/b: x\"]";
+        replaces(|t| t.unset("topics", "/scan", "by"), by, "");
+        let insert = |name| move |t: &mut EditedText| t.insert("nodes", name, "{}");
+        replaces(insert("/b"), "  /c:  ", "  /b: {}\n  /c:  ");
+        replaces(insert("/d"), "# kept\n", "# kept\n  /d: {}\n");
+        let text = edited(|t| t.insert("rules", "/d", "{}"));
+        assert_eq!(text, format!("{FILE}rules:\n  /d: {{}}\n"));
+    }
 }

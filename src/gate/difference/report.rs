@@ -136,33 +136,7 @@ struct DifferenceJson<'a> {
     schema: &'static str,
     first: &'a str,
     second: &'a str,
-    differences: Vec<DifferenceRow<'a>>,
-}
-
-#[derive(Serialize)]
-struct DifferenceRow<'a> {
-    kind: &'static str,
-    name: &'a str,
-    #[serde(rename = "in")]
-    side: &'static str,
-    first: &'a str,
-    second: &'a str,
-    known: bool,
-}
-
-fn row(difference: &Difference) -> DifferenceRow<'_> {
-    DifferenceRow {
-        kind: difference.kind,
-        name: &difference.name,
-        side: match difference.side {
-            Where::First => "first",
-            Where::Second => "second",
-            Where::Both => "both",
-        },
-        first: &difference.first,
-        second: &difference.second,
-        known: difference.is_known,
-    }
+    differences: Vec<&'a Difference>,
 }
 
 fn json(subject: &DiffSubject, all: &[Difference]) -> String {
@@ -170,7 +144,7 @@ fn json(subject: &DiffSubject, all: &[Difference]) -> String {
         schema: "bagreel.diff/1",
         first: &subject.first,
         second: &subject.second,
-        differences: known_first(all).map(row).collect(),
+        differences: known_first(all).collect(),
     };
     crate::mission::info::json(&report)
 }

@@ -1,16 +1,18 @@
 //! A summary in Markdown for a pull request or a job: its first line is the outcome, its table lists the findings
-//! with their times.
+//! with their times, a Mermaid flow chart shows missing, new or changed elements and their neighbours.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use super::{Subject, grouped, mermaid};
+use super::{Group, Subject, grouped};
 use crate::base::words;
+use crate::export::mermaid::escaped;
 use crate::export::report::escape::{code, plain};
 use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
+use crate::graph::Edge;
 
 /// The most bytes of each part; with a chart they stay below 256 KiB, a quarter of the limit of a job's summary.
 const MOST_ROWS: usize = 96 << 10;
@@ -32,10 +34,10 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let mut out = headline(subject, verdict) + "\n\n";
     // The most severe first, then those with the most consequences.
     let mut groups = grouped(&broken);
-    groups.sort_by_key(|(_, group)| (group.first().map(|f| f.severity), Reverse(group.len())));
+    groups.sort_by_key(|group| (group.worst(), Reverse(group.findings.len())));
     causes(&groups, &mut out);
     table(&facts, &groups, &mut out);
-    if let Some(chart) = mermaid::chart(&facts, &broken) {
+    if let Some(chart) = chart(&facts, &broken) {
         let open = "<details><summary>Graph around the changes</summary>";
         let _ = writeln!(out, "{open}\n\n```mermaid\n{chart}```\n</details>\n");
     }
@@ -47,12 +49,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
             command(&subject.accept(None))
         );
     }
-    list(
-        &of_severity(&[Severity::Unknown]),
-        "What this bag cannot tell",
-        &mut out,
-    );
-    list(&of_severity(&[Severity::Allowed]), "Allowed", &mut out);
+    undecidable(&of_severity(&[Severity::Unknown]), &mut out);
     let (bag, file) = (mark(&subject.name()), mark(&subject.tracked));
     let _ = writeln!(out, "<!-- bagreel:{bag}:{file} -->");
     out
@@ -72,12 +69,8 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         "✅"
     };
     let kept = words::count(verdict.facts(Judgement::Kept), "rule");
-    let unknown = match verdict.count(Severity::Unknown) {
-        0 => String::new(),
-        unknown => format!("{unknown} unknown"),
-    };
-    let mut parts = vec![verdict.broken(), unknown, format!("{kept} passed")];
-    parts.retain(|words| !words.is_empty());
+    let mut parts = verdict.counts();
+    parts.push(format!("{kept} passed"));
     format!(
         "### {sign} Graph check: {} · {} against {} · {} in windows of {}",
         parts.join(", "),
@@ -89,9 +82,9 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
 }
 
 /// Writes the causes of several findings, those of most findings first.
-fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
-    let several = groups.iter().filter(|(_, group)| group.len() > 1);
-    let several = several.filter_map(|(cause, group)| Some(((*cause)?, group.len())));
+fn causes(groups: &[Group<'_>], out: &mut String) {
+    let several = groups.iter().filter(|group| group.findings.len() > 1);
+    let several = several.filter_map(|group| Some((group.cause?, group.findings.len())));
     let several: Vec<(&str, usize)> = several.collect();
     for (cause, many) in several.iter().take(CAUSES) {
         let many = words::count(*many, "finding");
@@ -107,10 +100,10 @@ fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
 }
 
 /// Writes the table of findings, those of one cause one after the other.
-fn table(facts: &Facts<'_>, groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
-    let rows = groups.iter().flat_map(|(_, group)| {
-        let is_alone = group.len() == 1;
-        group.iter().map(move |f| row(facts, f, is_alone))
+fn table(facts: &Facts<'_>, groups: &[Group<'_>], out: &mut String) {
+    let rows = groups.iter().flat_map(|group| {
+        let is_alone = group.findings.len() == 1;
+        group.findings.iter().map(move |f| row(facts, f, is_alone))
     });
     let mut rows: Vec<String> = rows.collect();
     let all = rows.len();
@@ -180,28 +173,21 @@ fn value(text: &str) -> String {
     }
 }
 
-fn list(findings: &[&Finding], title: &str, out: &mut String) {
+/// Writes the findings that are not observable.
+fn undecidable(findings: &[&Finding], out: &mut String) {
     if findings.is_empty() {
         return;
     }
-    let _ = writeln!(
-        out,
-        "<details><summary>{title}: {}</summary>\n",
-        findings.len()
-    );
+    let title = "What this bag cannot tell";
+    let open = format!("<details><summary>{title}: {}</summary>", findings.len());
+    let _ = writeln!(out, "{open}\n");
     let start = out.len();
     let mut hinted = BTreeSet::new();
     for (at, finding) in findings.iter().enumerate() {
-        let why = finding
-            .why
-            .as_ref()
-            .map_or_else(String::new, |why| format!(": {}", plain(why)));
         // Hints apply to all findings of a kind.
-        let mut help = String::new();
-        for fresh in finding.help.iter().filter(|help| hinted.insert(*help)) {
-            let _ = write!(help, ": {}", plain(fresh));
-        }
-        let line = format!("- {}{why}{help}\n", plain(&finding.text));
+        let fresh = finding.help.iter().filter(|help| hinted.insert(*help));
+        let help: Vec<String> = fresh.map(|help| format!(": {}", plain(help))).collect();
+        let line = format!("- {}{}\n", plain(&finding.text), help.concat());
         if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);
             break;
@@ -235,4 +221,159 @@ fn mark(name: &str) -> String {
         .iter()
         .fold(mark.as_str(), |mark, ending| mark.trim_end_matches(ending));
     mark.chars().take(100).collect()
+}
+
+/// The most edges that are drawn.
+const MOST_EDGES: usize = 60;
+/// The most boxes that are drawn.
+const MOST_ITEMS: usize = 80;
+/// The largest size of the boxes in bytes; Mermaid draws no chart of more than 50,000 characters.
+const MOST_BOXES: usize = 36 << 10;
+/// The largest number of characters of a name; a longer one is cut.
+const LONGEST: usize = 80;
+
+/// A box of the chart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum ChartBox<'a> {
+    Node(&'a str),
+    Topic(&'a str),
+}
+
+/// An arrow from box to box.
+#[derive(Clone, Copy)]
+struct Arrow<'a> {
+    from: ChartBox<'a>,
+    to: ChartBox<'a>,
+    /// Whether it is expected and missing; such an arrow is dotted.
+    is_missing: bool,
+}
+
+/// What happened to a box: a class of the chart, and the text after its name.
+struct BoxChange {
+    class: &'static str,
+    label: String,
+}
+
+/// The chart; `None` if no finding is about the graph. Ends with a newline.
+fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
+    let mut marked: BTreeMap<ChartBox<'_>, BoxChange> = BTreeMap::new();
+    for finding in findings {
+        let class = finding.kind.row().class;
+        if class.is_empty() {
+            continue;
+        }
+        // The expected and the observed value.
+        let label = match finding.kind {
+            FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
+                format!("{} → {}", finding.expected, finding.seen)
+            }
+            _ => String::new(),
+        };
+        let own = if finding.kind.is_about_node() {
+            ChartBox::Node(&finding.name)
+        } else {
+            ChartBox::Topic(&finding.name)
+        };
+        marked.entry(own).or_insert(BoxChange { class, label });
+    }
+    let arrows = arrows(facts, &marked, findings);
+    let mut boxes: BTreeSet<ChartBox<'_>> = arrows.iter().flat_map(|a| [a.from, a.to]).collect();
+    boxes.extend(marked.keys().take(MOST_ITEMS));
+    (!boxes.is_empty()).then(|| written(&boxes, &marked, &arrows))
+}
+
+/// The arrows that are missing, then those of marked boxes.
+fn arrows<'a>(
+    facts: &Facts<'a>,
+    marked: &BTreeMap<ChartBox<'_>, BoxChange>,
+    findings: &[&'a Finding],
+) -> Vec<Arrow<'a>> {
+    let missing = findings.iter().filter_map(|finding| {
+        let node = ChartBox::Node(&finding.expected);
+        let topic = ChartBox::Topic(&finding.name);
+        let (from, to) = match finding.kind {
+            FindingKind::PublisherMissing => (node, topic),
+            FindingKind::SubscriberMissing => (topic, node),
+            _ => return None,
+        };
+        Some(Arrow {
+            from,
+            to,
+            is_missing: true,
+        })
+    });
+    let elements = &facts.mission.elements;
+    let arrow = |edge: &Edge, is_sent: bool| {
+        let node = ChartBox::Node(facts.role(edge.node));
+        let topic = ChartBox::Topic(facts.topic(edge.topic));
+        let is_marked = marked.contains_key(&node) || marked.contains_key(&topic);
+        let is_named = !edge.seen.evidence.is_guess();
+        let is_robots = !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic);
+        let (from, to) = if is_sent {
+            (node, topic)
+        } else {
+            (topic, node)
+        };
+        (is_marked && is_named && is_robots).then_some(Arrow {
+            from,
+            to,
+            is_missing: false,
+        })
+    };
+    let sent = elements
+        .publishes
+        .iter()
+        .filter_map(|edge| arrow(edge, true));
+    let received = elements
+        .subscribes
+        .iter()
+        .filter_map(|edge| arrow(edge, false));
+    let mut seen = BTreeSet::new();
+    let all = missing.chain(sent).chain(received);
+    all.filter(|arrow| seen.insert((arrow.from, arrow.to)))
+        .take(MOST_EDGES)
+        .collect()
+}
+
+fn written(
+    boxes: &BTreeSet<ChartBox<'_>>,
+    marked: &BTreeMap<ChartBox<'_>, BoxChange>,
+    arrows: &[Arrow<'_>],
+) -> String {
+    let mut place: BTreeMap<&ChartBox<'_>, usize> = BTreeMap::new();
+    let mut out = String::from("flowchart LR\n");
+    // Marked boxes before their neighbours.
+    let is_marked = |own: &&ChartBox<'_>| marked.contains_key(own);
+    let (mut order, rest): (Vec<&ChartBox<'_>>, Vec<&ChartBox<'_>>) =
+        boxes.iter().partition(is_marked);
+    order.extend(rest);
+    for (at, own) in order.into_iter().enumerate() {
+        let (open, name, close) = match own {
+            ChartBox::Node(name) => ("([", name, "])"),
+            ChartBox::Topic(name) => ("[", name, "]"),
+        };
+        let mark = marked.get(own);
+        let name = words::shorten(name, LONGEST);
+        let more = mark.map_or("", |mark| &mark.label);
+        let text = escaped(format!("{name} {more}").trim_end());
+        let class = mark.map_or_else(String::new, |mark| format!(":::{}", mark.class));
+        let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");
+        if out.len() + line.len() > MOST_BOXES {
+            break;
+        }
+        out.push_str(&line);
+        place.insert(own, at);
+    }
+    for arrow in arrows {
+        let line = if arrow.is_missing { "-.->" } else { "-->" };
+        if let (Some(from), Some(to)) = (place.get(&arrow.from), place.get(&arrow.to)) {
+            // Writing into a string does not fail.
+            let _ = writeln!(out, "  i{from} {line} i{to}");
+        }
+    }
+    // Colours that work on light and dark pages.
+    out.push_str("  classDef gone stroke:#d1242f,stroke-width:3px,stroke-dasharray:6 4\n");
+    out.push_str("  classDef new stroke:#1a7f37,stroke-width:3px\n");
+    out.push_str("  classDef changed stroke:#bf8700,stroke-width:3px\n");
+    out
 }

@@ -1,4 +1,5 @@
-//! Findings for people, in the style of compilers: the finding, its position, the observed value, and hints.
+//! Findings for people, in the style of compilers: the finding, its position, the observed value, and hints; and for GitHub,
+//! whose annotations come first.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -8,17 +9,18 @@ use crate::base::words;
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::{Judgement, Verdict};
 
-/// The report; ends in a new line.
-pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
+/// The text; ends in a new line.
+pub(super) fn text(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
     let mut out = String::new();
     let mut hinted = BTreeSet::new();
-    for (cause, group) in grouped(&findings) {
-        let is_one = group.len() == 1;
-        if let Some(cause) = cause.filter(|_| !is_one) {
-            let _ = writeln!(out, "{cause}: {}", words::count(group.len(), "finding"));
+    for group in grouped(&findings) {
+        let is_one = group.findings.len() == 1;
+        if let Some(cause) = group.cause.filter(|_| !is_one) {
+            let many = words::count(group.findings.len(), "finding");
+            let _ = writeln!(out, "{cause}: {many}");
         }
-        for one in group {
+        for one in group.findings {
             finding(subject, one, is_one, &mut hinted, &mut out);
         }
     }
@@ -30,11 +32,14 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
 /// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules passed`.
 fn last_line(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let kept = verdict.facts(Judgement::Kept);
+    let counts = match verdict.counts() {
+        counts if counts.is_empty() => "no findings".to_owned(),
+        counts => counts.join(", "),
+    };
     format!(
-        "{} against {}: {}, {} passed\n",
+        "{} against {}: {counts}, {} passed\n",
         subject.name(),
         subject.file,
-        verdict.summary(),
         words::count(kept, "rule")
     )
 }
@@ -58,16 +63,81 @@ fn finding(
     {
         let _ = writeln!(out, "   |  since {}", cause.text);
     }
-    if let Some(why) = &finding.why {
-        let _ = writeln!(out, "   =  allowed: {why}");
-    }
     // Hints apply to all findings of a kind.
     for hint in finding.help.iter().filter(|h| hinted.insert((*h).clone())) {
         let _ = writeln!(out, "   =  {hint}");
     }
     if let Some(name) = &finding.accept
-        && matches!(finding.severity, Severity::Error | Severity::Warning)
+        && finding.severity != Severity::Unknown
     {
         let _ = writeln!(out, "   =  accept: {}", subject.accept(Some(name)));
+    }
+}
+
+/// The number of annotations of one kind per step; GitHub silently drops more.
+const MOST: usize = 10;
+
+/// GitHub's annotations: workflow commands at lines of the expectation, followed by the text, since GitHub drops the
+/// annotations beyond its limit. Ends in a new line.
+pub(super) fn github(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let findings = verdict.findings();
+    let mut out = String::new();
+    for (severity, command) in [(Severity::Error, "error"), (Severity::Warning, "warning")] {
+        let own = findings.iter().filter(|f| f.severity == severity);
+        let own: Vec<&&Finding> = own.collect();
+        for (at, finding) in own.iter().take(MOST).enumerate() {
+            // The last one states how many are not shown.
+            let rest = own.len() - at - 1;
+            let is_last = at + 1 == MOST && rest > 0;
+            let more = is_last.then(|| format!(" (and {rest} more in the log)"));
+            let more = more.unwrap_or_default();
+            annotation(subject, command, finding, &more, &mut out);
+        }
+    }
+    let text = text(subject, verdict);
+    for line in text.lines() {
+        let _ = writeln!(out, "{}", inert(line));
+    }
+    // Runners interpret this as a command anywhere in a line.
+    out.replace("##[", "#\\#[")
+}
+
+fn annotation(
+    subject: &Subject<'_>,
+    command: &str,
+    finding: &Finding,
+    more: &str,
+    out: &mut String,
+) {
+    let details = finding.details.iter().map(|detail| format!("\n{detail}"));
+    let text = format!("{}{more}{}", finding.text, details.collect::<String>());
+    let _ = writeln!(
+        out,
+        "::{command} file={},line={},title={}::{}",
+        property(&subject.tracked),
+        finding.place.line.max(1),
+        property(finding.kind.word()),
+        data(&text)
+    );
+}
+
+/// Text after a command, escaped.
+fn data(text: &str) -> String {
+    text.replace('%', "%25")
+        .replace('\r', "%0D")
+        .replace('\n', "%0A")
+}
+
+/// A property of a command, escaped.
+fn property(text: &str) -> String {
+    data(text).replace(':', "%3A").replace(',', "%2C")
+}
+
+/// A line of the log, escaped so that it is not a command (`::` after spaces).
+fn inert(line: &str) -> String {
+    if line.trim_start().starts_with("::") {
+        format!("\\{line}")
+    } else {
+        line.to_owned()
     }
 }

@@ -1,21 +1,25 @@
-//! Two missions as one that can be drawn: the elements of both by role, and a log of the differences.
+//! Two missions as one that is drawn: the elements of both by role, a log of the differences, and below the picture the
+//! lifelines of everything that differs, one mission above the other, aligned at the first messages.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::{DiffSubject, Difference, Where};
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::base::words;
+use crate::draw::figure::course::{LifeLine, LifeLines};
+use crate::draw::figure::source::FigureSource;
+use crate::draw::figure::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
 use crate::evidence::{Confidence, Evidence};
-use crate::gate::facts::Facts;
-use crate::gate::pattern::Pattern;
+use crate::gate::facts::{Facts, Peer, Rate, TopicIn};
+use crate::gate::values::Pattern;
 use crate::graph::history::Sending;
 use crate::graph::{
     ById, Edge, Element, ElementState, Elements, Existence, Graph, Node, NodeId, State, Topic,
 };
 use crate::mission::event_log::{Detail, Event, EventId, EventLog, Kind, sorted};
 use crate::mission::{Mission, Window};
-
-use super::{Difference, Where};
+use crate::view::NameFilter;
 
 /// The picture of two missions that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,14 +32,32 @@ pub(crate) enum Side {
 
 /// The length of a window of the picture in nanoseconds, without meaning.
 const SECOND: i64 = 1_000_000_000;
+/// The time of all events of the picture, without meaning.
+const AT: Stamp = Stamp(SECOND);
 
 /// The elements of one mission, by role and topic.
 #[derive(Default)]
 struct MissionSide {
-    nodes: BTreeMap<String, (Confidence, Evidence)>,
+    nodes: BTreeMap<String, Seen>,
     topics: BTreeMap<String, TopicSeen>,
-    publishes: BTreeMap<(String, String), (Confidence, Evidence)>,
-    subscribes: BTreeMap<(String, String), (Confidence, Evidence)>,
+    publishes: BTreeMap<EdgeNames, Seen>,
+    subscribes: BTreeMap<EdgeNames, Seen>,
+}
+
+/// What is known of a node or an edge.
+#[derive(Clone, Copy)]
+struct Seen {
+    confidence: Confidence,
+    evidence: Evidence,
+}
+
+impl From<Peer> for Seen {
+    fn from(peer: Peer) -> Self {
+        Self {
+            confidence: peer.confidence,
+            evidence: peer.evidence,
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -46,51 +68,56 @@ struct TopicSeen {
     hz: Option<f64>,
 }
 
+/// The names of an edge's ends in its direction.
+type EdgeNames = [String; 2];
+
 impl MissionSide {
     fn of(mission: &Mission) -> Self {
-        let facts = Facts::new(mission);
+        let facts = &Facts::new(mission);
         let mut seen = Self::default();
         let elements = &mission.elements;
-        for (role, nodes) in facts.roles().filter(|(_, nodes)| !facts.is_tool(nodes)) {
-            let evidence = nodes.iter().fold(Evidence::NONE, |all, id| {
-                all.and(elements.nodes[*id].seen.evidence)
-            });
-            let confidence = if facts.is_sure(nodes) {
+        for role in facts.roles().filter(|role| !facts.is_tool(role.nodes)) {
+            let all = role
+                .nodes
+                .iter()
+                .map(|id| elements.nodes[*id].seen.evidence);
+            let confidence = if facts.is_sure(role.nodes) {
                 Confidence::Stated
             } else {
                 Confidence::Inferred
             };
-            seen.nodes.insert(role.to_owned(), (confidence, evidence));
+            let node = Seen {
+                confidence,
+                evidence: all.fold(Evidence::NONE, Evidence::and),
+            };
+            seen.nodes.insert(role.name.to_owned(), node);
         }
         for id in facts.topics(&Pattern::new("**")) {
-            let own = &elements.topics[id];
-            let rates = facts.rates(id, true, mission.span);
-            let count: u64 = rates.iter().map(|r| r.count).sum();
+            let own = TopicIn { facts, id };
+            let rates = own.rates(true);
             let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
             let topic = TopicSeen {
-                evidence: own.seen.evidence,
-                types: own.types.iter().map(|t| (**t).to_owned()).collect(),
+                evidence: elements.topics[id].seen.evidence,
+                types: own.types(),
                 count: facts.messages(id),
-                hz: (nanos > 0).then(|| count as f64 / (nanos as f64 / 1e9)),
+                hz: (nanos > 0).then(|| Rate::mean_hz(&rates)),
             };
-            let name = facts.topic(id).to_owned();
-            for (node, edge, confidence) in facts.publishers(id) {
-                let evidence = elements.publishes[edge].seen.evidence;
-                let key = (facts.role(node).to_owned(), name.clone());
-                seen.publishes.insert(key, (confidence, evidence));
+            let name = facts.topic(id);
+            for peer in facts.publishers(id) {
+                let key = [facts.role(peer.node), name].map(str::to_owned);
+                seen.publishes.insert(key, peer.into());
             }
-            for (node, edge, confidence) in facts.subscribers(id) {
-                let evidence = elements.subscribes[edge].seen.evidence;
-                let key = (name.clone(), facts.role(node).to_owned());
-                seen.subscribes.insert(key, (confidence, evidence));
+            for peer in facts.subscribers(id) {
+                let key = [name, facts.role(peer.node)].map(str::to_owned);
+                seen.subscribes.insert(key, peer.into());
             }
-            seen.topics.insert(name, topic);
+            seen.topics.insert(name.to_owned(), topic);
         }
         let nodes = &seen.nodes;
         seen.publishes
-            .retain(|(node, _), _| nodes.contains_key(node));
+            .retain(|[node, _], _| nodes.contains_key(node));
         seen.subscribes
-            .retain(|(_, node), _| nodes.contains_key(node));
+            .retain(|[_, node], _| nodes.contains_key(node));
         seen
     }
 }
@@ -104,7 +131,6 @@ pub(crate) fn union(
 ) -> Mission {
     let (a, b) = (MissionSide::of(first), MissionSide::of(second));
     let elements = elements(&a, &b);
-    let at = Stamp(SECOND);
     let span = |from: i64| Span::new(Stamp(from), Stamp(from + SECOND));
     let window = |index: usize, span: Span, seen: &MissionSide| Window {
         index,
@@ -126,23 +152,18 @@ pub(crate) fn union(
         .iter()
         .map(|(span, seen)| (*span, graph(&elements, seen)));
     let graphs = graphs.collect();
-    let whole = Span::new(
-        windows.first().map_or(at, |w| w.span.start),
-        Stamp(2 * SECOND),
-    );
+    let start = windows.first().map_or(AT, |w| w.span.start);
     let events = UnionLog {
-        a: &a,
-        b: &b,
+        sides: [&a, &b],
         elements: &elements,
         differing,
         turned: turned(differing),
-        at,
         events: ById::default(),
     };
     let period = Period::from_nanos(SECOND).unwrap_or(first.period);
     Mission {
         bags: first.bags.iter().chain(&second.bags).cloned().collect(),
-        span: whole,
+        span: Span::new(start, Stamp(2 * SECOND)),
         messages: windows.iter().map(|w| w.messages).sum(),
         period,
         step: period,
@@ -162,13 +183,13 @@ pub(crate) fn union(
 }
 
 fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
-    let nodes: BTreeMap<&String, Evidence> = both(&a.nodes, &b.nodes);
-    let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
-    let nodes = nodes.into_iter().map(|(name, evidence)| Node {
+    let nodes = both(&a.nodes, &b.nodes).into_iter();
+    let nodes = nodes.map(|(name, evidence)| Node {
         name: name.as_str().into(),
         role: name.as_str().into(),
         seen: Existence::of(evidence),
     });
+    let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
     let topics = topics.into_iter().map(|name| {
         let own = [a.topics.get(name), b.topics.get(name)];
         let own = || own.into_iter().flatten();
@@ -185,7 +206,7 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         topics: topics.collect(),
         ..Elements::default()
     };
-    let edge = |node: &String, topic: &String, evidence: Evidence| {
+    let edge = |node: &str, topic: &str, evidence: Evidence| {
         Some(Edge {
             node: ends.node(node)?,
             topic: ends.topic(topic)?,
@@ -193,9 +214,9 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
         })
     };
     let publishes = both(&a.publishes, &b.publishes).into_iter();
-    let publishes = publishes.filter_map(|((node, topic), e)| edge(node, topic, e));
+    let publishes = publishes.filter_map(|([node, topic], e)| edge(node, topic, e));
     let subscribes = both(&a.subscribes, &b.subscribes).into_iter();
-    let subscribes = subscribes.filter_map(|((topic, node), e)| edge(node, topic, e));
+    let subscribes = subscribes.filter_map(|([topic, node], e)| edge(node, topic, e));
     Elements {
         publishes: publishes.collect(),
         subscribes: subscribes.collect(),
@@ -205,13 +226,13 @@ fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
 
 /// The keys of both maps with their combined evidence.
 fn both<'a, K: Ord>(
-    a: &'a BTreeMap<K, (Confidence, Evidence)>,
-    b: &'a BTreeMap<K, (Confidence, Evidence)>,
+    a: &'a BTreeMap<K, Seen>,
+    b: &'a BTreeMap<K, Seen>,
 ) -> BTreeMap<&'a K, Evidence> {
     let mut all: BTreeMap<&K, Evidence> = BTreeMap::new();
-    for (key, (_, evidence)) in a.iter().chain(b) {
+    for (key, seen) in a.iter().chain(b) {
         let slot = all.entry(key).or_insert(Evidence::NONE);
-        *slot = slot.and(*evidence);
+        *slot = slot.and(seen.evidence);
     }
     all
 }
@@ -219,7 +240,6 @@ fn both<'a, K: Ord>(
 fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     let state = |what: Element| {
         let (node, topic) = elements.names(what);
-        let names = |a: Option<&str>, b: Option<&str>| Some((a?.to_owned(), b?.to_owned()));
         let known = match what {
             Element::Node(_) => seen.nodes.get(node?),
             Element::Topic(_) => {
@@ -230,10 +250,11 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
                     ..ElementState::new(what, State::default(), Confidence::default())
                 });
             }
-            Element::Publish(_) => seen.publishes.get(&names(node, topic)?),
-            Element::Subscribe(_) => seen.subscribes.get(&names(topic, node)?),
+            Element::Publish(_) => seen.publishes.get(&[node?, topic?].map(str::to_owned)),
+            Element::Subscribe(_) => seen.subscribes.get(&[topic?, node?].map(str::to_owned)),
         };
-        Some(ElementState::new(what, State::default(), known?.0))
+        let confidence = known?.confidence;
+        Some(ElementState::new(what, State::default(), confidence))
     };
     Graph {
         states: elements.all().filter_map(state).collect(),
@@ -242,12 +263,10 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
 
 /// The log under construction.
 struct UnionLog<'a> {
-    a: &'a MissionSide,
-    b: &'a MissionSide,
+    sides: [&'a MissionSide; 2],
     elements: &'a Elements,
     differing: &'a [Difference],
     turned: Turned<'a>,
-    at: Stamp,
     events: ById<EventId, Event>,
 }
 
@@ -334,8 +353,10 @@ impl UnionLog<'_> {
 
     /// The different values.
     fn values(&self, difference: &Difference) -> Detail {
-        let hz = |seen: &MissionSide| seen.topics.get(&difference.element).and_then(|t| t.hz);
-        if let ("rate", Some(from_hz), Some(to_hz)) = (difference.kind, hz(self.a), hz(self.b)) {
+        let topics = self.sides.map(|side| side.topics.get(&difference.element));
+        if let ("rate", [Some(from_hz), Some(to_hz)]) =
+            (difference.kind, topics.map(|topic| topic?.hz))
+        {
             return Detail::Rates { from_hz, to_hz };
         }
         let event = difference.name.strip_prefix(&*difference.element);
@@ -362,9 +383,9 @@ impl UnionLog<'_> {
         self.events.push(Event {
             kind,
             what,
-            time: self.at,
-            earliest: self.at,
-            latest: self.at,
+            time: AT,
+            earliest: AT,
+            latest: AT,
             until: None,
             detail,
             confidence: Confidence::Measured,
@@ -379,4 +400,106 @@ impl UnionLog<'_> {
 /// The kind of event for an edge or topic that appeared or vanished.
 fn appeared(came: bool) -> Kind {
     if came { Kind::Appeared } else { Kind::Vanished }
+}
+
+/// The most nodes and topics that are drawn.
+const MOST: usize = 200;
+
+/// A node or topic that is drawn, and its track in each mission.
+struct Pair {
+    what: Element,
+    tracks: [Option<Track>; 2],
+}
+
+/// A title for each node and topic that differs, and below it a row for each mission; times count from 0. `drawn` is
+/// the mission of both.
+pub(crate) fn pairs(
+    missions: [&Mission; 2],
+    subject: &DiffSubject,
+    differing: &[Difference],
+    drawn: &Mission,
+) -> LifeLines {
+    let known = differing.iter().filter(|d| d.is_known);
+    // An edge's name is that of both its ends.
+    let names: BTreeSet<&str> = known.flat_map(|d| d.element.split(" → ")).collect();
+    let all = NameFilter::default();
+    let mut rows = Vec::new();
+    let kinds: [(TracksOf, PlaceOf); 2] = [
+        (of_nodes, |all, name| all.node(name).map(Element::Node)),
+        (of_topics, |all, name| all.topic(name).map(Element::Topic)),
+    ];
+    for (of, place) in kinds {
+        let mut pairs: BTreeMap<String, Pair> = BTreeMap::new();
+        for (side, mission) in missions.iter().enumerate() {
+            for track in of(&FigureSource::new(mission, &all, &all, false)) {
+                let name = &*track.name;
+                let Some(what) = place(&drawn.elements, name).filter(|_| names.contains(name))
+                else {
+                    continue;
+                };
+                let new = Pair {
+                    what,
+                    tracks: [None, None],
+                };
+                let pair = pairs.entry(name.to_owned()).or_insert(new);
+                pair.tracks[side] = Some(track);
+            }
+        }
+        rows.extend(pairs.into_iter().flat_map(|(name, pair)| {
+            let hz = pair
+                .tracks
+                .each_ref()
+                .map(|track| track.as_ref().and_then(|t| t.hz));
+            let hz = hz.map(|hz| hz.unwrap_or(0.0));
+            let most = hz[0].max(hz[1]);
+            let row = |label: String, side: usize| {
+                let share = if most > 0.0 { hz[side] / most } else { 1.0 };
+                let start = missions[side].span.start;
+                line(label, pair.what, pair.tracks[side].as_ref(), start, share)
+            };
+            let title = LifeLine {
+                label: name,
+                is_inside: false,
+                what: None,
+                lives: Vec::new(),
+                bars: Vec::new(),
+            };
+            let (first, second) = (
+                format!("A {}", subject.first),
+                format!("B {}", subject.second),
+            );
+            [title, row(first, 0), row(second, 1)]
+        }));
+    }
+    rows.truncate(3 * MOST);
+    LifeLines {
+        rows,
+        ..LifeLines::default()
+    }
+}
+
+/// The tracks of all nodes, or of all topics.
+type TracksOf = fn(&FigureSource<'_>) -> Vec<Track>;
+/// The element of a name.
+type PlaceOf = fn(&Elements, &str) -> Option<Element>;
+
+/// The row of a track, its times counted from `start`, and its highest rate drawn as `share` of all.
+fn line(label: String, what: Element, track: Option<&Track>, start: Stamp, share: f64) -> LifeLine {
+    let moved =
+        |span: Span| Span::new(Stamp(span.start.since(start)), Stamp(span.end.since(start)));
+    let lives = track.iter().flat_map(|t| &t.lives).map(|life| TrackLife {
+        span: moved(life.span),
+        ..*life
+    });
+    let bars = track.iter().flat_map(|t| &t.bars).map(|bar| SendingBar {
+        span: moved(bar.span),
+        share: bar.share * share,
+    });
+    LifeLine {
+        label,
+        is_inside: true,
+        what: Some(what),
+        lives: lives.collect(),
+        bars: bars.collect(),
+    }
 }
