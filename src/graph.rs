@@ -29,8 +29,8 @@ pub use build::{Built, build};
 pub(crate) use build::{
     History, Record, TopicCount, Windowed, counts, graphs, made, traffic, unread,
 };
-pub use elements::{Edge, EdgeId, Element, Elements, Existence, Node, NodeId, Topic, TopicId};
 pub(crate) use elements::Wiring;
+pub use elements::{Edge, EdgeId, Element, Elements, Existence, Node, NodeId, Topic, TopicId};
 pub use per_element::PerElement;
 
 worded! {

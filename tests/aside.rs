@@ -79,7 +79,8 @@ fn messages_before_a_simulated_clock_are_noted_and_nothing_is_lost() {
     let folder = tempfile::tempdir().unwrap();
     let mut bag = wall();
     let odom = bag.messages[0].clone();
-    bag.messages.splice(0..0, (0..150).map(|_| (odom.0, 0, odom.2.clone())));
+    bag.messages
+        .splice(0..0, (0..150).map(|_| (odom.0, 0, odom.2.clone())));
     let path = written(folder.path(), &[("one.bag", &bag)]).remove(0);
     let mission = sound(&Reading::of([&path]));
     assert_eq!(mission.messages, 30);

@@ -394,7 +394,10 @@ fn too_many_nodes_are_grouped_by_shorter_namespaces() {
     let flat = |k: usize| format!("/{}_{k}", kinds[k % 3]);
     std::fs::write(&mission, large(flat).to_string()).unwrap();
     let svg = figure(&mission, &["--kind", "lives"]).unwrap();
-    assert!(svg.contains("camera_driver_261 and 237 more."), "of 300 nodes");
+    assert!(
+        svg.contains("camera_driver_261 and 237 more."),
+        "of 300 nodes"
+    );
 }
 
 #[test]

@@ -28,11 +28,7 @@ fn everywhere(recording: &Recording) -> Vec<(String, Vec<u8>)> {
         all.push((format!("{how:?}.bag"), rosbag1::write(recording, how, 4000)));
     }
     for profile in ["ros1", "ros2"] {
-        for compression in [
-            None,
-            Some(mcap::Packed::Zstd),
-            Some(mcap::Packed::Lz4),
-        ] {
+        for compression in [None, Some(mcap::Packed::Zstd), Some(mcap::Packed::Lz4)] {
             let name = format!("{profile}_{compression:?}.mcap");
             let options = mcap::Options {
                 profile,

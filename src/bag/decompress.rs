@@ -5,6 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use zstd::stream::raw::{DParameter, Decoder, InBuffer, Operation as _, OutBuffer};
+
 use crate::base::budget::{UNPACKED, UNPACKED_FOLD};
 use crate::base::words::worded;
 
@@ -31,6 +33,32 @@ pub(crate) fn zstd_stated(frame: &[u8]) -> Option<u64> {
     zstd::zstd_safe::get_frame_content_size(frame)
         .ok()
         .flatten()
+}
+
+/// Zstandard frames decompressed piece by piece, by a caller that has the packed bytes.
+pub(crate) struct ZstdPieces(Decoder<'static>);
+
+impl ZstdPieces {
+    pub(crate) fn new() -> io::Result<Self> {
+        let mut decoder = Decoder::new()?;
+        decoder.set_parameter(DParameter::WindowLogMax(LARGEST_WINDOW))?;
+        Ok(Self(decoder))
+    }
+
+    /// Decompresses some of `from` into `to`; returns the number of bytes taken and written.
+    ///
+    /// # Errors
+    /// If the data is damaged.
+    pub(crate) fn run(&mut self, from: &[u8], to: &mut [u8]) -> io::Result<(usize, usize)> {
+        let (mut from, mut to) = (InBuffer::around(from), OutBuffer::around(to));
+        self.0.run(&mut from, &mut to)?;
+        Ok((from.pos(), to.pos()))
+    }
+
+    /// Forgets a frame, to begin another.
+    pub(crate) fn begin(&mut self) -> io::Result<()> {
+        self.0.reinit()
+    }
 }
 
 impl Compression {

@@ -35,12 +35,16 @@ pub fn run(
         check::make_folder(&output.target)?;
     }
     // Films leave windows out that files have, and are the same whatever else is written.
-    let (films, files): (Vec<&Output>, Vec<&Output>) =
+    let (films, others): (Vec<&Output>, Vec<&Output>) =
         outputs.iter().partition(|output| output.format.is_film());
     let mut films = pass(sequence, &films, progress)?.into_iter();
-    let mut files = pass(sequence, &files, progress)?.into_iter();
+    let mut others = pass(sequence, &others, progress)?.into_iter();
     let outcome = |output: &Output| {
-        let of = if output.format.is_film() { &mut films } else { &mut files };
+        let of = if output.format.is_film() {
+            &mut films
+        } else {
+            &mut others
+        };
         of.next().flatten()
     };
     let outcomes: Vec<_> = outputs.iter().map(outcome).collect();

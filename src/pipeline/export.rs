@@ -341,7 +341,10 @@ const FRAME_MS: (f64, f64) = (4.0, 13.0);
 /// The note before a job with very many frames: their number, the estimated time, and an alternative.
 fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     let is_drawn = |o: &Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
-    let is_film = job.outputs.iter().all(|o| !is_drawn(o) || o.format.is_film());
+    let is_film = job
+        .outputs
+        .iter()
+        .all(|o| !is_drawn(o) || o.format.is_film());
     let frames = sequence.frame_times(is_film).len();
     if frames <= MANY_FRAMES || !job.outputs.iter().any(is_drawn) {
         return None;

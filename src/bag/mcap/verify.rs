@@ -2,15 +2,14 @@
 
 use std::io::{self, Read};
 
-use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::records::{Record, op};
+use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, parse_record};
-use zstd::stream::raw::{Decoder, InBuffer, Operation as _, OutBuffer};
 
 use super::{Described, Mcap, records};
 use crate::bag::chunked::{Grammar as _, NoRecord, SecondFinds, pass, walk};
-use crate::bag::decompress::Compression;
+use crate::bag::decompress::{Compression, ZstdPieces};
 use crate::bag::model::Sink;
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
@@ -114,11 +113,11 @@ fn record(kind: u8, data: &[u8], found: &mut SecondFinds<'_, Mcap>) -> Result<()
 }
 
 /// Zstandard for the crate, whose own decompressor would compile everything that the C library offers.
-struct Zstd(Decoder<'static>);
+struct Zstd(ZstdPieces);
 
 impl Zstd {
     fn new() -> McapResult<Self> {
-        Decoder::new().map(Self).map_err(failed)
+        ZstdPieces::new().map(Self).map_err(|e| failed(&e))
     }
 }
 
@@ -128,16 +127,12 @@ impl Decompressor for Zstd {
     }
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
-        let (mut from, mut to) = (InBuffer::around(src), OutBuffer::around(dst));
-        self.0.run(&mut from, &mut to).map_err(failed)?;
-        Ok(DecompressResult {
-            consumed: from.pos(),
-            wrote: to.pos(),
-        })
+        let (consumed, wrote) = self.0.run(src, dst).map_err(|e| failed(&e))?;
+        Ok(DecompressResult { consumed, wrote })
     }
 
     fn reset(&mut self) -> McapResult<()> {
-        self.0.reinit().map_err(failed)
+        self.0.begin().map_err(|e| failed(&e))
     }
 
     fn name(&self) -> &'static str {
@@ -145,7 +140,7 @@ impl Decompressor for Zstd {
     }
 }
 
-fn failed(error: io::Error) -> McapError {
+fn failed(error: &io::Error) -> McapError {
     McapError::DecompressionError(error.to_string())
 }
 

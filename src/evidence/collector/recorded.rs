@@ -71,13 +71,19 @@ impl Recorded {
         };
         let before = self.firsts();
         let zeros = self.messages.calendars().values().map(|bag| bag.zeros);
-        let zeros = if span.contains(Stamp(0)) { 0 } else { zeros.sum() };
+        let zeros = if span.contains(Stamp(0)) {
+            0
+        } else {
+            zeros.sum()
+        };
         let aside = self.clip(span)?;
         let text = "message at time 0, before the clock was known, set aside";
-        self.notices.add(Notice::counted(NoticeKind::Note, zeros, text));
+        self.notices
+            .add(Notice::counted(NoticeKind::Note, zeros, text));
         let text = "message at an impossible time, set aside";
         let far = aside.saturating_sub(zeros);
-        self.notices.add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
+        self.notices
+            .add(Notice::counted(NoticeKind::ImpossibleTime, far, text));
         let kept = self.firsts().into_iter().min_by_key(|(_, first)| *first);
         let offset = |bag: &usize| {
             let ((other, start), first) = kept.zip(before.get(bag))?;

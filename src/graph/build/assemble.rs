@@ -15,7 +15,8 @@ use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::observation::Name;
 use crate::graph::{
-    ById, Column, ColumnCursor, ColumnWriter, Element, Graphs, GraphsWriter, Measures, NodeId, Number, Row, State, TopicId, per_second,
+    ById, Column, ColumnCursor, ColumnWriter, Element, Graphs, GraphsWriter, Measures, NodeId,
+    Number, Row, State, TopicId, per_second,
 };
 
 /// The graphs of the windows of one division of time.

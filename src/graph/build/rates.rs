@@ -49,9 +49,7 @@ impl Arrivals {
         let usual = usual.unwrap_or(window.nanos());
         let longest = window.nanos().max(usual.saturating_mul(PAUSE));
         Self {
-            before: self
-                .before
-                .filter(|at| self.first.since(*at) <= longest),
+            before: self.before.filter(|at| self.first.since(*at) <= longest),
             after: self.after.filter(|at| at.since(self.last) <= longest),
             ..self
         }
@@ -139,9 +137,8 @@ pub(crate) fn rates(
     let mut before = None;
     recorded.messages.merge(&ids, |timed| {
         let time = timed.time;
-        while let Some(done) = open.pop_front_if(|o| o.span.end <= time) {
-            all.push(done.close(sized, Some(time)));
-        }
+        let ended = open.partition_point(|o| o.span.end <= time);
+        all.extend(open.drain(..ended).map(|o| o.close(sized, Some(time))));
         while windows.start(next).is_some_and(|start| start <= time) {
             if time < windows.end(next) {
                 open.push_back(OpenWindow::new(next, windows.0[next], time, before));

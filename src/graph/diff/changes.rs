@@ -119,9 +119,7 @@ impl<'a> Changes<'a> {
         spans: (Span, Span),
     ) -> Option<Change> {
         let (from_hz, to_hz) = (hz.0?, hz.1?);
-        let secs = self
-            .present(what, spans.0)
-            .min(self.present(what, spans.1));
+        let secs = self.present(what, spans.0).min(self.present(what, spans.1));
         rate_differs(from_hz, to_hz, secs, self.threshold).then_some(Change::Rate {
             what,
             from_hz,
