@@ -105,7 +105,7 @@ pub(crate) fn facts(shown: &Shown) -> String {
         None => parts.extend(shown.hz.and_then(|hz| measured(shown, hz, shown.count))),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
-        parts.push(count(usize::try_from(n).unwrap_or(usize::MAX), "message"));
+        parts.push(count(n, "message"));
     }
     if let Some(state) = &shown.lifecycle {
         parts.push(format!("lifecycle {state}"));

@@ -439,9 +439,10 @@ fn numbers(
     let data = payload.numbers(count, size)?;
     let each = data.chunks_exact(size.max(1)).map(|bytes| {
         let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-        match is_big {
-            true => bytes.iter().fold(0, add),
-            false => bytes.iter().rev().fold(0, add),
+        if is_big {
+            bytes.iter().fold(0, add)
+        } else {
+            bytes.iter().rev().fold(0, add)
         }
     });
     match (to, kind) {

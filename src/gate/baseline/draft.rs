@@ -345,7 +345,7 @@ fn unjudged(seen: &[TopicInRun<'_>], rates: &[Rate]) -> String {
     let counts = seen.iter().map(|s| s.facts.messages(s.id));
     let count = counts.max().unwrap_or(0);
     if count < FEWEST || rates.len() < 2 {
-        return words::count(usize::try_from(count).unwrap_or(usize::MAX), "message");
+        return words::count(count, "message");
     }
     let [least, most] = [least, most].map(|hz| Some(words::significant(hz, 2)));
     words::rate_range(least, most)

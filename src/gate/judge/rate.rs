@@ -218,7 +218,7 @@ impl Judge<'_> {
             words::count(judged, "window"),
             words::rate(worst.hz()),
             self.facts.clock(worst.span.start),
-            words::count(usize::try_from(count).unwrap_or(usize::MAX), "message"),
+            words::count(count, "message"),
         );
         let mut finding = Finding::new(kind, name, at, text)
             .saw(hz, words::rate_range(range.from, range.to))
