@@ -2,7 +2,6 @@
 
 mod applies;
 mod args;
-mod extract;
 mod follow;
 mod gate;
 mod installed;
@@ -21,13 +20,12 @@ use std::path::Path;
 
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, ValueEnum as _};
 
-use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::words::visible;
 use crate::cli::terminal::{Terminal, has_colour, print_usage};
 use crate::mission::Mission;
 use applies::Given;
-use args::{Colour, Command, ExtractArgs, Typed};
+use args::{Colour, Command, Typed};
 
 const DONE: u8 = 0;
 const FAILED: u8 = 1;
@@ -65,7 +63,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render::render(&args, &given, &mut terminal),
         Command::Figure(args) => render::figure(&args, &given, &mut terminal),
         Command::Info(args) => show::info(&args, &given, &mut terminal),
-        Command::Extract(args) => extract(&args, &mut terminal),
+        Command::Extract(args) => tables::extract(&args, &mut terminal),
         Command::Tables(args) => tables::tables(&args, &mut terminal),
         Command::Events(args) => show::events(&args, &given, &mut terminal),
         Command::Diff(args) => {
@@ -78,13 +76,9 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
             gate::check(&args, &given, &mut terminal)
         }
         Command::Follow(args) => follow::follow(&args, &mut terminal),
-        Command::Styles { name } => styles(name.as_deref(), &mut terminal),
-        Command::Completions { shell } => {
-            installed::completions(shell, &mut terminal).map(|()| DONE)
-        }
-        Command::Man { command } => {
-            installed::manual(command.as_deref(), &mut terminal).map(|()| DONE)
-        }
+        Command::Styles { name } => installed::styles(name.as_deref(), &mut terminal),
+        Command::Completions { shell } => installed::completions(shell, &mut terminal),
+        Command::Man { command } => installed::manual(command.as_deref(), &mut terminal),
     };
     // Even if the work was done, a script must not continue as if it had not been interrupted.
     let outcome = match terminal.stopped_by() {
@@ -168,19 +162,4 @@ fn code(mission: &Mission) -> u8 {
     } else {
         DONE
     }
-}
-
-fn extract(args: &ExtractArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let inputs = args.bags.iter().map(Input::parse).collect();
-    let (notices, undecoded) = extract::extract(args, inputs, terminal)?;
-    let is_whole = undecoded == 0 && !notices.any_loss();
-    Ok(if is_whole { DONE } else { SKIPPED })
-}
-
-fn styles(name: Option<&str>, terminal: &mut Terminal) -> Result<u8, Error> {
-    match name {
-        Some(name) => terminal.results(crate::draw::style::builtin_text(name)?)?,
-        None => terminal.results(&look::styles())?,
-    }
-    Ok(DONE)
 }

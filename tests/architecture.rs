@@ -80,7 +80,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("cli", &[
         &["args", "stop"],
         &["applies", "look", "reading", "terminal"],
-        &["extract", "installed", "render", "show", "tables"],
+        &["installed", "render", "show", "tables"],
         &["gate"],
         &["follow"],
     ]),

@@ -149,7 +149,8 @@ pub fn number(value: f64) -> String {
 }
 
 /// A number of things: `1 node`, `3 nodes`, `2 entries`, `2 switches`.
-pub fn count(n: usize, word: &str) -> String {
+pub fn count(n: impl TryInto<usize>, word: &str) -> String {
+    let n = n.try_into().unwrap_or(usize::MAX);
     if n == 1 {
         return format!("1 {word}");
     }

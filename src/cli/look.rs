@@ -69,12 +69,6 @@ pub(super) fn style(name: &str) -> Result<Style> {
     Style::from_toml(&text, path)
 }
 
-/// The built-in styles, one per line.
-pub(super) fn styles() -> String {
-    let names: Vec<&str> = BUILTIN.iter().map(|row| row.0).collect();
-    names.join("\n") + "\n"
-}
-
 /// The bundled font, with the user's font file for characters that it lacks.
 pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     let Some(path) = file else {

@@ -282,12 +282,11 @@ fn colour(kind: Kind) -> &'static str {
 fn summary(notices: &[Notice]) -> String {
     let of = |kind: NoticeKind| notices.iter().filter(move |notice| notice.kind == kind);
     let hidden: u64 = of(NoticeKind::Hidden).map(|notice| notice.count).sum();
-    let hidden = usize::try_from(hidden).unwrap_or(usize::MAX);
     let parts = [
         (hidden, "element", " left out or collapsed"),
-        (of(NoticeKind::Chosen).count(), "setting", " chosen"),
+        (of(NoticeKind::Chosen).count() as u64, "setting", " chosen"),
         (
-            of(NoticeKind::Glyph).count(),
+            of(NoticeKind::Glyph).count() as u64,
             "font",
             " about missing characters",
         ),

@@ -107,7 +107,7 @@ pub(crate) fn facts(shown: &Shown) -> String {
         None => parts.extend(measured(shown, shown.hz, shown.count)),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
-        parts.push(count(usize::try_from(n).unwrap_or(usize::MAX), "message"));
+        parts.push(count(n, "message"));
     }
     if let Some(state) = &shown.lifecycle {
         parts.push(format!("lifecycle {state}"));

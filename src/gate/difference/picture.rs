@@ -360,7 +360,7 @@ impl UnionLog<'_> {
             return Detail::Rates { from_hz, to_hz };
         }
         let event = difference.name.strip_prefix(&*difference.element);
-        let of = |value: &str| match (difference.kind, value.parse()) {
+        let of = |value: &str| match (difference.kind, value.parse::<usize>()) {
             ("restarts", Ok(n)) => words::count(n, "restart").into(),
             ("event", _) if value.is_empty() => "no such event".into(),
             ("begin", _) => format!("begins at {value}").into(),

@@ -57,16 +57,15 @@ pub(crate) fn predicate(mission: &Mission, parts: &[EventId], event: &Event) -> 
         }
         (Detail::Count(many), kind) => {
             let over = lasted.map_or_else(String::new, |lasted| format!(" in {lasted}"));
-            let many = usize::try_from(*many).unwrap_or(usize::MAX);
             match kind {
                 Kind::Lost => format!(
                     "{} lost by the recorder{over}",
-                    words::count(many, "message")
+                    words::count(*many, "message")
                 ),
                 Kind::Vanished => {
-                    format!("vanishes and appears {}{over}", words::count(many, "time"))
+                    format!("vanishes and appears {}{over}", words::count(*many, "time"))
                 }
-                _ => format!("appears and vanishes {}{over}", words::count(many, "time")),
+                _ => format!("appears and vanishes {}{over}", words::count(*many, "time")),
             }
         }
         (Detail::Values { to, .. }, Kind::Starved) => starved(event.what, to),
