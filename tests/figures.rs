@@ -375,8 +375,8 @@ fn too_many_nodes_are_grouped_by_shorter_namespaces() {
         "drive/right",
         "map",
     ];
-    let spaced = |k: usize| format!("/{}/part{}/node{k}", spaces[k % 6], k / 6 % 5);
-    std::fs::write(&mission, large(spaced).to_string()).unwrap();
+    let named = |k: usize| format!("/{}/part{}/node{k}", spaces[k % 6], k / 6 % 5);
+    std::fs::write(&mission, large(named).to_string()).unwrap();
     for kind in ["lives", "map", "steps"] {
         let svg = figure(&mission, &["--kind", kind, "--width", "181mm"]).unwrap();
         let (w, h) = size_mm(&svg);
