@@ -79,7 +79,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
     ("cli", &[
         &["args", "stop"],
-        &["applies", "look", "reading", "terminal"],
+        &["applies", "reading", "terminal"],
+        &["look"],
         &["installed", "render", "show", "tables"],
         &["gate"],
         &["follow"],

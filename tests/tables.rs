@@ -514,7 +514,7 @@ fn invalid_requests_are_refused() {
         assert!(said.contains(says), "{said}");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
     };
-    refused(&["-o", "x.gif"], "`gif` is not a format of tables");
+    refused(&["-o", "x.gif"], "`x.gif` has no known extension");
     refused(&["-o", "x"], "has no known extension");
     refused(&["-o", "-", "--fields"], "do not fit on standard output");
     refused(&["-o", "{n}.csv"], "a file per window");
