@@ -9,7 +9,7 @@ use crate::options;
 /// Lines of `src` that are neither blank nor comment nor test.
 const MOST_LINES: usize = 72_759;
 /// Entries of the dependency sections in `Cargo.toml`, optional ones included, those of tests not.
-const MOST_DEPENDENCIES: usize = 43;
+const MOST_DEPENDENCIES: usize = 44;
 /// Options in the help of all commands; one that three commands have counts three times.
 const MOST_OPTIONS: usize = 115;
 /// Options in the help of `render`.

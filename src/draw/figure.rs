@@ -116,7 +116,8 @@ pub(crate) const MOST_HEIGHT: f64 = 225.0;
 /// Draws a figure of the nodes and topics that pass the filters.
 ///
 /// # Errors
-/// [`Error::Usage`] if nothing is left, or if it does not fit even as groups; the hint suggests a filter.
+/// [`Error::Usage`](crate::base::error::Error::Usage) if nothing is left, or if it does not fit even as groups; the hint
+/// suggests a filter.
 pub(crate) fn figure(
     mission: &Mission,
     filters: (&NameFilter, &NameFilter),

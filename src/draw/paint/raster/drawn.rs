@@ -1,8 +1,8 @@
 //! A group as it is composited onto pages: small ones as cached pixels, large ones as a tree to draw each
 //! time.
 
-use resvg::tiny_skia::{Pixmap, PixmapMut, Transform};
 use resvg::usvg::Tree;
+use tiny_skia::{Pixmap, PixmapMut, Transform};
 
 use super::Pixels;
 use crate::base::cast;

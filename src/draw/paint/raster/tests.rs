@@ -95,8 +95,8 @@ fn text_is_drawn_in_both_weights_and_as_wide_as_measured() {
 /// The columns with ink in a document drawn at four times its size: the first and the last.
 fn columns(svg: &str, options: &usvg::Options<'_>) -> (u32, u32) {
     let tree = Tree::from_str(svg, options).unwrap();
-    let mut map = resvg::tiny_skia::Pixmap::new(800, 480).unwrap();
-    let scaled = resvg::tiny_skia::Transform::from_scale(4.0, 4.0);
+    let mut map = tiny_skia::Pixmap::new(800, 480).unwrap();
+    let scaled = tiny_skia::Transform::from_scale(4.0, 4.0);
     resvg::render(&tree, scaled, &mut map.as_mut());
     let has_ink = |x: &u32| {
         (0..480).any(|y| {
@@ -145,8 +145,8 @@ fn apart(scene: &Scene, scale: f32) -> Vec<u8> {
     let painter = painter();
     let pixels = painter.paint(scene, f64::from(scale)).unwrap();
     let whole = Tree::from_str(&svg::write_measured(scene, None), &painter.options).unwrap();
-    let mut map = resvg::tiny_skia::Pixmap::new(pixels.width, pixels.height).unwrap();
-    let scaled = resvg::tiny_skia::Transform::from_scale(scale, scale);
+    let mut map = tiny_skia::Pixmap::new(pixels.width, pixels.height).unwrap();
+    let scaled = tiny_skia::Transform::from_scale(scale, scale);
     resvg::render(&whole, scaled, &mut map.as_mut());
     let channels = pixels.rgba.iter().zip(map.data());
     channels.map(|(a, b)| a.abs_diff(*b)).collect()
