@@ -14,10 +14,11 @@ fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let out = |name: &str| folder.path().join(name);
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command
-        .arg("render")
-        .arg(bag.as_ref())
-        .args(["--mode", "all"]);
+    command.arg("render").arg(bag.as_ref());
+    // Without a mode, unknown publishers would make it a timeline.
+    if !arguments.contains(&"--mode") {
+        command.args(["--mode", "nodes"]);
+    }
     let outputs = [out("mission.json"), out("{n}.svg")];
     let done = command
         .args(arguments)

@@ -235,6 +235,27 @@ fn is_svg(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|e| e == "svg")
 }
 
+/// The film at the top. `SNAPSHOTS=new` rewrites it.
+#[test]
+fn readme_film_is_drawn_by_the_command_below_it() {
+    let (_, rest) = README.split_once("](examples/warehouse.gif)").unwrap();
+    let command = rest
+        .lines()
+        .find_map(|line| line.strip_prefix("$ "))
+        .unwrap();
+    let dir = folder();
+    let output = run(command, dir.path());
+    assert!(output.status.success(), "{command}: {output:?}");
+    let film = "examples/warehouse.gif";
+    let drawn = fs::read(dir.path().join(film)).unwrap();
+    if snapshot::is_new() {
+        fs::write(root().join(film), drawn).unwrap();
+    } else if cfg!(target_arch = "x86_64") {
+        let is_same = fs::read(root().join(film)).unwrap() == drawn;
+        assert!(is_same, "draw it anew with SNAPSHOTS=new");
+    }
+}
+
 /// Only the SVG pictures: the page is a screenshot.
 #[test]
 fn readme_pictures_are_drawn_by_the_commands_below_them() {

@@ -184,8 +184,8 @@ fn a_second_signal_ends_the_writing_of_outputs() {
     let folder = TempDir::new().unwrap();
     let bag = rosbag1::unindexed(&rosbag1::write(&small(), Pack::None, 20_000));
     fs::write(folder.path().join("r.bag.active"), bag).unwrap();
-    // A pipe that is never read: the film does not fit in it, so that its writing never ends.
-    let pipe = folder.path().join("f.gif");
+    // A pipe that is never read: the page does not fit in it, so that its writing never ends.
+    let pipe = folder.path().join("f.html");
     assert!(
         Command::new("mkfifo")
             .arg(&pipe)
@@ -193,7 +193,7 @@ fn a_second_signal_ends_the_writing_of_outputs() {
             .unwrap()
             .success()
     );
-    let args = ["follow", "r.bag.active", "-p", "0.2", "-o", "f.gif"];
+    let args = ["follow", "r.bag.active", "-p", "0.2", "-o", "f.html"];
     let mut follower = bagreel(folder.path(), &args).spawn().unwrap();
     let id = follower.id().to_string();
     let interrupt = || Command::new("kill").args(["-INT", &id]).status().unwrap();

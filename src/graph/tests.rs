@@ -230,7 +230,7 @@ fn elements_are_in_the_order_of_their_names() {
     let edges: Vec<_> = all.publishes.iter().map(|e| (e.node, e.topic)).collect();
     assert!(edges.is_sorted());
     assert_eq!(all.nodes[NodeId(0)].name.as_str(), "/a");
-    assert_eq!(built.graphs[0].states[0].hz, Some(0.1));
+    assert_eq!(built.graphs[0].states[0].hz, None);
 }
 
 #[test]
