@@ -17,7 +17,7 @@ fn rendered(bag: impl AsRef<Path>, arguments: &[&str]) -> (Value, Vec<String>) {
     command.arg("render").arg(bag.as_ref());
     // Without a mode, unknown publishers would make it a timeline.
     if !arguments.contains(&"--mode") {
-        command.args(["--mode", "nodes"]);
+        command.args(["--mode", "all"]);
     }
     let outputs = [out("mission.json"), out("{n}.svg")];
     let done = command
