@@ -37,17 +37,19 @@ pub fn run(
     // Films leave windows out that files have, and are the same whatever else is written.
     let (films, others): (Vec<&Output>, Vec<&Output>) =
         outputs.iter().partition(|output| output.format.is_film());
-    let mut films = pass(sequence, &films, progress)?.into_iter();
-    let mut others = pass(sequence, &others, progress)?.into_iter();
-    let outcome = |output: &Output| {
-        let of = if output.format.is_film() {
-            &mut films
+    // No file appears before all are drawn.
+    let mut films = played(sequence, &films, progress)?.into_iter();
+    let mut others = played(sequence, &others, progress)?.into_iter();
+    let next = |output: &Output| {
+        if output.format.is_film() {
+            films.next()
         } else {
-            &mut others
-        };
-        of.next().flatten()
+            others.next()
+        }
     };
-    let outcomes: Vec<_> = outputs.iter().map(outcome).collect();
+    let jobs: Vec<OutputJob<'_>> = outputs.iter().filter_map(next).collect();
+    let outcomes = jobs.into_iter().map(OutputJob::finish);
+    let outcomes: Vec<Option<Written>> = outcomes.collect::<Result<_>>()?;
     let each = outputs.iter().zip(outcomes);
     each.map(|(output, outcome)| match outcome {
         Some(written) => Ok(written),
@@ -62,6 +64,16 @@ pub(crate) fn pass(
     outputs: &[&Output],
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Option<Written>>> {
+    let jobs = played(sequence, outputs, progress)?.into_iter();
+    jobs.map(OutputJob::finish).collect()
+}
+
+/// The outputs with everything drawn, not yet finished.
+fn played<'a>(
+    sequence: &'a Sequence<'a>,
+    outputs: &[&'a Output],
+    progress: &mut Progress<'_>,
+) -> Result<Vec<OutputJob<'a>>> {
     let start = |output| OutputJob::start(sequence, output);
     let jobs = outputs.iter().copied().map(start);
     let mut jobs: Vec<OutputJob<'_>> = jobs.collect::<Result<_>>()?;
@@ -69,7 +81,7 @@ pub(crate) fn pass(
     if needs > Some(Needs::Nothing) {
         play(sequence, &mut jobs, progress)?;
     }
-    jobs.into_iter().map(OutputJob::finish).collect()
+    Ok(jobs)
 }
 
 /// An output being written.

@@ -122,7 +122,19 @@ fn a_signal_while_writing_leaves_no_files() {
     let dir = tempfile::tempdir().unwrap();
     let warehouse = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
     let args = [
-        "render", warehouse, "-p", "1", "-o", "x.gif", "-o", "x.json", "-o", "x.html", "-o",
+        "render",
+        warehouse,
+        "-p",
+        "1",
+        "--frame-ms",
+        "50",
+        "-o",
+        "x.gif",
+        "-o",
+        "x.json",
+        "-o",
+        "x.html",
+        "-o",
         "x.csv",
     ];
     let child = stalled(dir.path(), &args);
