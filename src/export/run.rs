@@ -34,22 +34,7 @@ pub fn run(
     for output in outputs {
         check::make_folder(&output.target)?;
     }
-    // Films leave windows out that files have, and are the same whatever else is written.
-    let (films, others): (Vec<&Output>, Vec<&Output>) =
-        outputs.iter().partition(|output| output.format.is_film());
-    // No file appears before all are drawn.
-    let mut films = played(sequence, &films, progress)?.into_iter();
-    let mut others = played(sequence, &others, progress)?.into_iter();
-    let next = |output: &Output| {
-        if output.format.is_film() {
-            films.next()
-        } else {
-            others.next()
-        }
-    };
-    let jobs: Vec<OutputJob<'_>> = outputs.iter().filter_map(next).collect();
-    let outcomes = jobs.into_iter().map(OutputJob::finish);
-    let outcomes: Vec<Option<Written>> = outcomes.collect::<Result<_>>()?;
+    let outcomes = pass(sequence, outputs, progress)?;
     let each = outputs.iter().zip(outcomes);
     each.map(|(output, outcome)| match outcome {
         Some(written) => Ok(written),
@@ -58,30 +43,24 @@ pub fn run(
     .collect()
 }
 
-/// One run of the sequence through outputs that are all films or none; `None` for an output that would exceed `max_bytes`.
+/// One run of the sequence; `None` for an output that would exceed `max_bytes`. No file appears before all are drawn.
 pub(crate) fn pass(
     sequence: &Sequence<'_>,
-    outputs: &[&Output],
+    outputs: &[Output],
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Option<Written>>> {
-    let jobs = played(sequence, outputs, progress)?.into_iter();
-    jobs.map(OutputJob::finish).collect()
-}
-
-/// The outputs with everything drawn, not yet finished.
-fn played<'a>(
-    sequence: &'a Sequence<'a>,
-    outputs: &[&'a Output],
-    progress: &mut Progress<'_>,
-) -> Result<Vec<OutputJob<'a>>> {
     let start = |output| OutputJob::start(sequence, output);
-    let jobs = outputs.iter().copied().map(start);
-    let mut jobs: Vec<OutputJob<'_>> = jobs.collect::<Result<_>>()?;
-    let needs = jobs.iter().map(OutputJob::needs).max();
-    if needs > Some(Needs::Nothing) {
-        play(sequence, &mut jobs, progress)?;
+    let mut jobs: Vec<OutputJob<'_>> = outputs.iter().map(start).collect::<Result<_>>()?;
+    // Films leave windows out that files have, and are the same whatever else is written.
+    for is_film in [true, false] {
+        let some = jobs.iter_mut();
+        let some = some.filter(|job| job.output.format.is_film() == is_film);
+        let mut some: Vec<&mut OutputJob<'_>> = some.collect();
+        if some.iter().any(|job| job.needs() > Needs::Nothing) {
+            play(sequence, &mut some, is_film, progress)?;
+        }
     }
-    Ok(jobs)
+    jobs.into_iter().map(OutputJob::finish).collect()
 }
 
 /// An output being written.
@@ -195,15 +174,15 @@ pub(crate) fn cores() -> usize {
 /// A packet with the index of its window and the time of its frame.
 struct Waiting(usize, FrameTime, Packet);
 
-/// Draws all frames and passes them on in order while the next ones are drawn.
+/// Draws all frames, of films or of files, and passes them on in order while the next ones are drawn.
 fn play(
     sequence: &Sequence<'_>,
-    jobs: &mut [OutputJob<'_>],
+    jobs: &mut [&mut OutputJob<'_>],
+    is_film: bool,
     progress: &mut Progress<'_>,
 ) -> Result<()> {
-    let is_film = jobs.iter().all(|job| job.output.format.is_film());
     let frame_times = sequence.frame_times(is_film);
-    let wants: Vec<FrameWant> = jobs.iter().map(OutputJob::want).collect();
+    let wants: Vec<FrameWant> = jobs.iter().map(|job| job.want()).collect();
     let pool = RasterPool::new(sequence, &frame_times, &wants)?;
     let mut done = 0;
     pool.run(|row| {
@@ -212,7 +191,7 @@ fn play(
         let queues = by_output(sequence, row, jobs.len());
         let each = jobs.par_iter_mut().zip(queues);
         each.for_each(|(job, packets)| job.take(size, pool.palette(), packets));
-        jobs.iter_mut().try_for_each(OutputJob::failure)?;
+        jobs.iter_mut().try_for_each(|job| job.failure())?;
         if progress(done, frame_times.len()).is_break() {
             return Err(Error::Interrupted);
         }

@@ -30,9 +30,8 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
         .with_validate_summary_section_crc(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    Zstd::new()
-        .and_then(|zstd| reader.add_decompressor(zstd))
-        .map_err(|e| e.to_string())?;
+    let zstd = ZstdPieces::new().map_err(|e| e.to_string())?;
+    reader.add_decompressor(zstd).map_err(|e| e.to_string())?;
     let mut found = SecondFinds::new(sink);
     let result = records_of(&mut reader, &mut from, &mut found);
     found.flush();
@@ -112,27 +111,19 @@ fn record(kind: u8, data: &[u8], found: &mut SecondFinds<'_, Mcap>) -> Result<()
     Ok(())
 }
 
-/// Zstandard for the crate, whose own decompressor would compile everything that the C library offers.
-struct Zstd(ZstdPieces);
-
-impl Zstd {
-    fn new() -> McapResult<Self> {
-        ZstdPieces::new().map(Self).map_err(|e| failed(&e))
-    }
-}
-
-impl Decompressor for Zstd {
+/// The crate's own decompressor would compile everything that the C library offers.
+impl Decompressor for ZstdPieces {
     fn next_read_size(&self) -> usize {
         0
     }
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
-        let (consumed, wrote) = self.0.run(src, dst).map_err(|e| failed(&e))?;
+        let (consumed, wrote) = self.run(src, dst).map_err(|e| failed(&e))?;
         Ok(DecompressResult { consumed, wrote })
     }
 
     fn reset(&mut self) -> McapResult<()> {
-        self.0.begin().map_err(|e| failed(&e))
+        self.begin().map_err(|e| failed(&e))
     }
 
     fn name(&self) -> &'static str {

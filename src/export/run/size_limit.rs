@@ -25,7 +25,7 @@ pub(crate) fn fit(
     for options in steps(&sequence.options) {
         let mut smaller = sequence.clone();
         smaller.options = options;
-        let outcome = pass(&smaller, &[output], progress)?;
+        let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
         if let Some(Some(mut written)) = outcome.into_iter().next() {
             written
                 .remarks

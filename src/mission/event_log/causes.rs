@@ -12,8 +12,9 @@ use crate::graph::{Element, NodeId, TopicId, Wiring};
 /// Makes events with a known cause parts of it.
 pub(super) fn add(context: &LogInput<'_>, drafts: &mut Drafts) {
     hand_overs(context, drafts);
-    subscribers(context, drafts);
-    follow_inputs(context, drafts);
+    let wiring = wiring(context);
+    subscribers(context, &wiring, drafts);
+    follow_inputs(context, &wiring, drafts);
     flaps(context, drafts);
     crowds(context, drafts);
     drafts.flatten();
@@ -98,9 +99,8 @@ fn hand_overs(context: &LogInput<'_>, drafts: &mut Drafts) {
 }
 
 /// Subscriptions that appear or vanish with the topic's publisher are consequences.
-fn subscribers(context: &LogInput<'_>, drafts: &mut Drafts) {
+fn subscribers(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
     let turns = by(drafts, drafts.list.ids(), turn);
-    let wiring = wiring(context);
     for id in headlines(drafts, &[Kind::Appeared, Kind::Vanished]) {
         let event = drafts.get(id);
         let (Element::Subscribe(_), (_, Some(topic))) =
@@ -141,8 +141,7 @@ fn senders(context: &LogInput<'_>, wiring: &Wiring, what: Element) -> Vec<NodeId
 }
 
 /// A silence that begins within an input's pause is a part of it, and so is a rate change that an input has too.
-fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
-    let wiring = wiring(context);
+fn follow_inputs(context: &LogInput<'_>, wiring: &Wiring, drafts: &mut Drafts) {
     let mut pauses: BTreeMap<Element, Vec<EventId>> = BTreeMap::new();
     let mut steps: BTreeMap<TopicId, Vec<EventId>> = BTreeMap::new();
     for (id, event) in drafts.list.with_ids() {
@@ -156,7 +155,7 @@ fn follow_inputs(context: &LogInput<'_>, drafts: &mut Drafts) {
     }
     for id in headlines(drafts, &[Kind::Silent, Kind::Rate]) {
         let event = drafts.get(id);
-        let own = senders(context, &wiring, event.what);
+        let own = senders(context, wiring, event.what);
         let inputs = own.iter().map(|node| &wiring.subscribed[*node]);
         let cause = inputs.flatten().find_map(|input| {
             if event.kind == Kind::Rate {
