@@ -32,6 +32,7 @@ mod select;
 mod shown;
 mod stable;
 mod state;
+mod still;
 mod turn;
 pub(crate) mod union;
 pub(crate) mod words;
@@ -56,6 +57,7 @@ pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown};
+pub use still::Presence;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
@@ -66,7 +68,9 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
         compares: mission.log.compares,
         ..assembled(viewed, options, frames)
     };
-    if options.is_picture {
+    if view.frames.len() == 1 && !view.compares {
+        still::settle(&mut view, mission);
+    } else if options.is_picture {
         crowds::gather(&mut view, mission);
     }
     (view, notices)
@@ -121,6 +125,7 @@ fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frame
         frames: list,
         items_shown: drawn.items_shown,
         arrows_shown: drawn.arrows_shown,
+        presences: ById::default(),
         compares: false,
     }
 }
@@ -362,6 +367,8 @@ pub struct View {
     pub items_shown: ById<ItemId, Looks>,
     /// The looks of each arrow, window by window.
     pub arrows_shown: ById<ArrowId, Looks>,
+    /// The times at which each item of a still was there; none for a film, and where nothing comes or goes.
+    pub presences: ById<ItemId, Presence>,
     /// Whether two missions are compared, A and B, so that times, windows and the timeline are meaningless;
     /// the first of the two windows is A alone.
     pub compares: bool,

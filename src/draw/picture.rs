@@ -16,6 +16,7 @@ pub(crate) use legend::{LegendSign, signs};
 mod measured;
 pub(crate) mod options;
 pub(crate) mod page;
+mod presence;
 mod replicas;
 mod room;
 mod spaces;
@@ -375,7 +376,11 @@ impl<'a> Picture<'a> {
         // Lines do not cross words.
         groups.extend(glows.chain(lines).chain(titles).chain(labels));
         for (item, card, shown) in items {
-            groups.push(boxes.item(item, card, shown));
+            let mut drawn = boxes.item(item, card, shown);
+            if let Some(presence) = view.presences.get(shown.item()) {
+                boxes.presence(&mut drawn, presence, card, item.kind);
+            }
+            groups.push(drawn);
             groups.extend(boxes.card_rows(card, view, k));
         }
         groups.extend(numbers);

@@ -5,7 +5,7 @@ use super::measured::{LINE, Label, ShownRates, rate_label, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::spaces::Space;
-use super::{badge, texts};
+use super::{badge, presence, texts};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Stroke, Text, polygon};
 use crate::draw::style::{Body, Color, Style};
@@ -330,7 +330,10 @@ impl Boxes<'_> {
     ) {
         let scale = self.fit.scale;
         let middle = place.centre();
-        let small = if label.second { body.small * LINE } else { 0.0 };
+        let mut small = if label.second { body.small * LINE } else { 0.0 };
+        if label.has_bar {
+            small += presence::room(body.size);
+        }
         // A line that is missing in this window keeps its space, so that the name does not move.
         let top = middle.y - (body.size * LINE + small) * scale / 2.0;
         let line = |y: f64, size: f64, weight, color, text: &str| Text {

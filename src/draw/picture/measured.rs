@@ -4,7 +4,7 @@ use super::also::{self, Footer};
 use super::card::{self, Card};
 use super::gates::{self, Gate, larger};
 use super::spaces::{Space, first_seen, spaces};
-use super::{options, replicas, texts, topics};
+use super::{options, presence, replicas, texts, topics};
 use std::collections::BTreeSet;
 
 use crate::base::geometry::Size;
@@ -14,7 +14,7 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::{ById, Id as _, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::looks::both;
-use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemKind, Looks, Shown, View};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Shown, View};
 
 /// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
@@ -36,6 +36,8 @@ pub(crate) struct Label {
     pub(crate) name: String,
     /// Whether a smaller line is drawn below it in some window.
     pub(crate) second: bool,
+    /// Whether a bar of the times at which it was there is drawn below it.
+    pub(crate) has_bar: bool,
     /// The original name, if the font lacks some of its characters.
     pub(crate) unshown: Option<String>,
 }
@@ -87,7 +89,9 @@ impl MeasuredGraph {
                 .cluster
                 .and_then(|c| spaces.get(c))
                 .map_or("", |space| space.name.as_str());
-            let label = drafter.label(item, inside, seconds[at].is_some());
+            let mut label = drafter.label(item, inside, seconds[at].is_some());
+            let presence = view.presences.get(ItemId::of(at));
+            label.has_bar = presence.is_some_and(|presence| !presence.times.is_empty());
             let has_rows = cards[at].room.h > 0.0;
             let mut size = drafter.size(item, &label, seconds[at].unwrap_or(0.0), has_rows);
             if has_rows {
@@ -216,6 +220,7 @@ impl Measurer<'_> {
         Label {
             name: (self.fonts.fit(&name, body.size, body.weight(), WIDEST)).into_owned(),
             second,
+            has_bar: false,
             unshown,
         }
     }
@@ -227,7 +232,8 @@ impl Measurer<'_> {
         let width = self.fonts.width(&label.name, body.size, body.weight());
         let width = width.max(second);
         let small = if label.second { body.small * LINE } else { 0.0 };
-        let height = body.size * LINE + small;
+        let bar = if label.has_bar { presence::room(body.size) } else { 0.0 };
+        let height = body.size * LINE + small + bar;
         let depth = match item.kind {
             ItemKind::Node if has_rows => 0.0,
             ItemKind::Node if body.is_capsule() => {
