@@ -7,4 +7,5 @@ pub mod scene;
 pub mod strip;
 pub mod style;
 pub mod text;
+pub(crate) mod timeline;
 pub(crate) mod topic_timeline;

@@ -53,7 +53,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["crowds", "filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "route", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip", "topic_timeline"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["timeline"], &["picture"], &["figure", "paint", "strip", "topic_timeline"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],

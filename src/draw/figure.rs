@@ -3,27 +3,15 @@
 //! A figure that does not fit with nodes is tried with groups; if that fails, the error suggests a filter.
 //! Text is never scaled.
 
-pub(crate) mod band;
-pub(crate) mod canvas;
-pub(crate) mod course;
 mod groups;
 mod labels;
-mod legend;
-pub(crate) mod live;
-pub(crate) mod lives;
 mod map;
-pub(crate) mod marks;
-pub(crate) mod notes;
 mod page;
 mod panel;
 mod place;
-pub(crate) mod rows;
-mod signs;
-pub(crate) mod source;
 mod steps;
 mod talks;
 mod tex;
-pub(crate) mod tracks;
 
 use crate::base::error::Result;
 use crate::base::words::worded;
@@ -32,9 +20,8 @@ use crate::draw::text::Fonts;
 use crate::mission::Mission;
 use crate::view::NameFilter;
 
-use canvas::Sizes;
-pub(crate) use course::Course;
-use source::FigureSource;
+use crate::draw::timeline::canvas::Sizes;
+use crate::draw::timeline::source::FigureSource;
 pub(crate) use tex::file as latex;
 
 worded! {

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 pub use crate::draw::figure::FigureOptions;
-use crate::draw::figure::course::LifeLines;
 pub use crate::draw::strip::Choice;
+use crate::draw::timeline::course::LifeLines;
 
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]

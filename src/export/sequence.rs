@@ -2,7 +2,7 @@
 
 pub use super::options::SequenceOptions;
 
-pub use crate::draw::figure::course::LifeLines;
+pub use crate::draw::timeline::course::LifeLines;
 pub use crate::draw::topic_timeline::Overview;
 
 use crate::base::notice::Notices;

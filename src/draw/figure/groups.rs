@@ -5,10 +5,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::source::FigureSource;
-use super::tracks::{SendingBar, Track, TrackLife};
 use crate::base::name::{last_part, namespace};
 use crate::base::time::Span;
+use crate::draw::timeline::source::FigureSource;
+use crate::draw::timeline::tracks::{SendingBar, Track, TrackLife};
 use crate::mission::phases::configurations;
 
 /// Some nodes that are drawn as one.

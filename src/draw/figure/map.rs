@@ -4,21 +4,21 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::band::{self, Axis};
-use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::groups::{NodeGroup, depths, groups, phases_of};
-use super::marks::Marks;
-use super::notes::{flow, sentence};
 use super::page::{FITTING, FigureSheet, MOST_NAMED, filter_that_fits, nothing};
 use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
-use super::tracks::{Track, of_nodes};
 use super::{MOST_HEIGHT, RowKind};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
+use crate::draw::timeline::band::{self, Axis};
+use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
+use crate::draw::timeline::marks::Marks;
+use crate::draw::timeline::notes::{flow, sentence};
+use crate::draw::timeline::tracks::{Track, of_nodes};
 use crate::layout::{Cluster, Outline, Plan, Vertex};
 
 /// The height of a map of nodes, in millimetres, above which groups are drawn instead, if they fit.
@@ -74,7 +74,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let nodes = (asked != Some(RowKind::Groups) && few)
         .then(|| page(sheet, &tracks, None))
         .flatten();
-    let is_low = |s: &Scene, most: f64| s.size.h <= most * super::canvas::PX_PER_MM;
+    let is_low = |s: &Scene, most: f64| s.size.h <= most * crate::draw::timeline::canvas::PX_PER_MM;
     if let Some(scene) = nodes
         .as_ref()
         .filter(|s| asked.is_some() && is_low(s, MOST_HEIGHT) || is_low(s, HIGH))

@@ -1,15 +1,7 @@
 //! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
-use super::band::{Axis, clock, names};
-use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
 use super::groups::depths;
-use super::lives::{LivesFigure, RowPlace, WIDE};
-use super::notes::{TextRun, Unbroken, flow, sentence};
-use super::rows::FigureRow;
-use super::signs::sign;
-use super::source::FigureSource;
-use super::tracks::Track;
-use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind, legend};
+use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -17,6 +9,15 @@ use crate::base::name::last_part;
 use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
+use crate::draw::timeline::band::{Axis, clock, names};
+use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
+use crate::draw::timeline::legend;
+use crate::draw::timeline::lives::{LivesFigure, RowPlace, WIDE};
+use crate::draw::timeline::notes::{TextRun, Unbroken, flow, sentence};
+use crate::draw::timeline::rows::FigureRow;
+use crate::draw::timeline::signs::sign;
+use crate::draw::timeline::source::FigureSource;
+use crate::draw::timeline::tracks::Track;
 
 /// The shortest legible time axis, in millimetres.
 const SHORTEST_AXIS: f64 = 15.0;
@@ -218,7 +219,7 @@ fn lives_place(lives: &LivesFigure<'_>, canvas: &PaperCanvas<'_>, width: f64) ->
 /// The letters explained, in order of time.
 fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     let start = lives.source.span().start;
-    let item = |(k, letter): (usize, &super::marks::Letter)| {
+    let item = |(k, letter): (usize, &crate::draw::timeline::marks::Letter)| {
         let at = clock(letter.mark.at.since(start));
         vec![
             TextRun::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),

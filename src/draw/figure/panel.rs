@@ -1,12 +1,12 @@
 //! One step as a panel: its boxes by their states, its arrows, its words.
 
-use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::notes::{Unbroken, flow_at, sentence};
 use super::place::PlacedPanel;
 use super::talks::Talk;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
+use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
+use crate::draw::timeline::notes::{Unbroken, flow_at, sentence};
 use crate::mission::EventId;
 
 /// The space inside a panel's border in millimetres.

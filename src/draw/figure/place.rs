@@ -1,11 +1,11 @@
 //! The positions of boxes and arrows within a width: our own layout tried at several densities, labels placed
 //! afterwards.
 
-use super::canvas::{PaperCanvas, Type, ink};
 use super::labels::{self, Room, Spot};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
+use crate::draw::timeline::canvas::{PaperCanvas, Type, ink};
 use crate::layout::{
     Cluster, Component, Engine, Layout, LayoutOptions, Orientation, Plan, Route, engine, lay_out,
     parts, shelves,

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::canvas::HAIRLINE;
-use super::source::FigureSource;
-use super::tracks::{Steps, Track, mean};
 use crate::base::name::last_part;
 use crate::base::time::Span;
 use crate::base::words;
+use crate::draw::timeline::canvas::HAIRLINE;
+use crate::draw::timeline::source::FigureSource;
+use crate::draw::timeline::tracks::{Steps, Track, mean};
 use crate::evidence::Confidence;
 use crate::graph::{ById, Element, TopicId};
 use crate::layout::Link;

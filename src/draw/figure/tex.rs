@@ -1,9 +1,9 @@
 //! A figure for `LaTeX`: the code that includes it, and a caption that describes it.
 
-use super::band::{clock, title};
-use super::source::FigureSource;
 use super::{Figure, FigureKind, FigureOptions};
 use crate::base::words;
+use crate::draw::timeline::band::{clock, title};
+use crate::draw::timeline::source::FigureSource;
 
 /// The caption: the content, the phases with their times, bag and length, the legend in words.
 pub(crate) fn caption(

@@ -2,12 +2,12 @@
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time::{Span, Stamp};
-use crate::draw::figure::canvas::event_data;
-use crate::draw::figure::course::{Course, CourseMark, CoursePhase, CourseRow};
-use crate::draw::figure::marks::Sign;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
+use crate::draw::timeline::canvas::event_data;
+use crate::draw::timeline::course::{Course, CourseMark, CoursePhase, CourseRow};
+use crate::draw::timeline::marks::Sign;
 use crate::mission::EventId;
 
 /// The smallest text on a screen, in pixels.

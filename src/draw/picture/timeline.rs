@@ -9,10 +9,10 @@ use crate::base::cast;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp, round_length};
 use crate::base::words;
-use crate::draw::figure::Course;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
+use crate::draw::timeline::course::Course;
 use crate::view::{Frame, View};
 
 /// A bar represents one window, or several if there is not enough space.

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use crate::draw::figure::course::LifeLines;
-use crate::draw::figure::marks::Sign;
 use crate::draw::paint::classes::badge_shapes;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{LegendSign, signs};
 use crate::draw::style::Style;
+use crate::draw::timeline::course::LifeLines;
+use crate::draw::timeline::marks::Sign;
 use crate::graph::State;
 use crate::view::runs::word;
 use crate::view::{Mark, View};

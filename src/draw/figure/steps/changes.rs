@@ -6,14 +6,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::StepSource;
 use crate::base::error::{Error, Result};
 use crate::draw::figure::MOST_HEIGHT;
-use crate::draw::figure::canvas::PX_PER_MM;
 use crate::draw::figure::groups::groups;
-use crate::draw::figure::marks::Sign;
 use crate::draw::figure::page::FigureSheet;
 use crate::draw::figure::panel::{BoxState, Panel, PanelBox};
 use crate::draw::figure::place::PlacedPanel;
 use crate::draw::figure::talks::Talk;
 use crate::draw::scene::Scene;
+use crate::draw::timeline::canvas::PX_PER_MM;
+use crate::draw::timeline::marks::Sign;
 
 /// The figure and its remarks: with as many panels side by side as fit, of nodes, else of nodes that start
 /// and stop together; if that is too high and the user chose no steps, without the first phase, then without

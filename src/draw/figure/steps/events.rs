@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::StepSource;
 use crate::base::time::Span;
-use crate::draw::figure::marks::Sign;
+use crate::draw::timeline::marks::Sign;
 use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::EventId;
 use crate::mission::event_log::Detail;

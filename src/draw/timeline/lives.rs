@@ -1,6 +1,6 @@
 //! Lifelines: a row per node (or topic), time to the right; when it exists, its rate, and its changes.
 //!
-//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page
+//! One drawing at three sizes: a figure on paper ([`crate::draw::figure`]), and, for a caller that has a page
 //! already, only the rows. `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives
 //! the height of the rows, and `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A
 //! canvas in pixels (a timeline below frames, the topic timeline) is `Canvas::new(fonts, sizes, scale)` with
