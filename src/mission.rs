@@ -5,6 +5,7 @@ pub mod events;
 pub mod info;
 pub mod phases;
 
+mod joined;
 mod json;
 pub use json::read::read_json;
 pub(crate) use json::write::Json;

@@ -23,6 +23,7 @@ mod lives;
 pub(crate) mod looks;
 mod marks;
 mod names;
+pub(crate) mod news;
 mod nothing;
 mod options;
 mod replicas;
@@ -57,7 +58,7 @@ pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown};
-pub use still::Presence;
+pub(crate) use still::Presence;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
@@ -68,8 +69,8 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
         compares: mission.log.compares,
         ..assembled(viewed, options, frames)
     };
-    if view.frames.len() == 1 && !view.compares {
-        still::settle(&mut view, mission);
+    if options.is_still || view.frames.len() == 1 && !view.compares {
+        view = still::still(view, mission);
     } else if options.is_picture {
         crowds::gather(&mut view, mission);
     }

@@ -8,7 +8,7 @@ use super::args::render::{LookArgs, ModeWord, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
-use crate::draw::figure::{FigureKind, RowKind};
+use crate::draw::figure::FigureKind;
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
@@ -113,17 +113,16 @@ pub(super) fn summary() -> Option<PathBuf> {
 pub(super) fn figure(args: &FigureArgs) -> Result<FigureOptions> {
     let (form, kind) = (&args.form, args.kind);
     let steps = form.steps.iter().map(|s| usize::from(*s)).collect();
-    let has_steps = matches!(kind, FigureKind::Steps | FigureKind::Changes);
-    if !has_steps && !form.steps.is_empty() {
+    if kind != FigureKind::Steps && !form.steps.is_empty() {
         return Err(Error::usage(
             format!("`--steps` has no effect on `{}`", kind.word()),
-            "it chooses the panels of `--kind steps` and `changes`",
+            "it chooses the panels of `--kind steps`",
         ));
     }
-    if kind != FigureKind::Lives && form.rows == Some(RowKind::Topics) {
+    if kind != FigureKind::Lives && form.rows.is_some() {
         return Err(Error::usage(
-            format!("`{}` has no rows of topics", kind.word()),
-            "`--rows nodes` or `--rows groups`; topics are arrows",
+            format!("`--rows` has no effect on `{}`", kind.word()),
+            "it chooses the rows of `--kind lives`",
         ));
     }
     let default = FigureOptions::default();

@@ -156,7 +156,7 @@ fn job(args: &RenderArgs, given: &Given) -> Result<Render, Error> {
         fonts: look::fonts(look.font.as_deref())?,
         page: look::page(look, args.rate.rate_change),
         is_sized: look.size.is_some(),
-        purpose: None,
+        medium: None,
         is_fitted: look.fit,
         engine: crate::layout::engine(&look.layout)?,
         kept: look::kept(look.layout_from.as_deref())?,

@@ -1,26 +1,17 @@
-//! Figures for papers, exact in width and never with text below 6 pt: lifelines, map and steps.
+//! Figures for papers, exact in width and never with text below 6 pt: lifelines, graph and steps.
 //!
 //! A figure that does not fit with nodes is tried with groups; if that fails, the error suggests a filter.
 //! Text is never scaled.
 
+pub(crate) mod graph;
 mod groups;
-mod labels;
-mod map;
-mod page;
-mod panel;
-mod place;
-mod steps;
-mod talks;
+pub(crate) mod page;
+pub(crate) mod steps;
 mod tex;
 
-use crate::base::error::Result;
 use crate::base::words::worded;
 use crate::draw::scene::Scene;
-use crate::draw::text::Fonts;
-use crate::mission::Mission;
-use crate::view::NameFilter;
 
-use crate::draw::timeline::canvas::Sizes;
 use crate::draw::timeline::source::FigureSource;
 pub(crate) use tex::file as latex;
 
@@ -31,12 +22,10 @@ worded! {
         /// Lifelines: when each row existed, how busy it was, and its changes.
         #[default]
         Lives = "lives",
-        /// The graph of nodes over the whole mission, with the phases in which each exists.
-        Map = "map",
-        /// A panel per change of phase, with only the differences.
+        /// The graph of the whole mission, with the times of each node.
+        Graph = "graph",
+        /// A panel per change of phase, with only what changes and its direct partners.
         Steps = "steps",
-        /// A map per phase, with fixed positions and the changes of the phase in colour.
-        Changes = "changes",
     }
 }
 
@@ -100,29 +89,16 @@ pub(crate) struct Figure {
 /// The largest height of a figure in millimetres: the text block of a page.
 pub(crate) const MOST_HEIGHT: f64 = 225.0;
 
-/// Draws a figure of the nodes and topics that pass the filters.
-///
-/// # Errors
-/// [`Error::Usage`](crate::base::error::Error::Usage) if nothing is left, or if it does not fit even as groups; the hint
-/// suggests a filter.
-pub(crate) fn figure(
-    mission: &Mission,
-    filters: (&NameFilter, &NameFilter),
-    fonts: &Fonts,
+/// The figure with this drawing.
+pub(crate) fn finished(
+    source: &FigureSource<'_>,
     options: &FigureOptions,
-) -> Result<Figure> {
-    let source = FigureSource::new(mission, filters.0, filters.1, options.is_named);
-    let sizes = Sizes::of_names(options.text_pt);
-    let sheet = page::FigureSheet {
-        source: &source,
-        fonts,
-        sizes,
-        options,
-    };
-    let (scene, remarks) = sheet.draw()?;
-    Ok(Figure {
-        caption: tex::caption(&source, options, &remarks),
+    scene: Scene,
+    remarks: Vec<String>,
+) -> Figure {
+    Figure {
+        caption: tex::caption(source, options, &remarks),
         scene,
         remarks,
-    })
+    }
 }

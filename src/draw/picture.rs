@@ -62,6 +62,8 @@ pub struct PageOptions {
     pub phases: Vec<String>,
     /// The scale of title, legend and timeline; by the size of the page if `None`.
     pub unit: Option<f64>,
+    /// The largest scale of the graph, so that its text has an exact size on paper; by `unit` if `None`.
+    pub largest: Option<f64>,
     /// Whether there is a legend of the signs.
     pub has_legend: bool,
     /// The phases and rows of the strip at the bottom; without rows it shows messages per second.
@@ -80,6 +82,7 @@ impl Default for PageOptions {
             orientation: None,
             phases: Vec::new(),
             unit: None,
+            largest: None,
             has_legend: true,
             course: Course::default(),
             rate_change: 0.25,

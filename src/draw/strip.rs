@@ -361,7 +361,7 @@ fn piece_bounds(piece: &Piece) -> Option<Rect> {
 }
 
 /// A group `by` times as large, its page's corner at `to`.
-fn moved(group: &Group, by: f64, to: Point) -> Group {
+pub(crate) fn moved(group: &Group, by: f64, to: Point) -> Group {
     let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
     let rect = |r: &Rect| r.scaled(by).moved(to);
     let form = |form: &Form| match form {

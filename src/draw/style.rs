@@ -177,6 +177,27 @@ impl Style {
         Ok(style)
     }
 
+    /// The style for paper, where space is scarce: names of [`PRINTED_NAMES`] pixels before they are scaled to their size
+    /// in print, and all other text of this share of it.
+    pub(crate) fn printed(mut self, others: f64) -> Self {
+        let by = PRINTED_NAMES / self.node.size;
+        let (names, others) = (PRINTED_NAMES, PRINTED_NAMES * others);
+        for body in [&mut self.node, &mut self.topic] {
+            body.pad_x *= by * PRINTED_PAD;
+            body.pad_y *= by * PRINTED_PAD;
+            (body.radius, body.width) = (body.radius * by, body.width * by);
+            (body.size, body.small) = (names, others);
+        }
+        (self.topic.size, self.edge.size, self.cluster.size) = (others, others, others);
+        self.edge.halo_width *= by;
+        self.page.margin = PRINTED_MARGIN;
+        self.stack.depth *= by;
+        // Signs beside letters of 7 pt, not of 10.
+        self.badge.radius *= PRINTED_BADGE;
+        self.badge.glow *= PRINTED_BADGE;
+        self
+    }
+
     /// Every colour of the style, once, sorted.
     pub fn palette(&self) -> &[Color] {
         &self.palette
@@ -187,6 +208,16 @@ impl Style {
         self.page.background
     }
 }
+
+/// The size of names on paper in pixels, before scaling. The distances between boxes and lines are pixels, too, so that
+/// larger letters make a closer drawing: with 22, lines touch the words of others.
+pub(crate) const PRINTED_NAMES: f64 = 18.0;
+/// The share of the space around names that remains on paper, where letters are sharper than on a screen.
+const PRINTED_PAD: f64 = 0.75;
+/// The space around a graph on paper: enough for a badge and a glow.
+const PRINTED_MARGIN: f64 = 6.5;
+/// The share of the size of badges and glows that remains on paper.
+const PRINTED_BADGE: f64 = 0.6;
 
 const HINT: &str = "print a complete style with every key explained: `bagreel styles light`";
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Purpose;
+use super::purpose::{Medium, Purpose};
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::draw::picture::PageOptions;
@@ -53,7 +53,7 @@ pub struct Drawing {
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
     /// The medium, if it determines the page: see [`Drawing::seen`].
-    pub(crate) purpose: Option<Purpose>,
+    pub(crate) medium: Option<Medium>,
     /// Whether to enlarge the page and collapse namespaces until the text is legible.
     pub is_fitted: bool,
     /// The layout engine.
@@ -75,7 +75,7 @@ impl Drawing {
             fonts: Fonts::bundled(),
             page: PageOptions::default(),
             is_sized: false,
-            purpose: None,
+            medium: None,
             is_fitted: true,
             engine: crate::layout::ENGINES[0].1,
             kept: None,
@@ -87,17 +87,25 @@ impl Drawing {
     /// The same drawing for this medium, which overrides page, text size and decorations.
     #[must_use]
     pub fn seen(self, purpose: Purpose) -> Self {
+        self.on(purpose.into())
+    }
+
+    /// The same drawing on the pages of a medium.
+    pub(crate) fn on(self, medium: Medium) -> Self {
         Self {
-            page: purpose.page(self.page),
+            page: medium.page(self.page),
+            style: medium.styled(self.style),
             is_sized: true,
-            purpose: Some(purpose),
+            medium: Some(medium),
             ..self
         }
     }
 
     /// The smallest legible text, in pixels.
     pub(super) fn readable(&self) -> f64 {
-        self.purpose.map_or(READABLE, Purpose::readable)
+        self.medium
+            .as_ref()
+            .map_or(READABLE, |medium| medium.readable)
     }
 }
 

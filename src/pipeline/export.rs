@@ -197,7 +197,7 @@ fn drawing_of(job: &Render, mission: &Mission) -> Drawing {
 /// Draws and writes a mission if all outputs show the same drawing.
 fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = drawing_of(job, &mission);
-    let figure = drawn_figure(job, &mission)?;
+    let figure = drawn_figure(job, &mission, watch)?;
     // Data and figures need no positions.
     let is_graph = |o: &Output| {
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
@@ -439,7 +439,11 @@ fn show_timeline(
 }
 
 /// The requested figure with its LaTeX code, if any.
-fn drawn_figure(job: &Render, mission: &Mission) -> Result<Option<(Figure, String)>> {
+fn drawn_figure(
+    job: &Render,
+    mission: &Mission,
+    watch: &mut dyn Watch,
+) -> Result<Option<(Figure, String)>> {
     let Some(options) = &job.sequence.figure else {
         return Ok(None);
     };
@@ -447,7 +451,7 @@ fn drawn_figure(job: &Render, mission: &Mission) -> Result<Option<(Figure, Strin
         is_named: job.reading.phases.is_named(),
         ..options.clone()
     };
-    super::figure::draw(mission, &job.drawing, &options, &job.outputs).map(Some)
+    super::figure::draw(mission, &job.drawing, &options, &job.outputs, watch).map(Some)
 }
 
 /// The film strip, if requested or needed by an output.

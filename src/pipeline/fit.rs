@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::draw::{Composed, Drawing, known};
-use super::{Purpose, Stage, Watch};
+use super::{Stage, Watch};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::draw::picture::{self, Measured, PageOptions};
@@ -52,8 +52,12 @@ struct Fitting<'a> {
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
     // The choice of elements does not depend on the style.
+    let style = Style::builtin(PLAIN).unwrap_or_else(|_| drawing.style.clone());
     let plain = Drawing {
-        style: Style::builtin(PLAIN).unwrap_or_else(|_| drawing.style.clone()),
+        style: match &drawing.medium {
+            Some(medium) => medium.styled(style),
+            None => style,
+        },
         ..drawing.clone()
     };
     let is_styled = plain.style != drawing.style;
@@ -82,6 +86,9 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     let mut composed = fitting.composed();
     if !drawing.is_sized && drawing.is_fitted && drawing.page.width_mm.is_none() {
         composed.page = crop::cropped(&composed, drawing);
+    }
+    if drawing.medium.as_ref().is_some_and(|m| m.paper.is_some()) {
+        composed.page = crop::lowered(&composed, drawing);
     }
     let notices = &mut composed.notices;
     notices.extend(picture::unshown(&composed.view, &drawing.fonts));
@@ -137,7 +144,7 @@ impl Fitting<'_> {
 
     /// Takes the lowest page of a purpose on which everything is legible, else the one with the largest text.
     fn take_higher_page(&mut self) {
-        let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
+        let sizes = self.sizes();
         for size in sizes.into_iter().skip(1) {
             if self.is_readable() {
                 return;
@@ -152,7 +159,7 @@ impl Fitting<'_> {
 
     /// Takes the lowest page of a purpose on which the remaining text is legible.
     fn take_lower_page(&mut self) {
-        let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
+        let sizes = self.sizes();
         let height = self.page.size.h;
         for size in sizes.into_iter().take_while(|size| size.h < height) {
             let page = self.page_of(size);
@@ -162,6 +169,12 @@ impl Fitting<'_> {
                 return;
             }
         }
+    }
+
+    /// The pages of the medium, the lowest first.
+    fn sizes(&self) -> Vec<Size> {
+        let medium = self.drawing.medium.as_ref();
+        medium.map_or_else(Vec::new, |medium| medium.sizes.clone())
     }
 
     fn page_of(&self, size: Size) -> PageOptions {
@@ -312,7 +325,7 @@ impl Fitting<'_> {
         }
         let (drawing, text) = (self.drawing, self.best.text);
         let mut notices = self.best.notices;
-        if drawing.is_fitted || drawing.purpose.is_some() {
+        if drawing.is_fitted || drawing.medium.is_some() {
             let collapsed = &self.options.collapse[drawing.view.collapse.len()..];
             let kept = &self.options.expand[drawing.view.expand.len()..];
             notices.extend(reported(drawing, &parts(collapsed, kept), &self.page, text).iter());

@@ -85,11 +85,6 @@ impl Looks {
         &self.distinct
     }
 
-    /// Every look, to be changed.
-    pub(super) fn each_mut(&mut self) -> impl Iterator<Item = &mut Shown> {
-        self.distinct.iter_mut()
-    }
-
     /// Its looks with the window from which each applies, in order; `None` if it is absent, as before the
     /// first of these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {

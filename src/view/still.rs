@@ -4,7 +4,11 @@
 //! In a film, a node that ended in a window is drawn as ended. In a still of a mission of an hour, that would make
 //! a planner that ran for 59 minutes grey.
 
-use super::{Frame, Item, ItemId, Looks, Mark, Phrase, Shown, View};
+use std::collections::BTreeSet;
+
+use super::stable::Lengths;
+use super::union::whole;
+use super::{Counts, Frame, Item, ItemId, Looks, Mark, Phrase, View};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::{ById, Element};
@@ -20,47 +24,48 @@ pub struct Presence {
     pub marks: Vec<(f64, Mark)>,
 }
 
-/// Makes a still of a view of one window.
-pub(super) fn settle(view: &mut View, mission: &Mission) {
+/// All windows of a view as one.
+pub(super) fn still(mut view: View, mission: &Mission) -> View {
+    let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
     let rows = view.rows.iter_mut().map(|row| &mut row.shown);
     let also = view.also.iter_mut().flat_map(|also| &mut also.shown);
     let items = view.items_shown.iter_mut();
     let boxes = items.chain(view.arrows_shown.iter_mut());
-    for shown in rows.chain(also).chain(boxes).flat_map(Looks::each_mut) {
-        unmark(shown);
+    for looks in rows.chain(also).chain(boxes) {
+        *looks = Looks::of([whole(looks, &lengths).as_ref()]);
     }
-    let times: ById<ItemId, Presence> = view
+    let presences: ById<ItemId, Presence> = view
         .items
         .iter()
         .map(|item| presence(item, mission))
         .collect();
-    let is_partial = |presence: &Presence| !presence.marks.is_empty();
-    if times.iter().any(is_partial) {
-        view.presences = times;
+    if presences.iter().any(|presence| !presence.marks.is_empty()) {
+        view.presences = presences;
     }
-    let nodes = node_count(view);
-    if let Some(frame) = view.frames.first_mut() {
-        tell(frame, mission, nodes);
+    let headlines = view.frames.iter_mut();
+    let headlines: Vec<_> = headlines
+        .flat_map(|f| std::mem::take(&mut f.headlines))
+        .collect();
+    let mut frame = Frame {
+        messages: mission.messages,
+        counts: Counts::of(&headlines),
+        caption: headline(mission, roles(&view, mission)),
+        headlines,
+        ..Frame::empty(0, mission.span)
+    };
+    if !view.presences.is_empty() {
+        "under each node: when it ran".clone_into(&mut frame.note);
     }
-}
-
-/// The look of an element while it was there.
-fn unmark(shown: &mut Shown) {
-    shown.mark = None;
-    shown.rates = None;
-    shown.is_paused = false;
-    shown.inside = None;
-    shown.lifecycle = None;
-    for row in &mut shown.topics {
-        (row.mark, row.rates) = (None, None);
-    }
+    view.frames = vec![frame];
+    view
 }
 
 /// The times of the nodes in a box; none for a box of topics.
 fn presence(item: &Item, mission: &Mission) -> Presence {
     let nodes = || item.members.iter().filter(|what| what.is_node());
     let whole = mission.span;
-    let part = |at: Stamp| (at.since(whole.start) as f64 / whole.nanos().max(1) as f64).clamp(0.0, 1.0);
+    let part =
+        |at: Stamp| (at.since(whole.start) as f64 / whole.nanos().max(1) as f64).clamp(0.0, 1.0);
     let lives = nodes().flat_map(|what| mission.elements.seen(*what).lives.iter().copied());
     let times = Span::joined(lives.collect(), 0);
     let mark = |event: &Event| {
@@ -75,43 +80,52 @@ fn presence(item: &Item, mission: &Mission) -> Presence {
     let is_own = |event: &&Event| event.is_headline() && nodes().any(|what| *what == event.what);
     let events = mission.log.events.iter().filter(is_own);
     Presence {
-        times: times.iter().map(|life| (part(life.start), part(life.end))).collect(),
+        times: times
+            .iter()
+            .map(|life| (part(life.start), part(life.end)))
+            .collect(),
         marks: events.filter_map(mark).collect(),
     }
 }
 
-/// The number of nodes in boxes and in words.
-fn node_count(view: &View) -> usize {
+/// The number of nodes in boxes and in words; the runs of an anonymous node are one.
+fn roles(view: &View, mission: &Mission) -> usize {
     let in_words = view.also.iter().flat_map(|also| &also.items);
-    let members = view.items.iter().chain(in_words).flat_map(|item| &item.members);
-    members.filter(|what| matches!(what, Element::Node(_))).count()
+    let members = view
+        .items
+        .iter()
+        .chain(in_words)
+        .flat_map(|item| &item.members);
+    let role = |what: &Element| match what {
+        Element::Node(id) => mission.elements.nodes.get(*id).map(|node| &*node.role),
+        _ => None,
+    };
+    members.filter_map(role).collect::<BTreeSet<&str>>().len()
 }
 
-/// Writes the headline: `31 nodes, 7 phases, 2 restarts, 2 topics change hands`.
-fn tell(frame: &mut Frame, mission: &Mission, nodes: usize) {
+/// The headline: `31 nodes, 7 phases, 2 restarts, 2 topics change hands`.
+fn headline(mission: &Mission, nodes: usize) -> Vec<Phrase> {
     let many = |kind: Kind| {
         let events = mission.log.headlines(mission.span);
         events.filter(|(_, event)| event.kind == kind).count()
     };
-    let hands = match many(Kind::HandedOver) {
-        1 => "1 topic changes hands".to_owned(),
-        more => format!("{more} topics change hands"),
-    };
-    let restarts = many(Kind::Restarted);
-    let (phases, handed_over) = (mission.log.phases.len(), many(Kind::HandedOver));
+    let (phases, restarts) = (mission.log.phases.len(), many(Kind::Restarted));
+    let hands = many(Kind::HandedOver);
+    let change = if hands == 1 { "changes" } else { "change" };
     let parts = [
         (true, words::count(nodes, "node")),
         (phases > 1, words::count(phases, "phase")),
         (restarts > 0, words::count(restarts, "restart")),
-        (handed_over > 0, hands),
+        (
+            hands > 0,
+            format!("{} {change} hands", words::count(hands, "topic")),
+        ),
     ];
     let parts = parts.into_iter().filter(|(is_told, _)| *is_told);
     let parts: Vec<String> = parts.map(|(_, words)| words).collect();
-    frame.crowds.clear();
-    frame.caption = vec![Phrase {
+    vec![Phrase {
         sign: ' ',
         lead: parts.join(", "),
         ..Phrase::default()
-    }];
-    frame.note = String::new();
+    }]
 }

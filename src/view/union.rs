@@ -19,7 +19,7 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
 }
 
 /// The look of one item or arrow in all windows together.
-fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
+pub(super) fn whole(looks: &Looks, lengths: &Lengths) -> Option<Shown> {
     let mut slot = None;
     let (mut first, mut last) = (None, 0);
     for (from, to, _, shown) in looks.spans(lengths.windows()) {

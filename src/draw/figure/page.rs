@@ -1,7 +1,7 @@
 //! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
 use super::groups::depths;
-use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind};
+use super::{FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -25,9 +25,6 @@ const SHORTEST_AXIS: f64 = 15.0;
 /// The most names of one kind that are reported in a note; the others are counted.
 pub(crate) const MOST_NAMED: usize = 60;
 
-/// The number of boxes that fit on a page, about.
-pub(crate) const FITTING: usize = 40;
-
 /// The parts of a page.
 pub(crate) struct FigureSheet<'a> {
     pub(crate) source: &'a FigureSource<'a>,
@@ -37,13 +34,16 @@ pub(crate) struct FigureSheet<'a> {
 }
 
 impl<'a> FigureSheet<'a> {
-    /// The figure and its remarks for the user.
-    pub(crate) fn draw(&self) -> Result<(Scene, Vec<String>)> {
-        match self.options.kind {
-            FigureKind::Lives => self.lives(),
-            FigureKind::Map => super::map::draw(self),
-            FigureKind::Steps => super::steps::draw(self),
-            FigureKind::Changes => super::steps::changes::draw(self),
+    pub(crate) fn new(
+        source: &'a FigureSource<'a>,
+        fonts: &'a Fonts,
+        options: &'a FigureOptions,
+    ) -> Self {
+        Self {
+            source,
+            fonts,
+            sizes: Sizes::of_names(options.text_pt),
+            options,
         }
     }
 
@@ -60,7 +60,11 @@ impl<'a> FigureSheet<'a> {
         }
     }
 
-    fn lives(&self) -> Result<(Scene, Vec<String>)> {
+    /// The lifelines, and remarks for the user.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if nothing is left, or if it does not fit even as groups.
+    pub(crate) fn lives(&self) -> Result<(Scene, Vec<String>)> {
         let by_topics = match self.options.rows {
             Some(rows) => rows == RowKind::Topics,
             None => !self.source.knows_publishers(),

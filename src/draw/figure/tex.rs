@@ -39,10 +39,7 @@ pub(crate) fn caption(
 fn what(kind: FigureKind) -> &'static str {
     match kind {
         FigureKind::Lives => "When each element was running, how busy it was, and its changes.",
-        FigureKind::Map => "Publishers and subscribers, and the phases in which they exist.",
-        FigureKind::Changes => {
-            "Phase by phase, at fixed positions: the running nodes, and their changes."
-        }
+        FigureKind::Graph => "Publishers and subscribers, and the times at which they ran.",
         FigureKind::Steps => "The reconfigurations one by one: starts, stops and takeovers.",
     }
 }
@@ -52,12 +49,12 @@ fn legend(kind: FigureKind) -> &'static str {
         FigureKind::Lives => {
             "Bars: publishing, with the height of the rate relative to the row's highest; thin lines: silent, dashed: inferred; tick: start; cross: end; arrows from a dot: another node takes over a topic; circled letters: returns and steps of rates."
         }
-        FigureKind::Map => {
-            "Numbers: the phases in which a node exists, none for all; arrows: topics, thicker for more messages per second, dashed \
-             if inferred; dashed frames: nodes without a known partner."
+        FigureKind::Graph => {
+            "Bar in a box: when the node ran, from the start of the mission to its end; ticks: starts, ends and restarts; \
+             lines: topics with their rates, dashed if inferred."
         }
-        FigureKind::Steps | FigureKind::Changes => {
-            "Solid with plus: began; dashed with minus: ended; double frame: another node took over a topic; thin: their neighbours."
+        FigureKind::Steps => {
+            "Green with plus: starts; orange with minus: stops; purple: changes in another way; others: their direct partners."
         }
     }
 }

@@ -16,8 +16,9 @@ use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::looks::both;
 use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Looks, Shown, View};
 
-/// The largest width of a name in pixels; longer ones are shortened in their middle.
-const WIDEST: f64 = 230.0;
+/// The largest width of a name in pixels, and in heights of its letters if these are large; longer ones are shortened in
+/// their middle.
+const WIDEST: (f64, f64) = (230.0, 16.4);
 /// The height of a line of text, relative to its font size.
 pub(crate) const LINE: f64 = 1.22;
 /// The height of a rate label, and its width beyond its text, relative to the font size.
@@ -217,8 +218,9 @@ impl Measurer<'_> {
                 (false, _) => name + "/…",
             };
         }
+        let widest = WIDEST.0.max(WIDEST.1 * body.size);
         Label {
-            name: (self.fonts.fit(&name, body.size, body.weight(), WIDEST)).into_owned(),
+            name: (self.fonts.fit(&name, body.size, body.weight(), widest)).into_owned(),
             second,
             has_bar: false,
             unshown,
@@ -232,7 +234,11 @@ impl Measurer<'_> {
         let width = self.fonts.width(&label.name, body.size, body.weight());
         let width = width.max(second);
         let small = if label.second { body.small * LINE } else { 0.0 };
-        let bar = if label.has_bar { presence::room(body.size) } else { 0.0 };
+        let bar = if label.has_bar {
+            presence::room(body.size)
+        } else {
+            0.0
+        };
         let height = body.size * LINE + small + bar;
         let depth = match item.kind {
             ItemKind::Node if has_rows => 0.0,

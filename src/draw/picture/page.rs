@@ -15,6 +15,8 @@ pub(crate) struct PageFrame {
     pub(crate) size: Size,
     /// The scale of title, legend and timeline: 1 on a page of 1280 × 720.
     pub(crate) unit: f64,
+    /// The largest scale of the graph.
+    largest: f64,
     /// Empty parts (`--bare`) have no height.
     pub(crate) title: Rect,
     pub(crate) graph: Rect,
@@ -67,6 +69,7 @@ impl PageFrame {
         Self {
             size,
             unit,
+            largest: options.largest.unwrap_or(LARGEST * unit.max(0.8)),
             title: strip(0.0, title),
             graph: Rect::new(graph.x, graph.y, graph.w.max(1.0), graph.h.max(1.0)),
             legend: strip(bottom, legend),
@@ -78,9 +81,7 @@ impl PageFrame {
     /// centred.
     pub(crate) fn fit(&self, layout: Size) -> GraphFit {
         let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
-        let scale = (self.graph.w / w)
-            .min(self.graph.h / h)
-            .min(LARGEST * self.unit.max(0.8));
+        let scale = (self.graph.w / w).min(self.graph.h / h).min(self.largest);
         let middle = self.graph.centre();
         GraphFit {
             scale,

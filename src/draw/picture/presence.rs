@@ -2,6 +2,7 @@
 //! starts, ends and restarts as ticks.
 
 use super::boxes::{Boxes, ItemBox};
+use super::measured::LINE;
 use super::options;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Form, Group, Shape, Stroke, line};
@@ -20,17 +21,39 @@ pub(crate) fn room(size: f64) -> f64 {
 
 impl Boxes<'_> {
     /// Draws the bar of a box below its name; none for a box of topics.
-    pub(crate) fn presence(&self, group: &mut Group, presence: &Presence, card: &ItemBox, kind: ItemKind) {
+    pub(crate) fn presence(
+        &self,
+        group: &mut Group,
+        presence: &Presence,
+        card: &ItemBox,
+        kind: ItemKind,
+    ) {
         if !card.label.has_bar {
             return;
         }
         let (style, scale) = (self.style, self.fit.scale);
         let body = options::body(style, kind);
         let head = card.card.as_ref().map(|rows| rows.head * scale);
-        let place = Rect::new(card.place.x, card.place.y, card.place.w, head.unwrap_or(card.place.h));
+        let place = Rect::new(
+            card.place.x,
+            card.place.y,
+            card.place.w,
+            head.unwrap_or(card.place.h),
+        );
         let high = body.size * BAR * scale;
-        let aside = if body.is_capsule() { 0.85 * body.pad_x } else { body.pad_x } * scale;
-        let middle = place.bottom() - (body.pad_y + body.size * BAR) * scale;
+        let aside = if body.is_capsule() {
+            0.85 * body.pad_x
+        } else {
+            body.pad_x
+        } * scale;
+        // Below the name and the smaller line, where `Boxes::lines` leaves room.
+        let small = if card.label.second {
+            body.small * LINE
+        } else {
+            0.0
+        };
+        let lines = body.size * LINE + small;
+        let middle = place.centre().y + lines / 2.0 * scale;
         let bar = Rect::new(
             place.x + aside,
             middle - high / 2.0,

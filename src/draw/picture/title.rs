@@ -110,12 +110,14 @@ impl<'a> Title<'a> {
     fn color(&self, frame: &Frame) -> Color {
         let style = &self.style.title;
         let is_away = frame.lasting.iter().any(|l| l.ended.is_none());
+        let is_still = frame.caption.iter().all(|p| p.names.is_empty());
         let has = |sign| frame.caption.iter().any(|p| p.sign == sign);
         match (has('−'), has('+')) {
             (true, true) => style.text,
             (true, false) => style.removed,
             (false, true) => style.added,
             (false, false) if is_away => style.removed,
+            (false, false) if is_still => style.text,
             (false, false) => style.changed,
         }
     }

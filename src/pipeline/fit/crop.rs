@@ -15,6 +15,18 @@ const LEGEND: f64 = 480.0;
 /// The width of a page with decorations (title, legend, timeline) of normal size, and their smallest legible scale.
 const DECORATIONS: (f64, f64) = (1100.0, 0.8);
 
+/// The page of a medium as high as its graph: paper is no wider or narrower, but need not stay empty.
+pub(super) fn lowered(composed: &Composed, drawing: &Drawing) -> PageOptions {
+    let page = &composed.page;
+    let measured = Measured::new(&composed.view, &drawing.style, &drawing.fonts, page.clone());
+    let graph = composed.layout.size.h * measured.scale(&composed.layout);
+    let high = page.size.h - measured.layout_options().page.h + graph;
+    PageOptions {
+        size: Size::new(page.size.w, libm::ceil(high).min(page.size.h)),
+        ..page.clone()
+    }
+}
+
 /// The page cropped to its graph, if names of a legible size leave it empty.
 pub(super) fn cropped(composed: &Composed, drawing: &Drawing) -> PageOptions {
     let (view, page, natural) = (&composed.view, &composed.page, composed.layout.size);

@@ -30,7 +30,7 @@ pub(super) fn reported(
 ) -> Notices {
     let mut notices = Notices::new();
     let is_readable = text >= drawing.readable();
-    if drawing.page.size != got.size && drawing.purpose.is_none() {
+    if drawing.page.size != got.size && drawing.medium.is_none() {
         let text = format!(
             "the page is {}x{}{} (change with `--size`)",
             got.size.w,
@@ -48,7 +48,7 @@ pub(super) fn reported(
         );
         notices.add(Notice::new(NoticeKind::Hidden, text));
     }
-    if let Some(purpose) = drawing.purpose.filter(|_| !is_readable) {
+    if let Some(medium) = drawing.medium.as_ref().filter(|_| !is_readable) {
         let size = match got.width_mm {
             Some(mm) => {
                 let pt = text * mm / got.size.w * 72.0 / 25.4;
@@ -56,7 +56,7 @@ pub(super) fn reported(
             }
             None => format!("{} pixels", words::number(words::significant(text, 2))),
         };
-        let advice = purpose.advice();
+        let advice = medium.advice();
         let text = format!("the smallest text will be {size}, too small to read; {advice}");
         notices.add(Notice::new(NoticeKind::Note, text));
     } else if !is_readable {

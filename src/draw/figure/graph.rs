@@ -1,0 +1,53 @@
+//! The graph on paper: the picture of the whole mission with the times of each node, above the band of phases.
+
+use super::page::FigureSheet;
+use crate::base::geometry::Size;
+use crate::draw::scene::Scene;
+use crate::draw::timeline::band::{self, Axis};
+use crate::draw::timeline::canvas::{PX_PER_MM, ink};
+use crate::draw::timeline::notes::{flow, sentence};
+
+/// The space between the graph and the band in millimetres.
+const BELOW: f64 = 1.2;
+/// The width in millimetres from which the names of phases fit below their places in the band.
+const WIDE: f64 = 150.0;
+
+/// The page of a picture of the mission in one window, which is as wide as the page.
+pub(crate) fn page(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
+    let (source, width) = (sheet.source, sheet.options.width_mm);
+    let mut canvas = sheet.canvas();
+    let mut y = picture.size.h / PX_PER_MM;
+    if !source.phases.is_empty() {
+        canvas.begin("phases");
+        let axis = Axis {
+            left: 0.0,
+            right: width,
+            span: source.span(),
+        };
+        y += BELOW;
+        band::band(&mut canvas, &axis, y, source.phases);
+        y += band::HEIGHT;
+        if width < WIDE {
+            y = band::axis(&mut canvas, &axis, y, false);
+        }
+        canvas.begin("words");
+        y = band::names(
+            &mut canvas,
+            source,
+            width,
+            y,
+            (width >= WIDE).then_some(&axis),
+        );
+    }
+    canvas.begin("notes");
+    if !sheet.options.is_bare {
+        let text = "Bar in a box: when the node ran, from the start of the mission to its end; ticks: starts, ends and \
+                    restarts. Line: topics with their rates, dashed if inferred.";
+        y = flow(&mut canvas, width, y + 0.4, &[sentence(ink::QUIET, text)]);
+    }
+    let mut scene = canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Graph"));
+    let ground = scene.groups.drain(..).collect::<Vec<_>>();
+    scene.groups = picture.groups;
+    scene.groups.extend(ground);
+    scene
+}
