@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::groups::{NodeGroup, depths, groups, phases_of};
-use super::page::{FITTING, FigureSheet, MOST_NAMED, filter_that_fits, nothing};
+use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
 use super::place::{PlacedPanel, place};
 use super::talks::{Talk, Talks};
 use super::{MOST_HEIGHT, RowKind};
@@ -14,11 +14,13 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
-use crate::draw::timeline::band::{self, Axis};
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use crate::draw::timeline::marks::Marks;
+use crate::draw::timeline::drawer::{self, Axis};
+use crate::draw::timeline::legend::MOST_NAMED;
+use crate::draw::timeline::marks;
 use crate::draw::timeline::notes::{flow, sentence};
-use crate::draw::timeline::tracks::{Track, of_nodes};
+use crate::draw::timeline::phases;
+use crate::draw::timeline::rows::{Row, of_nodes};
 use crate::layout::{Cluster, Outline, Plan, Vertex};
 
 /// The height of a map of nodes, in millimetres, above which groups are drawn instead, if they fit.
@@ -103,7 +105,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
 }
 
 /// The map of the smallest groups that fit.
-fn grouped(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Option<Scene> {
+fn grouped(sheet: &FigureSheet<'_>, tracks: &[Row]) -> Option<Scene> {
     let mut many = usize::MAX;
     depths(tracks).find_map(|depth| {
         let groups = groups(sheet.source, tracks, depth);
@@ -115,7 +117,7 @@ fn grouped(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Option<Scene> {
     })
 }
 
-fn too_large(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Error {
+fn too_large(sheet: &FigureSheet<'_>, tracks: &[Row]) -> Error {
     let width = sheet.options.width_mm;
     let many = words::count(tracks.len(), "node");
     let hint = if width < 181.0 && page_at(sheet, tracks, 181.0) {
@@ -127,7 +129,7 @@ fn too_large(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Error {
 }
 
 /// Whether groups would fit at another width.
-fn page_at(sheet: &FigureSheet<'_>, tracks: &[Track], width: f64) -> bool {
+fn page_at(sheet: &FigureSheet<'_>, tracks: &[Row], width: f64) -> bool {
     let options = super::FigureOptions {
         width_mm: width,
         ..sheet.options.clone()
@@ -140,7 +142,7 @@ fn page_at(sheet: &FigureSheet<'_>, tracks: &[Track], width: f64) -> bool {
 }
 
 /// The map of nodes, or of groups of them.
-fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>) -> Option<Scene> {
+fn page(sheet: &FigureSheet<'_>, tracks: &[Row], groups: Option<&[NodeGroup]>) -> Option<Scene> {
     let width = sheet.options.width_mm;
     let mut canvas = sheet.canvas();
     let drawn = match groups {
@@ -171,14 +173,15 @@ fn below(
             right: width,
             span: sheet.source.span(),
         };
-        band::band(canvas, &axis, y, sheet.source.phases);
-        y += band::HEIGHT;
+        let phases = phases::numbered(sheet.source);
+        drawer::band(canvas, &axis, y, &phases, Type::Head);
+        y += drawer::BAND.0;
         let wide = width >= 150.0;
         if !wide {
-            y = band::axis(canvas, &axis, y, false);
+            y = axis.draw(canvas, y, false);
         }
         canvas.begin("words");
-        y = band::names(canvas, sheet.source, width, y, wide.then_some(&axis));
+        y = phases::names(canvas, sheet.source, width, y, wide.then_some(&axis));
     }
     canvas.begin("notes");
     let mut text = String::new();
@@ -212,7 +215,7 @@ fn below(
 fn of_capsules(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
-    tracks: &[Track],
+    tracks: &[Row],
 ) -> Option<MapDrawing> {
     let source = sheet.source;
     let talks = Talks::new(source, tracks);
@@ -235,8 +238,8 @@ fn of_capsules(
             spaces.push(space);
         }
     }
-    let home = |track: &Track| spaces.iter().position(|s| s == namespace(&track.name));
-    let label = |track: &Track| match home(track) {
+    let home = |track: &Row| spaces.iter().position(|s| s == namespace(&track.name));
+    let label = |track: &Row| match home(track) {
         Some(_) => last_part(&track.name).to_owned(),
         None => track.name.trim_start_matches('/').to_owned(),
     };
@@ -283,7 +286,7 @@ fn of_capsules(
 fn of_groups(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
-    tracks: &[Track],
+    tracks: &[Row],
     groups: &[NodeGroup],
 ) -> Option<MapDrawing> {
     let source = sheet.source;
@@ -401,7 +404,7 @@ fn sized(canvas: &PaperCanvas<'_>, look: &MapBox, cluster: Option<usize>, phases
 fn paint(
     canvas: &mut PaperCanvas<'_>,
     sheet: &FigureSheet<'_>,
-    tracks: &[Track],
+    tracks: &[Row],
     drawn: &MapDrawing,
 ) {
     let placed = &drawn.placed;
@@ -421,11 +424,14 @@ fn paint(
     for (at, lines) in drawn.labels.iter().enumerate() {
         placed.label(canvas, at, lines);
     }
-    let marks = Marks::new(sheet.source, tracks);
+    let marked = marks::marked(sheet.source, tracks.to_vec());
     let boxes = drawn.looks.iter().zip(&drawn.members);
     for ((look, members), rect) in boxes.zip(&placed.boxes) {
         let names = members.iter().map(|at| &*tracks[*at].name);
-        canvas.begin_box(names, &marks.events(members));
+        let events: BTreeSet<_> = marks::on(&marked, members)
+            .flat_map(|m| m.events.clone())
+            .collect();
+        canvas.begin_box(names, &events.into_iter().collect::<Vec<_>>());
         match look {
             MapBox::Capsule(name, phases) => capsule(canvas, *rect, name, phases),
             MapBox::List(all) => list(canvas, *rect, all),

@@ -19,11 +19,12 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::Scene;
-use crate::draw::timeline::band::{clock, title};
 use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, ink};
-use crate::draw::timeline::marks::{Marks, Sign};
+use crate::draw::timeline::drawer::clock;
+use crate::draw::timeline::marks::{Sign, marked};
 use crate::draw::timeline::notes::{Unbroken, flow, sentence};
-use crate::draw::timeline::tracks::{Track, of_nodes};
+use crate::draw::timeline::phases::title;
+use crate::draw::timeline::rows::{Row, of_nodes};
 use crate::graph::TopicId;
 use crate::layout::{Outline, Plan, Vertex};
 use crate::mission::EventId;
@@ -41,11 +42,10 @@ const BETWEEN: f64 = 2.0;
 /// The source of panels.
 struct StepSource<'s> {
     sheet: &'s FigureSheet<'s>,
-    tracks: Vec<Track>,
+    tracks: Vec<Row>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
     /// The events of the log on the rows.
-    marks: Marks,
     /// The number of panels side by side.
     columns: usize,
     /// The number of parts of namespaces that distinguish groups.
@@ -104,8 +104,7 @@ impl<'s> StepSource<'s> {
             depth: depths(&tracks).next().unwrap_or(1),
             talks: Talks::new(sheet.source, &tracks),
             found: configurations(sheet.source.mission, sheet.source.phases),
-            marks: Marks::new(sheet.source, &tracks),
-            tracks,
+            tracks: marked(sheet.source, tracks),
             sheet,
         })
     }

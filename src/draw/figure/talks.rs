@@ -6,8 +6,8 @@ use crate::base::name::last_part;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::timeline::canvas::HAIRLINE;
+use crate::draw::timeline::rows::{Row, Steps, mean};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::tracks::{Steps, Track, mean};
 use crate::evidence::Confidence;
 use crate::graph::{ById, Element, TopicId};
 use crate::layout::Link;
@@ -83,7 +83,7 @@ pub(crate) struct Talks<'a> {
 }
 
 impl<'a> Talks<'a> {
-    pub(crate) fn new(source: &'a FigureSource<'a>, tracks: &[Track]) -> Self {
+    pub(crate) fn new(source: &'a FigureSource<'a>, tracks: &[Row]) -> Self {
         let elements = &source.mission.elements;
         let mut track_of = ById::like(&elements.nodes, None);
         for (at, track) in tracks.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::StepSource;
 use crate::base::time::Span;
-use crate::draw::timeline::marks::Sign;
+use crate::draw::timeline::marks::{self, Sign};
 use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::EventId;
 use crate::mission::event_log::Detail;
@@ -32,16 +32,16 @@ impl StepSource<'_> {
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let (old, new) = match sign {
             Sign::Start => (before, after),
-            Sign::End | Sign::Dot => (after, before),
+            _ => (after, before),
         };
         let around = Span::new(
             self.sheet.source.phases[k - 1].span.start,
             self.sheet.source.phases[k].span.end,
         );
         let events = |track: usize| -> Vec<EventId> {
-            let own = self.marks.signs.iter().filter(|s| s.track == track);
+            let own = self.tracks[track].marks.iter();
             let own = own.filter(|s| s.sign == sign && around.contains(s.at));
-            own.map(|s| s.event).collect()
+            own.flat_map(|s| s.events.clone()).collect()
         };
         let tracks = new.difference(old).filter_map(|name| self.track(name));
         let tracks = tracks.map(|track| (track, events(track)));
@@ -70,12 +70,7 @@ impl StepSource<'_> {
     /// The events in the step into phase `k` on the rows of a box.
     pub(super) fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EventId> {
         let time = self.time(k);
-        let letters = self.marks.letters.iter().map(|l| &l.mark);
-        let marks = self.marks.signs.iter().chain(letters);
-        let own = marks.filter(|m| members.contains(&m.track) && time.contains(m.at));
-        let hands = self.marks.handovers.iter().filter(|h| {
-            time.contains(h.at) && (members.contains(&h.from) || members.contains(&h.to))
-        });
-        own.map(|m| m.event).chain(hands.map(|h| h.event)).collect()
+        let own = marks::on(&self.tracks, members).filter(|mark| time.contains(mark.at));
+        own.flat_map(|mark| mark.events.clone()).collect()
     }
 }
