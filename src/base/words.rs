@@ -247,6 +247,17 @@ pub fn moment(nanos: i64) -> String {
     }
 }
 
+/// A moment as [`moment`] writes it, to the millisecond, after 20 s to the second: the last window, which ends 1 ns after
+/// the last message, is shown as ending at it.
+pub fn moment_rounded(nanos: i64) -> String {
+    let milli = nanos.saturating_add(500_000) / 1_000_000 * 1_000_000;
+    moment(if milli.abs() > 20 * SECOND {
+        milli.saturating_add(SECOND / 2) / SECOND * SECOND
+    } else {
+        milli
+    })
+}
+
 /// The UTC clock of a time since 1970, in nanoseconds: `14:03:22`.
 pub fn clock(nanos: i64) -> String {
     let second = nanos.div_euclid(SECOND).rem_euclid(86_400);

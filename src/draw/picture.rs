@@ -7,7 +7,6 @@ mod boxes;
 mod card;
 mod texts;
 pub(crate) use texts::change_counts;
-mod course;
 mod gates;
 mod ids;
 mod legend;
@@ -20,7 +19,6 @@ mod presence;
 mod replicas;
 mod room;
 mod spaces;
-mod timeline;
 pub(crate) mod title;
 mod topics;
 mod union;
@@ -33,14 +31,14 @@ pub use self::ids::unshown;
 use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
 use self::page::{GraphFit, PageFrame};
-use self::timeline::Timeline;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
-pub use crate::draw::timeline::course::Course;
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::below::Below;
 use crate::graph::Id as _;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
 use crate::view::{ArrowId, ArrowKind, Frame, ItemId, SeenWindow, View};
@@ -66,8 +64,8 @@ pub struct PageOptions {
     pub largest: Option<f64>,
     /// Whether there is a legend of the signs.
     pub has_legend: bool,
-    /// The phases and rows of the strip at the bottom; without rows it shows messages per second.
-    pub course: Course,
+    /// The phases and rows of the timeline at the bottom; without rows it shows messages per second.
+    pub timeline: Timeline,
     /// The least relative change of a rate that is reported, for the legend.
     pub rate_change: f64,
 }
@@ -84,7 +82,7 @@ impl Default for PageOptions {
             unit: None,
             largest: None,
             has_legend: true,
-            course: Course::default(),
+            timeline: Timeline::default(),
             rate_change: 0.25,
         }
     }
@@ -195,7 +193,7 @@ pub struct Picture<'a> {
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<ArrowId>,
     title: Title<'a>,
-    timeline: Timeline<'a>,
+    timeline: Below<'a>,
     /// The groups that are equal in every frame, behind the graph and the moving parts.
     ground: Vec<Group>,
 }
@@ -232,7 +230,13 @@ impl<'a> Picture<'a> {
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
-            timeline: Timeline::new(style, fonts, page, view, &measured.options),
+            timeline: Below::new(
+                page::below(style, &measured.options),
+                fonts,
+                page.timeline,
+                view,
+                measured.options.timeline.clone(),
+            ),
             ground: Vec::new(),
             measured,
             layout,
@@ -313,13 +317,13 @@ impl<'a> Picture<'a> {
 
     fn decorations(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
         // The timeline names the phase, if there is one.
-        let is_named = !self.measured.options.course.phases.is_empty();
+        let is_named = !self.measured.options.timeline.phases.is_empty();
         let phase = self
             .phase(k)
             .filter(|_| !is_named || !self.measured.view.has_time());
         groups.extend(self.title.words(frame, phase.unwrap_or("")));
         if self.measured.view.has_time() {
-            groups.extend(self.timeline.head(k, frame));
+            groups.extend(self.timeline.head(frame));
         }
     }
 

@@ -10,15 +10,17 @@ use crate::base::words;
 use crate::draw::picture::PageOptions;
 use crate::draw::picture::page::{PageFrame, unit};
 use crate::draw::picture::title::Title;
-use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
+use crate::draw::scene::{Group, Scene, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
-use crate::draw::timeline::band::Axis;
+use crate::draw::timeline::Timeline;
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
-use crate::draw::timeline::lives::{LivesFigure, RowPlace};
+use crate::draw::timeline::drawer::{Axis, Density, Drawer};
+use crate::draw::timeline::marks::marked;
+use crate::draw::timeline::phases;
+use crate::draw::timeline::rows::{Level, Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::tracks::Track;
-use crate::graph::{Element, ElementState, NodeId};
+use crate::graph::{Element, ElementState, NodeId, TopicId};
 use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
@@ -32,6 +34,8 @@ const LARGEST: Size = Size::new(1920.0, 1080.0);
 const TYPES: f64 = 58.0;
 const RATES: f64 = 15.0;
 const BETWEEN: f64 = 2.4;
+/// The largest fraction of the width for the names of topics.
+const MOST_NAMES: f64 = 0.29;
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
@@ -44,11 +48,10 @@ pub(crate) struct TopicTimeline<'a> {
     style: &'a Style,
     fonts: &'a Fonts,
     options: PageOptions,
-    lives: LivesFigure<'a>,
     title: Title<'a>,
-    sizes: Sizes,
+    /// Pixels per millimetre.
     scale: f64,
-    place: RowPlace,
+    drawer: Drawer,
     /// The window of the mission that each frame shows.
     windows: Vec<usize>,
     ground: Vec<Group>,
@@ -80,31 +83,35 @@ impl<'a> TopicTimeline<'a> {
         mut options: PageOptions,
         is_sized: bool,
     ) -> Self {
-        let sizes = Sizes::of_names(7.0);
         if !is_sized {
             options.size.w = options.size.w.min(NARROW);
         }
-        let mut lives = LivesFigure::new(source, true).opened();
-        if !is_sized && most_rows(&lives, style, &options, fonts) < lives.rows.len() {
+        let rows = marked(source, of_topics(source));
+        let rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
+        let timeline = |is_folded| Timeline {
+            phases: phases::named(source),
+            ..Timeline::by_namespace(source, rows.clone(), is_folded)
+        };
+        let mut shown = timeline(false);
+        if !is_sized && most_rows(&shown, style, &options) < shown.rows.len() {
             options.size = LARGEST;
         }
-        let mut most = most_rows(&lives, style, &options, fonts);
-        if most < lives.rows.len() {
-            lives = LivesFigure::new(source, true).plain();
-            most = most_rows(&lives, style, &options, fonts);
+        let mut most = most_rows(&shown, style, &options);
+        if most < shown.rows.len() {
+            shown = timeline(true);
+            most = most_rows(&shown, style, &options);
         }
-        let left_out = lives.shorten(most, &|track| messages(source, track));
+        let left_out = shorten(&mut shown, most, source);
         let page = PageFrame::new(style, &options, 0, true);
-        let (place, scale) = placed(&lives, &page, &options, fonts);
+        let (drawer, scale) = placed(shown, &page, &options, fonts);
         if !is_sized {
             // A short timeline has no empty space below; encoders of video need an even number of rows.
-            let canvas = PaperCanvas::new(fonts, sizes, scale);
-            let end = (place.top + lives.height(&canvas) + BELOW) * scale;
-            options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);
+            let end = drawer.top + drawer.timeline.height(sizes(), drawer.pitch) + BELOW;
+            options.size.h = (libm::ceil(end * scale / 2.0) * 2.0).min(options.size.h);
         }
         let mission = source.mission;
         let window = |start| mission.windows.partition_point(|w| w.span.start < start);
-        let mut timeline = Self {
+        let mut page = Self {
             title: Title::new(style, fonts, &page, view, &options),
             windows: view.frames.iter().map(|f| window(f.span.start)).collect(),
             ground: Vec::new(),
@@ -113,14 +120,12 @@ impl<'a> TopicTimeline<'a> {
             style,
             fonts,
             options,
-            lives,
-            sizes,
+            drawer,
             scale,
-            place,
             left_out,
         };
-        timeline.ground = timeline.ground();
-        timeline
+        page.ground = page.ground();
+        page
     }
 
     /// Remarks for the user; lower case, no period.
@@ -156,31 +161,27 @@ impl<'a> TopicTimeline<'a> {
     /// All windows in one drawing.
     pub(crate) fn overview(&self) -> Overview {
         let mut scene = self.empty();
-        let mut canvas = self.canvas();
-        canvas.begin("past");
-        self.lives
-            .past(&mut canvas, &self.place, self.source.span().end);
-        canvas.begin("names");
-        self.lives.names(&mut canvas, &self.place, &|_| true);
-        canvas.begin("rates");
-        self.rates(&mut canvas, &|track| track.hz.map(words::rate));
-        canvas.begin("nodes");
-        self.nodes(&mut canvas, &|_| true);
         if !self.options.bare {
             let span = self.source.span();
-            let topics = words::count(self.lives.tracks.len(), "topic");
+            let rows = self.drawer.timeline.rows.iter();
+            let shown = rows.map(|row| row.folded.len() + usize::from(row.topic.is_some()));
+            let topics = words::count(shown.sum::<usize>() + self.left_out, "topic");
             let mut whole = Frame::empty(0, span);
             whole.messages = self.source.mission.messages;
             whole.note = format!("{topics} over {}", words::duration(span.nanos()));
             scene.groups.extend(self.title.words(&whole, ""));
         }
-        scene.groups.extend(self.painted(canvas));
+        let mut canvas = self.canvas();
+        let rate = |row: &Row| row.hz.map(words::rate);
+        self.window(&mut canvas, self.source.span(), &|_| true, &rate, &|_| true);
+        scene.groups.extend(canvas.into_styled(self.style));
+        scene.groups.extend(self.marks());
         scene.title = format!("Topics over time of {}", self.options.title());
         let heads = self
             .view
             .frames
             .iter()
-            .map(|f| self.head(f.span).scaled(self.scale));
+            .map(|f| self.drawer.window(f.span).scaled(self.scale));
         Overview {
             scene,
             heads: heads.collect(),
@@ -200,24 +201,24 @@ impl<'a> TopicTimeline<'a> {
     }
 
     fn canvas(&self) -> PaperCanvas<'a> {
-        PaperCanvas::new(self.fonts, self.sizes, self.scale)
+        PaperCanvas::new(self.fonts, sizes(), self.scale)
     }
 
     /// The parts that are equal in every frame: band, pale bars, starts and ends, types, axis, and the reason
     /// why this is not a graph.
     fn ground(&self) -> Vec<Group> {
         let mut canvas = self.canvas();
-        let end = self.lives.draw(&mut canvas, &self.place);
+        let end = self.drawer.ground(&mut canvas);
         canvas.begin("why");
-        let y = end + LABEL + 1.6 + self.sizes.line() / 2.0;
-        let wide = self.options.size.w / self.scale - 2.0 * self.place.left;
+        let y = end + LABEL + 1.6 + sizes().line() / 2.0;
+        let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
         let text = canvas.cut(&self.why(), Type::Small, wide);
-        canvas.text(self.place.left, y, Type::Small, ink::QUIET, &text);
+        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &text);
         let mut groups = Vec::new();
         if !self.options.bare {
             groups.push(self.title.ground());
         }
-        groups.extend(self.painted(canvas));
+        groups.extend(canvas.into_styled(self.style));
         groups
     }
 
@@ -246,49 +247,53 @@ impl<'a> TopicTimeline<'a> {
             .windows
             .get(window)
             .map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
-        let count = |track: &Track| {
-            let topic = Element::Topic(track.topic?);
+        let count = |row: &Row| {
+            let topic = Element::Topic(row.topic?);
             graph.as_ref()?.get(topic).map(ElementState::messages)
         };
-        let mut canvas = self.canvas();
-        canvas.begin("past");
-        self.lives.past(&mut canvas, &self.place, span.end);
-        canvas.begin("names");
-        self.lives
-            .names(&mut canvas, &self.place, &|t| count(t).unwrap_or(0) > 0);
-        canvas.begin("rates");
-        self.rates(&mut canvas, &|track| {
-            let count = count(track).filter(|n| *n > 0)?;
+        let rate = |row: &Row| {
+            let count = count(row).filter(|n| *n > 0)?;
             Some(words::rate_of(count, seconds))
-        });
-        canvas.begin("nodes");
-        let alive: BTreeSet<NodeId> = graph
-            .iter()
-            .flat_map(|g| g.nodes().map(|(id, _)| id))
-            .collect();
-        self.nodes(&mut canvas, &|nodes| {
-            nodes.iter().any(|n| alive.contains(n))
-        });
-        let mut groups = self.painted(canvas);
-        let mut head = Group::named("playhead");
-        let form = Form::Rect(self.head(span).scaled(self.scale), 2.0);
-        head.shape(Shape::line(
-            form,
-            Stroke::solid(self.style.timeline.head, 1.5),
-        ));
-        groups.push(head);
+        };
+        let nodes = graph.iter().flat_map(|g| g.nodes().map(|(id, _)| id));
+        let alive: BTreeSet<NodeId> = nodes.collect();
+        let is_there = |nodes: &[NodeId]| nodes.iter().any(|n| alive.contains(n));
+        let mut canvas = self.canvas();
+        let is_now = |row: &Row| count(row).unwrap_or(0) > 0;
+        self.window(&mut canvas, span, &is_now, &rate, &is_there);
+        let mut groups = canvas.into_styled(self.style);
+        groups.extend(self.marks());
+        groups.push(self.drawer.playhead(span, self.scale, self.style));
         groups
     }
 
-    fn rates(&self, canvas: &mut PaperCanvas<'_>, reported: &dyn Fn(&Track) -> Option<String>) {
-        let right = self.place.axis.right + RATES;
-        for (y, track, ..) in self.lives.lines(canvas, &self.place) {
-            let (color, text) = match reported(track) {
-                Some(text) => (ink::TEXT, text),
-                None => (ink::QUIET, "–".to_owned()),
-            };
-            canvas.text_end(right, y, Type::Small, color, &text);
+    /// Draws what depends on the window: bars and names, rates, and nodes.
+    fn window(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        span: Span,
+        is_now: &dyn Fn(&Row) -> bool,
+        rate: &dyn Fn(&Row) -> Option<String>,
+        is_there: &dyn Fn(&[NodeId]) -> bool,
+    ) {
+        self.drawer.now(canvas, span, is_now);
+        canvas.begin("rates");
+        for (k, row) in self.drawer.timeline.rows.iter().enumerate() {
+            let (y, rate) = (self.drawer.y(k), rate(row));
+            match rate {
+                Some(rate) => self.drawer.rate(canvas, y, &rate, ink::TEXT),
+                None if row.topic.is_some() => self.drawer.rate(canvas, y, "–", ink::QUIET),
+                None => {}
+            }
         }
+        canvas.begin("nodes");
+        self.nodes(canvas, is_there);
+    }
+
+    fn marks(&self) -> Vec<Group> {
+        let mut canvas = self.canvas();
+        self.drawer.marks(&mut canvas);
+        canvas.into_styled(self.style)
     }
 
     /// Draws as many of the known nodes as fit, as labels in a row; those for which `is_there` is true are
@@ -304,10 +309,10 @@ impl<'a> TopicTimeline<'a> {
         if all.is_empty() {
             return;
         }
-        let y = self.lives.bottom(canvas, &self.place) + self.sizes.line() + 2.0 + LABEL / 2.0;
-        canvas.text(self.place.left, y, Type::Small, ink::QUIET, "nodes known");
-        let mut x = self.place.axis.left;
-        let end = self.options.size.w / self.scale - self.place.left;
+        let y = self.drawer.end() + sizes().line() + 2.0 + LABEL / 2.0;
+        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, "nodes known");
+        let mut x = self.drawer.axis.left;
+        let end = self.options.size.w / self.scale - self.drawer.left;
         for (k, &(role, nodes)) in all.iter().enumerate() {
             let wide = canvas.width(role, Type::Small) + 2.4;
             let more = format!("+{}", all.len() - k);
@@ -332,59 +337,37 @@ impl<'a> TopicTimeline<'a> {
             x += wide + 1.4;
         }
     }
-
-    /// The frame around the time of a window, in millimetres.
-    fn head(&self, span: Span) -> Rect {
-        let place = &self.place;
-        let (left, right) = (place.axis.x(span.start), place.axis.x(span.end));
-        let top = self.lives.top(place) - 0.4;
-        let bottom = self.lives.bottom(&self.canvas(), place);
-        Rect::new(left, top, (right - left).max(0.3), bottom - top)
-    }
-
-    /// The groups of a canvas in the colours of the style.
-    fn painted(&self, canvas: PaperCanvas<'_>) -> Vec<Group> {
-        let mut groups = canvas.into_groups();
-        for piece in groups.iter_mut().flat_map(|g| &mut g.pieces) {
-            match piece {
-                Piece::Shape(Shape { fill, stroke, .. }) => {
-                    *fill = self.color(*fill);
-                    stroke.color = self.color(stroke.color);
-                }
-                Piece::Text(text) => text.color = self.color(text.color),
-            }
-        }
-        groups
-    }
-
-    /// The style's colour for a colour of figures, which are on white paper.
-    fn color(&self, of: Color) -> Color {
-        let style = self.style;
-        let table = [
-            (ink::PAPER, style.page.background),
-            (ink::TEXT, style.page.text),
-            (ink::QUIET, style.page.quiet),
-            (ink::BAR, style.timeline.past),
-            (ink::FOLDED, style.timeline.future),
-            (ink::LINE, style.timeline.axis),
-            (ink::RULE, style.timeline.axis),
-            (ink::TINT, style.cluster.fill),
-            (ink::BAND[0], style.timeline.future),
-            (ink::BAND[1], style.legend.fill),
-            (ink::ADDED, style.added.color),
-            (ink::REMOVED, style.removed.color),
-            (ink::CHANGED, style.changed.color),
-        ];
-        let found = table.iter().find(|(ink, _)| *ink == of);
-        found.map_or(of, |(_, color)| *color)
-    }
 }
 
-/// The number of messages that the topic of a row carried.
-fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
-    let Some(topic) = track.topic else { return 0 };
-    let rows = source.mission.graphs.rows(Element::Topic(topic));
-    rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
+fn sizes() -> Sizes {
+    Sizes::of_names(7.0)
+}
+
+/// Keeps the rows of the busiest topics, at most `most` rows; returns the number of topics left out.
+fn shorten(timeline: &mut Timeline, most: usize, source: &FigureSource<'_>) -> usize {
+    let messages = |topic: &TopicId| -> u64 {
+        let rows = source.mission.graphs.rows(Element::Topic(*topic));
+        rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
+    };
+    let rows = &mut timeline.rows;
+    let mut order: Vec<TopicId> = rows.iter().filter_map(|row| row.topic).collect();
+    order.sort_by_cached_key(|topic| std::cmp::Reverse(messages(topic)));
+    let mut left = 0;
+    while rows.len() > most {
+        let least = order.pop();
+        let is_least = |row: &Row| row.topic.is_some() && row.topic == least;
+        let Some(at) = rows.iter().position(is_least) else {
+            break;
+        };
+        rows.remove(at);
+        left += 1;
+        // The title of a namespace whose last row this was.
+        let is_last = rows.get(at).is_none_or(|row| row.level != Level::Inside);
+        if is_last && at > 0 && rows[at - 1].level == Level::Title {
+            rows.remove(at - 1);
+        }
+    }
+    left
 }
 
 /// The part of the page for the timeline.
@@ -401,47 +384,44 @@ fn room(page: &PageFrame, options: &PageOptions) -> Rect {
 }
 
 /// The number of rows that are legible on this page.
-fn most_rows(
-    lives: &LivesFigure<'_>,
-    style: &Style,
-    options: &PageOptions,
-    fonts: &Fonts,
-) -> usize {
+fn most_rows(timeline: &Timeline, style: &Style, options: &PageOptions) -> usize {
     let page = PageFrame::new(style, options, 0, true);
-    let canvas = PaperCanvas::new(fonts, Sizes::of_names(7.0), SCALE.0);
-    let rows = lives.rows.len() as f64 * canvas.sizes.pitch();
-    let others = lives.height(&canvas) - rows + BELOW;
+    let pitch = sizes().pitch();
+    let others = timeline.height(sizes(), pitch) - timeline.rows.len() as f64 * pitch + BELOW;
     let free = room(&page, options).h / SCALE.0 - others;
-    cast::to_usize((free / canvas.sizes.pitch()).max(1.0))
+    cast::to_usize((free / pitch).max(1.0))
 }
 
-/// The positions of all parts in millimetres, and the number of pixels per millimetre.
+/// The timeline at its place, and the number of pixels per millimetre.
 fn placed(
-    lives: &LivesFigure<'_>,
+    timeline: Timeline,
     page: &PageFrame,
     options: &PageOptions,
     fonts: &Fonts,
-) -> (RowPlace, f64) {
+) -> (Drawer, f64) {
     let room = room(page, options);
-    let canvas = PaperCanvas::new(fonts, Sizes::of_names(7.0), 1.0);
-    let high = lives.height(&canvas) + BELOW;
+    let canvas = PaperCanvas::new(fonts, sizes(), 1.0);
+    let pitch = sizes().pitch();
+    let high = timeline.height(sizes(), pitch) + BELOW;
     let largest = SCALE.1 * unit(options).max(1.0);
     let scale = (room.h / high).clamp(SCALE.0, largest);
     let (left, wide) = (room.x / scale, room.w / scale);
-    let names = lives.names_width(&canvas, wide * 0.8);
+    let names = timeline.names_width(&canvas, Type::Name, wide * MOST_NAMES);
     let types = if wide > 150.0 { TYPES } else { 0.0 };
-    let right = left + wide - types - RATES - BETWEEN;
-    let place = RowPlace {
+    let right = (left + wide - types - RATES - BETWEEN).max(left + names + 10.0);
+    let drawer = Drawer {
+        density: Density::Page,
         top: room.y / scale,
         left,
         axis: Axis {
             left: left + names,
-            right: right.max(left + names + 10.0),
-            span: lives.source.span(),
+            right,
+            span: timeline.span,
         },
-        rates: None,
-        talk: (types > 0.0).then_some((left + wide - types + BETWEEN, types - BETWEEN)),
-        is_live: true,
+        pitch,
+        rates: Some(right + RATES),
+        beside: (types > 0.0).then_some((left + wide - types + BETWEEN, types - BETWEEN)),
+        timeline,
     };
-    (place, scale)
+    (drawer, scale)
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 pub use crate::draw::figure::FigureOptions;
 pub use crate::draw::strip::Choice;
-use crate::draw::timeline::course::LifeLines;
+use crate::draw::timeline::Timeline;
 
 /// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct SequenceOptions {
     /// The figure, if requested; it replaces a strip.
     pub figure: Option<FigureOptions>,
     /// The lifelines of two compared missions, which replace the mission's own.
-    pub pairs: Option<LifeLines>,
+    pub pairs: Option<Timeline>,
     /// Links for the report: name and address.
     pub links: Vec<(String, String)>,
     /// A file to which reports are appended; all others are overwritten.

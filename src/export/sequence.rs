@@ -2,7 +2,7 @@
 
 pub use super::options::SequenceOptions;
 
-pub use crate::draw::timeline::course::LifeLines;
+pub use crate::draw::timeline::Timeline;
 pub use crate::draw::topic_timeline::Overview;
 
 use crate::base::notice::Notices;
@@ -80,7 +80,7 @@ pub struct Unfolded<'a> {
     /// The drawings of that view, if an output needs them.
     pub picture: Option<&'a dyn Drawings>,
     /// The lifelines of the mission, if an output needs them.
-    pub lives: Option<&'a LifeLines>,
+    pub lives: Option<&'a Timeline>,
     /// The smallest relative change of a rate that is reported.
     pub rate_change: f64,
 }

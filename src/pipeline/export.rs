@@ -14,8 +14,9 @@ use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, StripWidth, strip};
-use crate::draw::timeline::course::{self, Course, LifeLines};
-use crate::draw::timeline::lives::LivesFigure;
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::marks::marked;
+use crate::draw::timeline::rows::{known, of_topics};
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
@@ -210,11 +211,11 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         &drawing.view.topic_filter,
         job.reading.phases.is_named(),
     );
-    let lives = (is_drawn && !is_timeline).then(|| course::of_all(&source));
-    let course = lives
-        .as_ref()
-        .map(|lives| Course::new(lives, rows(drawing.page.size.h)));
-    drawing.page.course = course.unwrap_or_default();
+    let known = (is_drawn && !is_timeline).then(|| known(&source));
+    if let Some(known) = &known {
+        let most = rows(drawing.page.size.h);
+        drawing.page.timeline = Timeline::together(&source, known.clone(), most);
+    }
     let Composed {
         view,
         options,
@@ -246,7 +247,8 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     let opened_picture = opened
         .as_ref()
         .and_then(|view| unfolded::drawn((view, part.as_ref()), &drawing, &job.outputs));
-    let lives = lives.filter(|_| opened.is_some()).map(LifeLines::new);
+    let known = known.filter(|_| opened.is_some());
+    let lives = known.map(|known| Timeline::by_namespace(&source, known, false));
     let lives = job.sequence.pairs.clone().or(lives);
     let strip = match figure {
         Some(_) => None,
@@ -406,7 +408,7 @@ fn show_timeline(
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = timeline.overview();
     let data = chosen(job, &mission, &mut all);
-    let lives = LifeLines::new(LivesFigure::new(&source, true));
+    let lives = Timeline::by_namespace(&source, marked(&source, of_topics(&source)), false);
     // Each topic has its own row.
     let mut each = drawing.clone();
     each.view.group = Grouping::parse("none")?;

@@ -4,8 +4,9 @@ use super::Drawing;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::draw::picture::also::MOST_LISTED;
-use crate::draw::picture::{Course, Measured, PageOptions, Picture};
+use crate::draw::picture::{Measured, PageOptions, Picture};
 use crate::draw::scene::Scene;
+use crate::draw::timeline::Timeline;
 use crate::export::Output;
 use crate::export::sequence::{Drawings, UnionDrawings};
 use crate::mission::Mission;
@@ -79,7 +80,7 @@ pub(super) fn drawn<'a>(
         size: SCREEN,
         bare: true,
         width_mm: None,
-        course: Course::default(),
+        timeline: Timeline::default(),
         ..drawing.page.clone()
     };
     let measured = Measured::new(view, &drawing.style, &drawing.fonts, page);

@@ -3,9 +3,10 @@
 use super::page::FigureSheet;
 use crate::base::geometry::Size;
 use crate::draw::scene::Scene;
-use crate::draw::timeline::band::{self, Axis};
-use crate::draw::timeline::canvas::{PX_PER_MM, ink};
+use crate::draw::timeline::canvas::{PX_PER_MM, Type, ink};
+use crate::draw::timeline::drawer::{self, Axis};
 use crate::draw::timeline::notes::{flow, sentence};
+use crate::draw::timeline::phases;
 
 /// The space between the graph and the band in millimetres.
 const BELOW: f64 = 1.2;
@@ -25,13 +26,14 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
             span: source.span(),
         };
         y += BELOW;
-        band::band(&mut canvas, &axis, y, source.phases);
-        y += band::HEIGHT;
+        let labels = phases::numbered(source);
+        drawer::band(&mut canvas, &axis, y, &labels, Type::Head);
+        y += drawer::BAND.0;
         if width < WIDE {
-            y = band::axis(&mut canvas, &axis, y, false);
+            y = axis.draw(&mut canvas, y, false);
         }
         canvas.begin("words");
-        y = band::names(
+        y = phases::names(
             &mut canvas,
             source,
             width,

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use crate::base::name::{last_part, namespace};
 use crate::base::time::Span;
+use crate::draw::timeline::rows::{Row, SendingBar};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::tracks::{SendingBar, Track, TrackLife};
 use crate::mission::phases::configurations;
 
 /// Some nodes that are drawn as one.
@@ -22,9 +22,9 @@ pub(crate) struct NodeGroup {
 }
 
 /// The phases that each of these roles belongs to: those whose configuration contains it, otherwise the one in which it is first seen.
-pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTreeSet<usize>> {
+pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Row]) -> Vec<BTreeSet<usize>> {
     let found = configurations(source.mission, source.phases);
-    let of = |track: &Track| {
+    let of = |track: &Row| {
         let inside = (0..found.len()).filter(|k| found[*k].names.contains(&track.name));
         let mut inside: BTreeSet<usize> = inside.collect();
         if inside.is_empty() && !found.is_empty() {
@@ -40,8 +40,8 @@ pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTre
 const MOST_PARTS: usize = 8;
 
 /// The numbers of parts of namespaces that may distinguish groups, from all of them down to one.
-pub(crate) fn depths(tracks: &[Track]) -> impl Iterator<Item = usize> + use<> {
-    let parts = |t: &Track| namespace(&t.name).matches('/').count();
+pub(crate) fn depths(tracks: &[Row]) -> impl Iterator<Item = usize> + use<> {
+    let parts = |t: &Row| namespace(&t.name).matches('/').count();
     let deepest = tracks.iter().map(parts).max().unwrap_or(1).max(1);
     (1..=deepest.min(MOST_PARTS)).rev()
 }
@@ -53,7 +53,7 @@ pub(crate) fn cut(space: &str, depth: usize) -> &str {
 }
 
 /// The groups of some tracks, by the first `depth` parts of their namespace and by their phases.
-pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<NodeGroup> {
+pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Row], depth: usize) -> Vec<NodeGroup> {
     let phases = phases_of(source, tracks);
     let mut all: BTreeMap<(&str, BTreeSet<usize>), Vec<usize>> = BTreeMap::new();
     for (at, (track, phases)) in tracks.iter().zip(phases).enumerate() {
@@ -70,7 +70,7 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) 
 }
 
 /// A row per group: it exists while a member does, and sums the messages of all.
-pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<Track> {
+pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Row], depth: usize) -> Vec<Row> {
     groups(source, tracks, depth)
         .iter()
         .map(|group| match group.members[..] {
@@ -80,14 +80,10 @@ pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track], depth: usize) 
         .collect()
 }
 
-fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> Track {
+fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Row]) -> Row {
     let members = || group.members.iter().map(|at| &tracks[*at]);
-    let lives = members().flat_map(|t| &t.lives).map(|l| l.span).collect();
+    let lives = members().flat_map(|t| &t.lives).copied().collect();
     let whole = source.span();
-    let life = |span: Span| TrackLife {
-        span,
-        is_inferred: false,
-    };
     let sends = members().flat_map(|t| &t.bars).map(|b| b.span).collect();
     let bar = |span: Span| SendingBar { span, share: 1.0 };
     let first = members().next();
@@ -96,16 +92,16 @@ fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> T
     let name = first.map_or_else(String::new, |t| {
         format!("{space}/{} +{more}", last_part(&t.name))
     });
-    Track {
+    Row {
         name: Arc::from(name),
         nodes: members().flat_map(|t| &t.nodes).copied().collect(),
-        topic: None,
-        lives: Span::joined(lives, 0).into_iter().map(life).collect(),
+        lives: Span::joined(lives, 0),
         bars: Span::joined(sends, whole.nanos() / 83)
             .into_iter()
             .map(bar)
             .collect(),
         hz: members().filter_map(|t| t.hz).reduce(|a, b| a + b),
+        ..Row::default()
     }
 }
 

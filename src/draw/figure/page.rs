@@ -5,25 +5,26 @@ use super::{FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
-use crate::base::name::last_part;
 use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
-use crate::draw::timeline::band::{Axis, clock, names};
-use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
-use crate::draw::timeline::legend;
-use crate::draw::timeline::lives::{LivesFigure, RowPlace, WIDE};
-use crate::draw::timeline::notes::{TextRun, Unbroken, flow, sentence};
-use crate::draw::timeline::rows::FigureRow;
-use crate::draw::timeline::signs::sign;
+use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type};
+use crate::draw::timeline::drawer::{Axis, Density, Drawer};
+use crate::draw::timeline::marks::marked;
+use crate::draw::timeline::notes::flow;
+use crate::draw::timeline::phases::names;
+use crate::draw::timeline::rows::{Row, of_nodes, of_topics};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::tracks::Track;
+use crate::draw::timeline::{Timeline, legend};
 
 /// The shortest legible time axis, in millimetres.
 const SHORTEST_AXIS: f64 = 15.0;
 
-/// The most names of one kind that are reported in a note; the others are counted.
-pub(crate) const MOST_NAMED: usize = 60;
+/// The least width of a figure with a column of the topics that each row publishes and subscribes to, and the
+/// width of that column; in millimetres.
+const WIDE: (f64, f64) = (150.0, 68.0);
+/// The largest fraction of the width for the names of rows.
+const MOST_NAMES: f64 = 0.36;
 
 /// The parts of a page.
 pub(crate) struct FigureSheet<'a> {
@@ -65,56 +66,68 @@ impl<'a> FigureSheet<'a> {
     /// # Errors
     /// [`Error::Usage`] if nothing is left, or if it does not fit even as groups.
     pub(crate) fn lives(&self) -> Result<(Scene, Vec<String>)> {
+        let source = self.source;
         let by_topics = match self.options.rows {
             Some(rows) => rows == RowKind::Topics,
-            None => !self.source.knows_publishers(),
+            None => !source.knows_publishers(),
         };
-        let first = LivesFigure::new(self.source, by_topics);
-        if first.rows.is_empty() {
-            return Err(nothing(self.source));
+        let rows = if by_topics {
+            of_topics(source)
+        } else {
+            of_nodes(source)
+        };
+        if rows.is_empty() {
+            return Err(nothing(source));
         }
+        let timeline = |rows: Vec<Row>| Timeline::by_namespace(source, marked(source, rows), true);
+        let first = timeline(rows.clone());
         let is_grouped = self.options.rows == Some(RowKind::Groups);
         let (mut scene, mut remarks) = (None, Vec::new());
         if !is_grouped {
-            scene = self.lives_page(&first).filter(fits);
+            scene = self.lives_page(&first, by_topics).filter(fits);
         }
         if scene.is_none()
             && !by_topics
             && matches!(self.options.rows, None | Some(RowKind::Groups))
         {
-            scene = depths(&first.tracks).find_map(|depth| {
-                let tracks = super::groups::tracks(self.source, &first.tracks, depth);
-                let groups = LivesFigure::of(self.source, tracks);
-                self.lives_page(&groups).filter(fits)
+            scene = depths(&rows).find_map(|depth| {
+                let groups = super::groups::tracks(source, &rows, depth);
+                self.lives_page(&timeline(groups), by_topics).filter(fits)
             });
             if scene.is_some() && !is_grouped {
-                let many = words::count(first.tracks.len(), "node");
+                let many = words::count(rows.len(), "node");
                 remarks.push(format!(
                     "{many} do not fit on a page; rows are groups of nodes that start and stop together"
                 ));
             }
         }
-        let scene = scene.ok_or_else(|| self.too_high(&first))?;
+        let flag = if by_topics {
+            "--topic-filter"
+        } else {
+            "--ns-filter"
+        };
+        let scene = scene.ok_or_else(|| self.too_high(&first, &rows, flag))?;
         Ok((scene, remarks))
     }
 
-    /// The page of some lifelines, of any height; `None` if it is too narrow.
-    fn lives_page(&self, lives: &LivesFigure<'_>) -> Option<Scene> {
+    /// The page of some rows, of any height; `None` if it is too narrow.
+    fn lives_page(&self, timeline: &Timeline, by_topics: bool) -> Option<Scene> {
         let width = self.options.width_mm;
         let mut canvas = self.canvas();
-        let place = lives_place(lives, &canvas, width)?;
-        let mut y = lives.draw(&mut canvas, &place);
+        let drawer = lives_drawer(timeline, &canvas, width)?;
+        let mut y = drawer.ground(&mut canvas);
+        drawer.marks(&mut canvas);
         canvas.begin("words");
         if self.options.is_named || !self.options.is_bare {
             y = names(&mut canvas, self.source, width, y, None);
         }
-        y = flow(&mut canvas, width, y, &letter_items(lives));
+        y = flow(&mut canvas, width, y, &legend::letters(timeline));
         if !self.options.is_bare {
-            let notes = lives_notes(lives, place.talk.is_some());
+            let notes = legend::notes(self.source, timeline, drawer.beside.is_some());
             y = flow(&mut canvas, width, y, &notes);
-            y = flow(&mut canvas, width, y + 0.15, &legend::items(lives));
+            y = flow(&mut canvas, width, y + 0.15, &legend::signs(timeline));
         }
-        let what = if lives.is_of_topics() {
+        let what = if by_topics {
             "Lifelines of topics"
         } else {
             "Lifelines"
@@ -123,27 +136,22 @@ impl<'a> FigureSheet<'a> {
     }
 
     /// The error for a figure that does not fit, with a namespace that would fit.
-    fn too_high(&self, lives: &LivesFigure<'_>) -> Error {
+    fn too_high(&self, timeline: &Timeline, rows: &[Row], flag: &str) -> Error {
         let canvas = self.canvas();
         let width = self.options.width_mm;
-        if lives_place(lives, &canvas, width).is_none() {
+        if lives_drawer(timeline, &canvas, width).is_none() {
             let wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
-            let enough = wider.filter(|w| lives_place(lives, &canvas, *w).is_some());
+            let enough = wider.filter(|w| lives_drawer(timeline, &canvas, *w).is_some());
             let enough = enough.take(1).next().unwrap_or(88.0);
             return Error::usage(
                 format!("{width} mm leave no space for the time axis beside the names"),
                 format!("use `--width {enough}mm`"),
             );
         }
-        let high = lives.height(&canvas);
+        let high = timeline.height(self.sizes, self.sizes.pitch());
         let most = cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch());
-        let flag = if lives.is_of_topics() {
-            "--topic-filter"
-        } else {
-            "--ns-filter"
-        };
-        let hint = filter_that_fits(&lives.tracks, most, flag, "row");
-        let rows = words::count(lives.rows.len(), "row");
+        let hint = filter_that_fits(rows, most, flag, "row");
+        let rows = words::count(timeline.rows.len(), "row");
         Error::usage(
             format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
             hint,
@@ -152,7 +160,7 @@ impl<'a> FigureSheet<'a> {
 }
 
 /// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
-pub(crate) fn filter_that_fits(tracks: &[Track], most: usize, flag: &str, word: &str) -> String {
+pub(crate) fn filter_that_fits(tracks: &[Row], most: usize, flag: &str, word: &str) -> String {
     let mut spaces: Vec<(&str, usize)> = Vec::new();
     for top in tracks.iter().filter_map(|t| top_space(&t.name)) {
         match spaces.iter_mut().find(|(name, _)| *name == top) {
@@ -195,67 +203,26 @@ pub(crate) fn fits(scene: &Scene) -> bool {
     scene.size.h <= MOST_HEIGHT * PX_PER_MM
 }
 
-/// The columns of a page of lifelines; `None` if too little is left for the time axis.
-fn lives_place(lives: &LivesFigure<'_>, canvas: &PaperCanvas<'_>, width: f64) -> Option<RowPlace> {
-    let names = lives.names_width(canvas, width.min(WIDE.0));
-    let talk = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
-    let right = width - talk - 5.2;
+/// A page of rows over time; `None` if too little is left for the time axis.
+fn lives_drawer(timeline: &Timeline, canvas: &PaperCanvas<'_>, width: f64) -> Option<Drawer> {
+    let most = width.min(WIDE.0) * MOST_NAMES;
+    let names = timeline.names_width(canvas, Type::Name, most);
+    let beside = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
+    let right = width - beside - 5.2;
     let left = names.max(canvas.width("min:s", Type::Small) + 1.5);
-    let top = if lives.source.phases.is_empty() {
-        canvas.sizes.line()
-    } else {
-        0.0
-    };
-    (right - left >= SHORTEST_AXIS).then_some(RowPlace {
-        top,
+    let has_band = !timeline.phases.is_empty();
+    (right - left >= SHORTEST_AXIS).then(|| Drawer {
+        timeline: timeline.clone(),
+        density: Density::Paper,
+        top: if has_band { 0.0 } else { canvas.sizes.line() },
         left: 0.0,
         axis: Axis {
             left,
             right,
-            span: lives.source.span(),
+            span: timeline.span,
         },
+        pitch: canvas.sizes.pitch(),
         rates: Some(right + 5.1),
-        talk: (width >= WIDE.0).then_some((width - WIDE.1, WIDE.1)),
-        is_live: false,
+        beside: (width >= WIDE.0).then_some((width - WIDE.1, WIDE.1)),
     })
-}
-
-/// The letters explained, in order of time.
-fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
-    let start = lives.source.span().start;
-    let item = |(k, letter): (usize, &crate::draw::timeline::marks::Letter)| {
-        let at = clock(letter.mark.at.since(start));
-        vec![
-            TextRun::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),
-            TextRun::Words(Type::Small, ink::TEXT, format!("{at} {}", letter.text)),
-        ]
-    };
-    lives.marks.letters.iter().enumerate().map(item).collect()
-}
-
-/// The notes below the legend: the members of collapsed rows if no column lists them, and the number of
-/// events without a letter.
-fn lives_notes(lives: &LivesFigure<'_>, is_reported: bool) -> Vec<Unbroken> {
-    let mut items = Vec::new();
-    for row in lives.rows.iter().filter(|_| !is_reported) {
-        if let FigureRow::Folded(all, space) = row {
-            let names: Vec<&str> = all
-                .iter()
-                .map(|at| last_part(&lives.tracks[*at].name))
-                .collect();
-            let text = format!(
-                "Throughout in {space}: {}.",
-                words::some_of(&names, MOST_NAMED)
-            );
-            items.push(sentence(ink::QUIET, text));
-        }
-    }
-    if lives.marks.unlettered > 0 {
-        let text = format!(
-            "{} without a letter.",
-            words::count(lives.marks.unlettered, "smaller change")
-        );
-        items.push(sentence(ink::QUIET, text));
-    }
-    items
 }

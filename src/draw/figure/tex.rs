@@ -2,7 +2,8 @@
 
 use super::{Figure, FigureKind, FigureOptions};
 use crate::base::words;
-use crate::draw::timeline::band::{clock, title};
+use crate::draw::timeline::drawer::clock;
+use crate::draw::timeline::phases::title;
 use crate::draw::timeline::source::FigureSource;
 
 /// The caption: the content, the phases with their times, bag and length, the legend in words.

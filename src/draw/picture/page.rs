@@ -1,8 +1,9 @@
 //! The page: its parts for title, graph, legend and timeline, and the scale of the graph in its part.
 
-use super::{PageOptions, timeline};
+use super::PageOptions;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::style::Style;
+use crate::draw::timeline::below::BelowSizes;
 
 /// The page size for which lengths of title, legend and timeline are given.
 const STANDARD: Size = Size::new(1280.0, 720.0);
@@ -51,7 +52,7 @@ impl PageFrame {
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
             if has_timeline {
-                timeline = timeline::height(style, options, unit);
+                timeline = below(style, options).height(&options.timeline);
             }
         }
         let margin = (style.page.margin * unit)
@@ -88,6 +89,15 @@ impl PageFrame {
             pen: libm::sqrt(scale),
             origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
         }
+    }
+}
+
+/// The sizes of the timeline on a page.
+pub(crate) fn below<'a>(style: &'a Style, options: &PageOptions) -> BelowSizes<'a> {
+    BelowSizes {
+        style,
+        unit: unit(options),
+        is_paper: options.width_mm.is_some(),
     }
 }
 

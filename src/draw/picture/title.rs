@@ -132,7 +132,7 @@ impl<'a> Title<'a> {
             span(view.frames.first()).start,
             span(view.frames.last()).end,
         );
-        let at = |stamp: crate::base::time::Stamp| words::moment(whole(stamp.since(start)));
+        let at = |stamp: crate::base::time::Stamp| words::moment_rounded(stamp.since(start));
         let mut parts = vec![self.name.clone()];
         let time = if view.compares {
             let is_alone = view.frames.len() > 1 && frame.index == 0;
@@ -212,16 +212,3 @@ const SMALLER: [f64; 4] = [1.0, 0.9, 0.8, 0.7];
 
 /// The titles of the windows of a comparison.
 pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];
-
-/// The time without fractions if it is a second or more, as on a clock.
-pub(crate) fn whole(nanos: i64) -> i64 {
-    const MILLI: i64 = 1_000_000;
-    let second = 1000 * MILLI;
-    // A window that ends 1 ns after the last message is shown as ending at it.
-    let rounded = nanos.saturating_add(MILLI / 2) / MILLI * MILLI;
-    if rounded.abs() > 20 * second {
-        (rounded.saturating_add(second / 2)) / second * second
-    } else {
-        rounded
-    }
-}

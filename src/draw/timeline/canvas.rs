@@ -2,8 +2,8 @@
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::words::visible;
-use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text, polygon};
-use crate::draw::style::Color;
+use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text, polygon};
+use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::mission::EventId;
 
@@ -52,6 +52,16 @@ pub(crate) enum Type {
     Small,
     /// Everything else, in bold.
     Strong,
+}
+
+impl Type {
+    /// The same size in bold.
+    pub(crate) fn bold(self) -> Self {
+        match self {
+            Self::Name | Self::Head => Self::Head,
+            Self::Small | Self::Strong => Self::Strong,
+        }
+    }
 }
 
 /// The sizes of type in points.
@@ -108,8 +118,8 @@ impl<'a> PaperCanvas<'a> {
     /// Begins the group of a mark: its class, and the events of the log that it shows. The log's sentence about
     /// them is its title.
     pub(crate) fn begin_mark(&mut self, class: &str, events: &[EventId], title: String) {
-        let id = format!("{class}-{}", self.groups.len());
-        self.open(&id, class, event_data(events));
+        let id = format!("mark-{}", self.groups.len());
+        self.open(&id, &format!("mark {class}"), event_data(events));
         if let Some(group) = self.group() {
             group.title = title;
         }
@@ -292,6 +302,45 @@ impl<'a> PaperCanvas<'a> {
     pub(crate) fn into_groups(self) -> Vec<Group> {
         let drawn = self.groups.into_iter();
         drawn.filter(|g| !g.pieces.is_empty()).collect()
+    }
+
+    /// The groups in the colours of a style, for a page on a screen.
+    pub(crate) fn into_styled(self, style: &Style) -> Vec<Group> {
+        let band = style.timeline.future.towards(style.legend.fill, 0.5);
+        let table = [
+            (ink::PAPER, style.page.background),
+            (ink::TEXT, style.page.text),
+            (ink::QUIET, style.timeline.text),
+            // Darker than a bar of messages that are past, to be distinguished from pale ones.
+            (
+                ink::BAR,
+                style.timeline.past.towards(style.timeline.text, 0.4),
+            ),
+            (ink::FOLDED, style.timeline.future),
+            (ink::LINE, style.timeline.axis),
+            (ink::RULE, style.timeline.axis),
+            (ink::TINT, style.cluster.fill),
+            (ink::BAND[0], style.timeline.future),
+            (ink::BAND[1], band),
+            (ink::ADDED, style.added.color),
+            (ink::REMOVED, style.removed.color),
+            (ink::CHANGED, style.changed.color),
+        ];
+        let styled = |of: &mut Color| {
+            let found = table.iter().find(|(ink, _)| ink == of);
+            *of = found.map_or(*of, |(_, color)| *color);
+        };
+        let mut groups = self.into_groups();
+        for piece in groups.iter_mut().flat_map(|group| &mut group.pieces) {
+            match piece {
+                Piece::Shape(Shape { fill, stroke, .. }) => {
+                    styled(fill);
+                    styled(&mut stroke.color);
+                }
+                Piece::Text(text) => styled(&mut text.color),
+            }
+        }
+        groups
     }
 
     /// The page as a scene, `size` in millimetres; its width is exact.

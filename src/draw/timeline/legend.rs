@@ -1,61 +1,122 @@
-//! The legend of a figure of lifelines, with only the signs that are drawn.
+//! The words below rows on paper: the letters explained, notes, and the legend with only the signs that are drawn.
 
+use super::Timeline;
 use super::canvas::{PaperCanvas, Type, ink};
-use super::lives::LivesFigure;
+use super::drawer::{clock, letter, put};
 use super::marks::Sign;
-use super::notes::{InlineSign, TextRun, Unbroken};
-use super::rows::FigureRow;
-use super::signs::{cross, dot, start};
+use super::notes::{InlineSign, TextRun, Unbroken, sentence};
+use super::rows::{Level, Row};
+use super::source::FigureSource;
 use crate::base::geometry::{Point, Rect};
+use crate::base::name::last_part;
+use crate::base::words;
 use crate::draw::scene::Stroke;
+use crate::mission::event_log::Kind;
 
-/// Every sign that `lives` draws, with its label.
-pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
-    let open: Vec<_> = lives
+/// The most names of one kind that are reported in a note; the others are counted.
+pub(crate) const MOST_NAMED: usize = 60;
+/// The width of a bar, a line or an arrow in the legend, in millimetres.
+const LONG: f64 = 3.2;
+
+/// The letters explained, in order of time.
+pub(crate) fn letters(timeline: &Timeline) -> Vec<Unbroken> {
+    let marks = timeline.marks().into_iter().map(|(_, mark)| mark);
+    let letters = marks.filter(|mark| mark.sign == Sign::Letter).enumerate();
+    let item = |(k, mark): (usize, &super::marks::RowMark)| {
+        let at = clock(mark.at.since(timeline.span.start));
+        vec![
+            TextRun::Words(Type::Strong, ink::CHANGED, format!("{} ", letter(k))),
+            TextRun::Words(Type::Small, ink::TEXT, format!("{at} {}", mark.text)),
+        ]
+    };
+    letters.map(item).collect()
+}
+
+/// The notes: the members of collapsed rows unless they are beside them, and the number of events without a letter.
+pub(crate) fn notes(
+    source: &FigureSource<'_>,
+    timeline: &Timeline,
+    is_beside: bool,
+) -> Vec<Unbroken> {
+    let mut items = Vec::new();
+    let mut space = "";
+    for row in timeline.rows.iter().filter(|_| !is_beside) {
+        if row.level == Level::Title {
+            space = &row.name;
+        }
+        if !row.folded.is_empty() {
+            let names: Vec<&str> = row.folded.iter().map(|name| last_part(name)).collect();
+            let names = words::some_of(&names, MOST_NAMED);
+            items.push(sentence(
+                ink::QUIET,
+                format!("Throughout in {space}: {names}."),
+            ));
+        }
+    }
+    let has_words = |id| {
+        let event = source.mission.log.events.get(id);
+        event.is_some_and(|e| !matches!(e.kind, Kind::Appeared | Kind::Vanished))
+    };
+    let marks = timeline.rows.iter().flat_map(|row| &row.marks);
+    let dots = marks.filter(|mark| mark.sign == Sign::Dot);
+    let many = dots
+        .filter(|mark| mark.events.iter().copied().any(has_words))
+        .count();
+    if many > 0 {
+        let many = words::count(many, "smaller change");
+        items.push(sentence(ink::QUIET, format!("{many} without a letter.")));
+    }
+    items
+}
+
+/// Every sign that is drawn, with its label.
+pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
+    let open: Vec<&Row> = timeline
         .rows
         .iter()
-        .filter_map(|row| match row {
-            FigureRow::Track(at, ..) => lives.tracks.get(*at),
-            _ => None,
-        })
+        .filter(|r| r.folded.is_empty())
         .collect();
-    let all_lives = || open.iter().flat_map(|t| &t.lives);
-    let silent = open.iter().any(|t| {
-        let busy: i64 = t.bars.iter().map(|b| b.span.nanos()).sum();
-        let alive: i64 = t.lives.iter().map(|l| l.span.nanos()).sum();
+    let is_silent = |row: &&Row| {
+        let busy: i64 = row.bars.iter().map(|b| b.span.nanos()).sum();
+        let alive: i64 = row.lives.iter().map(|life| life.nanos()).sum();
         alive - busy > alive / 50
-    });
-    let has = |sign| lives.marks.signs.iter().any(|m| m.sign == sign);
+    };
+    let marks = || timeline.rows.iter().flat_map(|row| &row.marks);
+    let has = |sign| marks().any(|mark| mark.sign == sign);
     let all: [(bool, InlineSign, &str); 7] = [
         (
-            open.iter().any(|t| !t.bars.is_empty()),
-            (3.2, bar),
+            open.iter().any(|row| !row.bars.is_empty()),
+            (LONG, bar),
             "publishes (height: share of the row’s maximum)",
         ),
-        (silent, (3.2, |c, x, y| line(c, x, y, &[])), "silent"),
         (
-            all_lives().any(|l| l.is_inferred),
-            (3.2, |c, x, y| line(c, x, y, &[0.55, 0.5])),
+            open.iter().any(is_silent),
+            (LONG, |c, x, y| line(c, x, y, &[])),
+            "silent",
+        ),
+        (
+            open.iter().any(|row| row.is_inferred),
+            (LONG, |c, x, y| line(c, x, y, &[0.55, 0.5])),
             "inferred",
         ),
         (
             has(Sign::Start),
-            (0.6, |c, x, y| start(c, x + 0.3, y)),
+            (0.6, |c, x, y| sign(c, Sign::Start, x + 0.3, y)),
             "starts",
         ),
         (
             has(Sign::End),
-            (1.2, |c, x, y| cross(c, x + 0.6, y)),
+            (1.2, |c, x, y| sign(c, Sign::End, x + 0.6, y)),
             "ends",
         ),
         (
-            !lives.marks.handovers.is_empty(),
-            (3.2, arrow),
+            marks().any(|mark| timeline.giver(mark).is_some()),
+            (LONG, arrow),
             "topic is taken over",
         ),
         (
             has(Sign::Dot),
-            (1.0, |c, x, y| dot(c, x + 0.5, y)),
+            (1.0, |c, x, y| sign(c, Sign::Dot, x + 0.5, y)),
             "other change",
         ),
     ];
@@ -67,6 +128,11 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     drawn.map(item).collect()
 }
 
+fn sign(canvas: &mut PaperCanvas<'_>, sign: Sign, x: f64, y: f64) {
+    let pitch = canvas.sizes.pitch();
+    put(canvas, sign, Point::new(x, y), pitch);
+}
+
 fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.fill(Rect::new(x, y - 1.0, 1.6, 2.0), ink::BAR);
     canvas.fill(Rect::new(x + 1.6, y - 0.4, 1.6, 0.8), ink::BAR);
@@ -74,12 +140,12 @@ fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
 
 fn line(canvas: &mut PaperCanvas<'_>, x: f64, y: f64, dash: &[f64]) {
     let stroke = Stroke::dashed(ink::LINE, 0.28, dash);
-    canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
+    canvas.line(Point::new(x, y), Point::new(x + LONG, y), &stroke);
 }
 
 fn arrow(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke::solid(ink::CHANGED, 0.3);
-    let (from, tip) = (Point::new(x + 0.55, y), Point::new(x + 3.2, y));
+    let (from, tip) = (Point::new(x + 0.55, y), Point::new(x + LONG, y));
     canvas.line(from, Point::new(x + 2.2, y), &stroke);
     canvas.disc(from, 0.55, ink::CHANGED, &Stroke::default());
     canvas.head(from, tip, 1.3, ink::CHANGED);

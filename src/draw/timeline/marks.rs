@@ -1,17 +1,17 @@
-//! The marks of a figure: events of the log on the rows of their elements. Only events of the log are marked,
-//! and every headline of an element that has a row is marked there.
+//! The marks of rows: events of the log on the rows of their elements. Only events of the log are marked, and every
+//! headline of an element that has a row is marked there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::rows::{Row, relative};
 use super::source::FigureSource;
-use super::tracks::Track;
-use crate::base::name::{last_part, namespace};
+use crate::base::name::last_part;
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::graph::{Element, NodeId, TopicId};
+use crate::graph::{Element, NodeId};
 use crate::mission::EventId;
-use crate::mission::event_log::{Detail, Event, Kind};
-use crate::mission::events::predicate;
+use crate::mission::event_log::{Detail, Event, Kind, Parts};
+use crate::mission::events::{predicate, sentence};
 
 /// The most letters, and the most arrows: more crowd the rows. Other events are marked by a small circle.
 const MOST: (usize, usize) = (10, 6);
@@ -25,204 +25,144 @@ pub(crate) enum Sign {
     End,
     /// A small circle: anything else.
     Dot,
+    /// A letter, explained below the rows. Without space for words, a small circle.
+    Letter,
+    /// An arrow from another row: it takes over a topic. Without space for words, a small circle.
+    Handover,
 }
 
 /// A mark on a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowMark {
-    /// The row: an index into the tracks.
-    pub(crate) track: usize,
     pub(crate) at: Stamp,
     pub(crate) sign: Sign,
-    pub(crate) event: EventId,
-}
-
-impl RowMark {
-    /// The same on the row of its track; `None` if it has no row.
-    pub(crate) fn on(&self, row: impl Fn(usize) -> Option<usize>) -> Option<Self> {
-        let track = row(self.track)?;
-        Some(Self {
-            track,
-            ..self.clone()
-        })
-    }
-}
-
-/// An event with a letter, explained below the rows.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Letter {
-    pub(crate) mark: RowMark,
-    /// Its text, after its time: `planner: plan 1 → 0.2 Hz`.
+    /// The events that it shows.
+    pub(crate) events: Vec<EventId>,
+    /// The log's sentence about them.
+    pub(crate) title: String,
+    /// The words of a letter, after its time: `planner: plan 1 → 0.2 Hz`; of an arrow, the last part of the topic.
     pub(crate) text: String,
+    /// The node from which the topic of an arrow is taken over.
+    pub(crate) from: Option<NodeId>,
 }
 
-/// A topic that another row publishes from a time on.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Handover {
-    pub(crate) at: Stamp,
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    /// The topic's last part.
-    pub(crate) topic: String,
-    pub(crate) event: EventId,
+/// The log with the sentences of its events.
+pub(super) struct Sentences<'a> {
+    source: &'a FigureSource<'a>,
+    parts: Parts,
 }
 
-impl Handover {
-    /// The same between the rows of its tracks; `None` if they have none, or share one.
-    pub(crate) fn on(&self, row: impl Fn(usize) -> Option<usize>) -> Option<Self> {
-        let (from, to) = (row(self.from)?, row(self.to)?);
-        (from != to).then(|| Self {
-            from,
-            to,
-            ..self.clone()
-        })
+impl<'a> Sentences<'a> {
+    pub(super) fn new(source: &'a FigureSource<'a>) -> Self {
+        let parts = source.mission.log.all_parts();
+        Self { source, parts }
     }
-}
 
-/// All marks of some rows.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Marks {
-    /// Ticks, crosses and small circles, in order of the log.
-    pub(crate) signs: Vec<RowMark>,
-    /// Letters, in order of time.
-    pub(crate) letters: Vec<Letter>,
-    pub(crate) handovers: Vec<Handover>,
-    /// The number of small circles that would have a letter or an arrow if there were fewer.
-    pub(crate) unlettered: usize,
-}
-
-impl Marks {
-    /// The marks of these rows: nodes, or topics.
-    pub(crate) fn new(source: &FigureSource<'_>, tracks: &[Track]) -> Self {
-        let rows = Rows::new(tracks);
-        let mut marks = Self::default();
-        let mut circles: Vec<RowMark> = Vec::new();
-        for (id, event) in source.mission.log.events.with_ids() {
-            if event.quiet {
-                continue;
-            }
-            let mark = |track, at, sign| RowMark {
-                track,
-                at,
-                sign,
-                event: id,
-            };
-            if let (Some(from), Some(to)) = rows.hands(source, event)
-                && marks.handovers.len() < MOST.1
-                && from != to
-            {
-                marks.handovers.push(Handover {
-                    at: event.time,
-                    from,
-                    to,
-                    topic: last_part(source.name(event.what)).to_owned(),
-                    event: id,
-                });
-                continue;
-            }
-            if let Some(track) = rows.of(source, event) {
-                match event.kind {
-                    Kind::Started => marks.signs.push(mark(track, event.time, Sign::Start)),
-                    Kind::Stopped => marks.signs.push(mark(track, event.time, Sign::End)),
-                    Kind::Appeared if rows.is_row(event.what) => {
-                        marks.signs.push(mark(track, event.time, Sign::Start));
-                    }
-                    Kind::Vanished if rows.is_row(event.what) => {
-                        marks.signs.push(mark(track, event.time, Sign::End));
-                    }
-                    Kind::Restarted => {
-                        let back = event.until.unwrap_or(event.time);
-                        marks.signs.push(mark(track, event.time, Sign::End));
-                        marks.signs.push(mark(track, back, Sign::Start));
-                        circles.push(mark(track, event.time, Sign::Dot));
-                    }
-                    _ => circles.push(mark(track, event.time, Sign::Dot)),
-                }
-            }
+    pub(super) fn mark(&self, id: EventId, event: &Event, sign: Sign) -> RowMark {
+        RowMark {
+            at: event.time,
+            sign,
+            events: vec![id],
+            title: sentence(self.source.mission, &self.parts, id, event),
+            text: String::new(),
+            from: None,
         }
-        marks.letter(source, tracks, circles);
-        marks
     }
+}
 
-    /// Gives letters to the most important events other than ticks and crosses, in order of time; a restart
-    /// without a letter has its cross and tick.
-    fn letter(&mut self, source: &FigureSource<'_>, tracks: &[Track], circles: Vec<RowMark>) {
-        let events = &source.mission.log.events;
-        let whole = source.span().nanos().max(1) as f64;
-        let weight = |mark: &RowMark| events.get(mark.event).map_or(0.0, |e| weight(e, whole));
-        let mut order: Vec<usize> = (0..circles.len()).collect();
-        order.sort_by(|a, b| {
-            weight(&circles[*b])
-                .total_cmp(&weight(&circles[*a]))
-                .then(a.cmp(b))
-        });
-        // A circle suffices for a connection: labels for all of them would fill the page.
-        let has_words = |e: &Event| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
-        let is_lettered = |at: &usize| events.get(circles[*at].event).is_some_and(has_words);
-        let lettered = order.into_iter().filter(is_lettered).take(MOST.0);
-        let lettered: BTreeSet<usize> = lettered.collect();
-        for (at, mark) in circles.into_iter().enumerate() {
-            let Some(event) = events.get(mark.event) else {
-                continue;
-            };
-            if lettered.contains(&at) {
-                let text = text(source, event, &tracks[mark.track]);
-                self.letters.push(Letter { mark, text });
-            } else {
-                self.unlettered += usize::from(has_words(event));
-                if event.kind != Kind::Restarted {
-                    self.signs.push(mark);
-                }
-            }
+/// The rows with the marks of their events.
+pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> {
+    let places = Places::new(&rows);
+    let sentences = Sentences::new(source);
+    let mut arrows = 0;
+    // Events that get a letter if they are important enough.
+    let mut others: Vec<(usize, RowMark, &Event)> = Vec::new();
+    for (id, event) in source.mission.log.events.with_ids() {
+        if event.quiet {
+            continue;
         }
-        self.letters
-            .sort_by_key(|l| (l.mark.at, l.mark.track, l.mark.event));
-    }
-
-    /// The same with small circles instead of letters, and without arrows: for rows without space for words.
-    pub(crate) fn plain(mut self) -> Self {
-        let letters = std::mem::take(&mut self.letters).into_iter();
-        let is_restart = |mark: &RowMark| self.signs.iter().any(|s| s.event == mark.event);
-        let dots: Vec<RowMark> = letters.map(|l| l.mark).filter(|m| !is_restart(m)).collect();
-        self.signs.extend(dots);
-        for hand in std::mem::take(&mut self.handovers) {
-            self.signs.push(RowMark {
-                track: hand.to,
-                at: hand.at,
-                sign: Sign::Dot,
-                event: hand.event,
+        let mark = |sign| sentences.mark(id, event, sign);
+        if let [Some((from, _)), Some((_, to))] = places.hands(source, event)
+            && arrows < MOST.1
+            && places.nodes(from) != Some(to)
+        {
+            arrows += 1;
+            rows[to].marks.push(RowMark {
+                text: last_part(source.name(event.what)).to_owned(),
+                from: Some(from),
+                ..mark(Sign::Handover)
             });
+            continue;
         }
-        self.unlettered = 0;
+        let Some(row) = places.of(source, event) else {
+            continue;
+        };
+        let is_row = places.0.contains_key(&event.what);
+        match event.kind {
+            Kind::Started => rows[row].marks.push(mark(Sign::Start)),
+            Kind::Stopped => rows[row].marks.push(mark(Sign::End)),
+            Kind::Appeared if is_row => rows[row].marks.push(mark(Sign::Start)),
+            Kind::Vanished if is_row => rows[row].marks.push(mark(Sign::End)),
+            Kind::Restarted => {
+                let at = event.until.unwrap_or(event.time);
+                let back = mark(Sign::Start);
+                rows[row].marks.push(mark(Sign::End));
+                rows[row].marks.push(RowMark { at, ..back });
+                others.push((row, mark(Sign::Letter), event));
+            }
+            _ => others.push((row, mark(Sign::Dot), event)),
+        }
+    }
+    letter(source, &mut rows, others);
+    rows
+}
+
+/// Gives letters to the most important events other than ticks and crosses; a restart without a letter has its cross
+/// and tick.
+fn letter(source: &FigureSource<'_>, rows: &mut [Row], others: Vec<(usize, RowMark, &Event)>) {
+    let whole = source.span().nanos().max(1) as f64;
+    // A circle suffices for a connection: labels for all of them would fill the page.
+    let has_words = |e: &Event| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
+    let mut order: Vec<usize> = (0..others.len()).collect();
+    let weight = |at: &usize| weight(others[*at].2, whole);
+    order.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.cmp(b)));
+    let lettered = order.into_iter().filter(|at| has_words(others[*at].2));
+    let lettered: BTreeSet<usize> = lettered.take(MOST.0).collect();
+    for (at, (row, mut mark, event)) in others.into_iter().enumerate() {
+        if lettered.contains(&at) {
+            mark.sign = Sign::Letter;
+            mark.text = text(source, event, &rows[row]);
+        } else if mark.sign == Sign::Letter {
+            continue;
+        }
+        rows[row].marks.push(mark);
+    }
+}
+
+impl Row {
+    /// The same with small circles instead of letters and arrows, for rows without space for words.
+    pub(crate) fn plain(mut self) -> Self {
+        let turns: BTreeSet<EventId> = self.turns().flat_map(|mark| mark.events.clone()).collect();
+        let is_restart = |mark: &RowMark| mark.events.iter().any(|id| turns.contains(id));
+        self.marks
+            .retain(|mark| mark.sign != Sign::Letter || !is_restart(mark));
+        for mark in &mut self.marks {
+            if matches!(mark.sign, Sign::Letter | Sign::Handover) {
+                mark.sign = Sign::Dot;
+            }
+        }
         self
     }
 
-    /// The events marked on some rows, sorted.
-    pub(crate) fn events(&self, tracks: &[usize]) -> Vec<EventId> {
-        let signs = self.signs.iter().map(|s| (s.track, s.event));
-        let letters = self.letters.iter().map(|l| (l.mark.track, l.mark.event));
-        let hands = self.handovers.iter();
-        let hands = hands.flat_map(|h| [(h.from, h.event), (h.to, h.event)]);
-        let all = signs.chain(letters).chain(hands);
-        let own = all.filter(|(track, _)| tracks.contains(track));
-        let own: BTreeSet<EventId> = own.map(|(_, event)| event).collect();
-        own.into_iter().collect()
+    /// The ticks and crosses.
+    fn turns(&self) -> impl Iterator<Item = &RowMark> {
+        let marks = self.marks.iter();
+        marks.filter(|mark| matches!(mark.sign, Sign::Start | Sign::End))
     }
 
-    /// The rows with any mark other than ticks, which collapsed rows can also have.
-    pub(crate) fn marked(&self) -> BTreeSet<usize> {
-        let letters = self.letters.iter().map(|l| l.mark.track);
-        let hands = self.handovers.iter().flat_map(|h| [h.from, h.to]);
-        let signs = self.signs.iter().filter(|s| s.sign != Sign::Start);
-        let signs = signs.map(|s| s.track);
-        letters.chain(hands).chain(signs).collect()
-    }
-
-    /// Whether a row ends for good: its last tick or cross is a cross.
-    pub(crate) fn ends(&self, track: usize) -> bool {
-        let own = self.signs.iter().filter(|s| s.track == track);
-        let turns = own.filter(|s| s.sign != Sign::Dot);
-        let last = turns.max_by_key(|s| (s.at, s.sign == Sign::Start));
+    /// Whether it ends for good: its last tick or cross is a cross.
+    pub(crate) fn is_ending(&self) -> bool {
+        let last = self.turns().max_by_key(|s| (s.at, s.sign == Sign::Start));
         last.is_some_and(|s| s.sign == Sign::End)
     }
 }
@@ -242,97 +182,81 @@ fn weight(event: &Event, whole: f64) -> f64 {
 }
 
 /// The text of a letter, with the name as short as the row allows, and the log's words.
-fn text(source: &FigureSource<'_>, event: &Event, track: &Track) -> String {
+fn text(source: &FigureSource<'_>, event: &Event, row: &Row) -> String {
     let said = predicate(source.mission, &[], event);
     let (node, topic) = source.mission.elements.ends(event.what);
-    let row = words::visible(last_part(&track.name)).into_owned();
-    let topic = topic.filter(|topic| track.topic != Some(*topic));
-    match topic.map(|topic| relative(source.topic(topic), &track.name)) {
-        Some(topic) => format!("{row}: {} {said}", words::visible(topic)),
-        None if node.is_some() && track.topic.is_some() => {
+    let name = words::visible(last_part(&row.name)).into_owned();
+    let topic = topic.filter(|topic| row.topic != Some(*topic));
+    match topic.map(|topic| relative(source.topic(topic), &row.name)) {
+        Some(topic) => format!("{name}: {} {said}", words::visible(topic)),
+        None if node.is_some() && row.topic.is_some() => {
             let node = node.and_then(|id| source.mission.elements.nodes.get(id));
             let node = node.map_or("", |n| last_part(n.name.as_str()));
-            format!("{row}: {} {said}", words::visible(node))
+            format!("{name}: {} {said}", words::visible(node))
         }
-        None => format!("{row} {said}"),
+        None => format!("{name} {said}"),
     }
-}
-
-/// A topic's name inside the namespace of a node.
-pub(crate) fn relative<'t>(topic: &'t str, node: &str) -> &'t str {
-    let space = namespace(node);
-    let inside = if space == "/" {
-        topic.strip_prefix('/')
-    } else {
-        topic.strip_prefix(space).and_then(|t| t.strip_prefix('/'))
-    };
-    inside.unwrap_or_else(|| topic.strip_prefix('/').unwrap_or(topic))
 }
 
 /// The rows of nodes and topics.
-struct Rows {
-    nodes: BTreeMap<NodeId, usize>,
-    topics: BTreeMap<TopicId, usize>,
-}
+struct Places(BTreeMap<Element, usize>);
 
-impl Rows {
-    fn new(tracks: &[Track]) -> Self {
-        let tracks = || tracks.iter().enumerate();
-        let nodes = tracks().flat_map(|(at, track)| track.nodes.iter().map(move |id| (*id, at)));
-        let topics = tracks().filter_map(|(at, track)| Some((track.topic?, at)));
-        Self {
-            nodes: nodes.collect(),
-            topics: topics.collect(),
-        }
+impl Places {
+    fn new(rows: &[Row]) -> Self {
+        let places = rows.iter().enumerate().flat_map(|(at, row)| {
+            let nodes = row.nodes.iter().map(|id| Element::Node(*id));
+            let all = nodes.chain(row.topic.map(Element::Topic));
+            all.map(move |what| (what, at))
+        });
+        Self(places.collect())
     }
 
-    fn is_row(&self, what: Element) -> bool {
-        match what {
-            Element::Node(id) => self.nodes.contains_key(&id),
-            Element::Topic(id) => self.topics.contains_key(&id),
-            Element::Publish(_) | Element::Subscribe(_) => false,
-        }
+    fn nodes(&self, id: NodeId) -> Option<usize> {
+        self.0.get(&Element::Node(id)).copied()
     }
 
-    /// The rows from which and to which a topic is handed over.
-    fn hands(&self, source: &FigureSource<'_>, event: &Event) -> (Option<usize>, Option<usize>) {
+    /// The nodes from which and to which a topic is handed over, with their rows.
+    fn hands(&self, source: &FigureSource<'_>, event: &Event) -> [Option<(NodeId, usize)>; 2] {
         let topic = source.mission.elements.ends(event.what).1;
         let is_shown = topic.is_some_and(|topic| source.shows(topic));
         let (Detail::Senders { from, to }, true) = (&event.detail, is_shown) else {
-            return (None, None);
+            return [None; 2];
         };
-        let row = |nodes: &[NodeId]| nodes.iter().find_map(|id| self.nodes.get(id).copied());
-        (row(from), row(to))
+        [from, to].map(|nodes| nodes.iter().find_map(|id| Some((*id, self.nodes(*id)?))))
     }
 
     /// The row on which an event is marked: that of its element; for an edge, that of its node or topic; for
     /// a topic among nodes, that of a sender. A part of another event is only marked if it is a row that
     /// begins or ends.
     fn of(&self, source: &FigureSource<'_>, event: &Event) -> Option<usize> {
-        let elements = &source.mission.elements;
-        let (node, topic) = elements.ends(event.what);
+        let (node, topic) = source.mission.elements.ends(event.what);
         if topic.is_some_and(|id| !source.shows(id)) {
             return None;
         }
+        let is_turn = matches!(event.kind, Kind::Appeared | Kind::Vanished);
         if event.part_of.is_some() {
-            let turns = matches!(event.kind, Kind::Appeared | Kind::Vanished);
-            return match event.what {
-                Element::Topic(id) if turns => self.topics.get(&id).copied(),
-                _ => None,
-            };
+            let is_own = matches!(event.what, Element::Topic(_)) && is_turn;
+            return self.0.get(&event.what).filter(|_| is_own).copied();
         }
-        let own = topic.and_then(|id| self.topics.get(&id));
-        let own = own.or_else(|| node.and_then(|id| self.nodes.get(&id)));
-        if own.is_some() || matches!(event.kind, Kind::Appeared | Kind::Vanished) {
-            return own.copied();
+        let own = topic.and_then(|id| self.0.get(&Element::Topic(id)).copied());
+        let own = own.or_else(|| self.nodes(node?));
+        if own.is_some() || is_turn {
+            return own;
         }
-        let (from, to) = self.hands(source, event);
         let senders = topic.map_or(&[][..], |id| source.mission.sending.of_topic(id));
-        let sender = || {
-            senders
-                .iter()
-                .find_map(|s| self.nodes.get(&s.node?).copied())
-        };
-        from.or(to).or_else(sender)
+        let sender = || senders.iter().find_map(|s| self.nodes(s.node?));
+        let [from, to] = self.hands(source, event);
+        from.or(to).map(|(_, row)| row).or_else(sender)
     }
+}
+
+/// The marks of some rows, with those of the topics that are taken over from them.
+pub(crate) fn on<'a>(rows: &'a [Row], of: &'a [usize]) -> impl Iterator<Item = &'a RowMark> {
+    let nodes: BTreeSet<NodeId> = of.iter().flat_map(|at| rows[*at].nodes.clone()).collect();
+    let all = rows.iter().enumerate();
+    let marks = all.flat_map(|(at, row)| row.marks.iter().map(move |mark| (at, mark)));
+    let own = marks.filter(move |(at, mark)| {
+        of.contains(at) || mark.from.is_some_and(|id| nodes.contains(&id))
+    });
+    own.map(|(_, mark)| mark)
 }

@@ -1,144 +1,383 @@
-//! The rows of a figure of lifelines and their order: the staircase, namespaces, collapsed rows.
+//! A row per node or topic: the times at which it existed and published, and its rates. Lifetimes and rates are
+//! those of the mission's history; the height of a bar only changes where the log has another rate.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use super::marks::Marks;
-use super::tracks::Track;
-use crate::base::name::{last_part, namespace};
+use super::marks::{RowMark, marked};
+use super::source::FigureSource;
+use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
-use crate::base::words;
+use crate::evidence::Confidence;
+use crate::graph::history::{Sender, Stretch};
+use crate::graph::{EdgeId, Element, NodeId, TopicId};
+use crate::mission::event_log::Kind;
 
-/// The part of the mission, one in this many, up to which starts count as one burst.
-const BURST: i64 = 66;
-/// The number of parts of the mission that make the grid on which ends are compared.
-const END: i64 = 33;
-/// The least number of constant rows that are collapsed.
-const FEWEST_FOLDED: usize = 3;
-/// The most rows that are drawn separately in a figure without starts and stops.
-const MOST_OPEN: usize = 12;
+/// The length above which a silence visibly interrupts a bar: in nanoseconds, and as a fraction of the
+/// mission (one in so many).
+const SILENCE: (i64, i64) = (4_000_000_000, 83);
+/// The shortest visible piece of a bar, as a fraction of the mission (one in so many). Shorter ones join the
+/// previous one.
+const SEEN: i64 = 400;
 
-/// One row of the figure.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum FigureRow {
-    /// The title of a namespace.
-    Space(String),
-    /// A track, by index, with its label; members of a titled namespace are indented.
-    Track(usize, String, bool),
-    /// Tracks that exist throughout, by index, and their namespace.
-    Folded(Vec<usize>, String),
+/// An interval of publishing at one rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SendingBar {
+    pub(crate) span: Span,
+    /// Its share of the row's highest rate, 0 to 1.
+    pub(crate) share: f64,
 }
 
-impl FigureRow {
-    /// Whether it represents this track.
-    pub(crate) fn holds(&self, track: usize) -> bool {
-        match self {
-            Self::Space(_) => false,
-            Self::Track(at, ..) => *at == track,
-            Self::Folded(all, _) => all.contains(&track),
+/// The place of a row's name in the column of names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Level {
+    /// The title of a namespace, above its rows.
+    Title,
+    /// A row by itself.
+    #[default]
+    Outside,
+    /// A row below the title of its namespace.
+    Inside,
+}
+
+/// A node, a topic, or several that are drawn as one; or a title.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Row {
+    /// The full name: a role, a topic, or a namespace.
+    pub(crate) name: Arc<str>,
+    /// Its nodes: those of a role, or of several.
+    pub(crate) nodes: Vec<NodeId>,
+    /// Its topic.
+    pub(crate) topic: Option<TopicId>,
+    /// The times in which it exists.
+    pub(crate) lives: Vec<Span>,
+    /// Whether it is known by inference only.
+    pub(crate) is_inferred: bool,
+    /// The times in which it publishes.
+    pub(crate) bars: Vec<SendingBar>,
+    /// Messages per second while it publishes; `None` if it never does, or if that is unknown.
+    pub(crate) hz: Option<f64>,
+    /// Its events, in order of the log.
+    pub(crate) marks: Vec<RowMark>,
+    /// The names before it, of which as many as fit are written.
+    pub(crate) labels: Vec<String>,
+    pub(crate) level: Level,
+    /// The full names of the elements that are drawn as one because they exist throughout.
+    pub(crate) folded: Vec<Arc<str>>,
+    /// What is written beside it: the topics that it publishes, the fastest first; and in a quiet colour those that
+    /// it subscribes to, or the types of a topic.
+    pub(crate) beside: [Vec<String>; 2],
+}
+
+impl Row {
+    pub(crate) fn start(&self) -> Stamp {
+        self.lives.first().map_or(Stamp::MAX, |life| life.start)
+    }
+
+    pub(crate) fn end(&self) -> Stamp {
+        self.lives.last().map_or(Stamp::MIN, |life| life.end)
+    }
+
+    /// Whether it exists at any moment of `time`.
+    pub(crate) fn is_in(&self, time: Span) -> bool {
+        let shared = |life: &Span| life.start < time.end && time.start < life.end;
+        self.lives.iter().any(shared)
+    }
+
+    /// The node or the topic of the row; `None` for a title.
+    pub(crate) fn what(&self) -> Option<Element> {
+        let node = self.nodes.last().map(|id| Element::Node(*id));
+        node.or(self.topic.map(Element::Topic))
+    }
+}
+
+/// A row per role, or per topic if publishers are unknown, with their events.
+pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
+    if source.knows_publishers() {
+        marked(source, of_nodes(source))
+    } else {
+        marked(source, of_topics(source))
+    }
+}
+
+/// A row per role.
+pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
+    let steps = Steps::new(source);
+    let row = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
+        let publications = source.publications(nodes);
+        let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
+        let own = row(source, &steps, &elements, &source.senders(&publications));
+        Row {
+            name: Arc::clone(role),
+            nodes: nodes.clone(),
+            beside: [
+                arrowed("→", role, sent_by(source, &steps, &publications)),
+                arrowed("←", role, received_by(source, nodes)),
+            ],
+            ..own
         }
-    }
-}
-
-/// All rows in order. Marked tracks are not collapsed.
-pub(crate) fn rows(tracks: &[Track], whole: Span, marks: &Marks) -> Vec<FigureRow> {
-    let marked = marks.marked();
-    let mut spaces: Vec<(bool, Stamp, &str, Vec<usize>)> = Vec::new();
-    for (at, track) in tracks.iter().enumerate() {
-        let space = namespace(&track.name);
-        match spaces.iter_mut().find(|(.., name, _)| *name == space) {
-            Some((_, start, _, own)) => {
-                *start = (*start).min(track.start());
-                own.push(at);
-            }
-            None => spaces.push((space != "/", track.start(), space, vec![at])),
-        }
-    }
-    spaces.sort_by(|a, b| (a.0, a.1, a.2).cmp(&(b.0, b.1, b.2)));
-    let mut rows = Vec::new();
-    for (_, _, space, own) in spaces {
-        rows.extend(of_space(tracks, whole, (marks, &marked), space, own));
-    }
-    rows
-}
-
-fn of_space(
-    tracks: &[Track],
-    whole: Span,
-    (marks, marked): (&Marks, &BTreeSet<usize>),
-    space: &str,
-    own: Vec<usize>,
-) -> Vec<FigureRow> {
-    if let [only] = own[..] {
-        let name = tracks[only].name.trim_start_matches('/');
-        return vec![FigureRow::Track(only, name.to_owned(), false)];
-    }
-    let mut rows = vec![FigureRow::Space(space.to_owned())];
-    let is_folded = |at: &usize| !marked.contains(at) && is_throughout(&tracks[*at], whole);
-    let mut folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
-    // If nothing else is shown, a few rows are more informative than their number.
-    let is_all = folded.len() == tracks.len() && tracks.len() <= MOST_OPEN;
-    if folded.len() < FEWEST_FOLDED || is_all {
-        folded.clear();
-    }
-    let open = own
-        .into_iter()
-        .filter(|at| folded.binary_search(at).is_err());
-    let open = in_order(tracks, whole, marks, open.collect());
-    if !folded.is_empty() {
-        rows.push(FigureRow::Folded(folded, space.to_owned()));
-    }
-    rows.extend(open.into_iter().map(|at| {
-        let label = last_part(&tracks[at].name).to_owned();
-        FigureRow::Track(at, label, true)
-    }));
-    rows
-}
-
-/// Whether a track exists from (nearly) the first moment to the last, without a gap or a step.
-fn is_throughout(track: &Track, whole: Span) -> bool {
-    let [life] = track.lives[..] else {
-        return false;
     };
-    let nanos = whole.nanos();
-    let steady = track.topic.is_none() || track.bars.len() == 1;
-    life.span.start.since(whole.start) <= nanos / 20 && steady
+    let rows = source.roles.iter().map(row);
+    rows.filter(|row| !row.lives.is_empty()).collect()
 }
 
-/// The tracks sorted by burst of start, then by end, the latest first, then by name.
-fn in_order(tracks: &[Track], whole: Span, marks: &Marks, mut own: Vec<usize>) -> Vec<usize> {
-    own.sort_by_key(|at| (tracks[*at].start(), *at));
-    let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / END).max(1));
-    let mut bursts: Vec<Vec<usize>> = Vec::new();
-    let mut last: Option<Stamp> = None;
-    for at in own {
-        let start = tracks[at].start();
-        match bursts.last_mut() {
-            Some(burst) if last.is_some_and(|l| start.since(l) <= near) => burst.push(at),
-            _ => bursts.push(vec![at]),
+/// A row per topic that carried a message.
+pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
+    let steps = Steps::new(source);
+    let row = |id: TopicId| {
+        let senders: Vec<&Sender> = source.mission.sending.of_topic(id).iter().collect();
+        let topic = source.mission.elements.topics.get(id);
+        let types = topic.map(|topic| topic.types.iter().map(ToString::to_string).collect());
+        Row {
+            name: source.topic(id).into(),
+            topic: Some(id),
+            beside: [Vec::new(), types.unwrap_or_default()],
+            ..row(source, &steps, &[Element::Topic(id)], &senders)
         }
-        last = Some(start);
-    }
-    let end = |at: usize| {
-        marks
-            .ends(at)
-            .then(|| tracks[at].end().since(whole.start) / grid)
     };
-    // Elements that never end come first.
-    let end = |at: usize| end(at).unwrap_or(i64::MAX);
-    for burst in &mut bursts {
-        burst.sort_by(|a, b| {
-            let late = end(*b).cmp(&end(*a));
-            late.then_with(|| tracks[*a].name.cmp(&tracks[*b].name))
+    let rows = source.shown_topics().map(row);
+    rows.filter(|row| !row.lives.is_empty() && !row.bars.is_empty())
+        .collect()
+}
+
+/// The row of some elements drawn as one, without its name.
+fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: &[&Sender]) -> Row {
+    let whole = source.span();
+    let lives = elements.iter().flat_map(|what| source.lives(*what));
+    let lives = Span::joined(lives.collect(), 0);
+    let confidence = elements.iter().map(|what| source.confidence(*what)).min();
+    let rates: Vec<Vec<Piece>> = senders.iter().map(|s| steps.pieces(s, whole)).collect();
+    let hz = rates.iter().filter_map(|pieces| mean(pieces));
+    let hz = hz.reduce(|a, b| a + b);
+    let mut bars = bars(&rates, whole);
+    if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
+        && life.end.since(bar.span.end) <= silence(whole)
+        && life.end == whole.end
+    {
+        // The recording ended between two messages.
+        bar.span.end = life.end;
+    }
+    Row {
+        lives,
+        is_inferred: senders.is_empty() && confidence.is_some_and(|c| c >= Confidence::Inferred),
+        bars,
+        hz,
+        ..Row::default()
+    }
+}
+
+/// The topics of some publications that tell something about their nodes, the fastest first.
+fn sent_by<'s>(source: &'s FigureSource<'_>, steps: &Steps, edges: &[EdgeId]) -> Vec<&'s str> {
+    let rated = |edge: &EdgeId| {
+        let topic = source.mission.elements.publishes.get(*edge)?.topic;
+        let senders = source.senders(&[*edge]);
+        let hz = senders
+            .first()
+            .and_then(|s| mean(&steps.pieces(s, source.span())));
+        (!source.is_hub(topic)).then_some((hz.unwrap_or(0.0), source.topic(topic)))
+    };
+    let mut rated: Vec<(f64, &str)> = edges.iter().filter_map(rated).collect();
+    rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    let mut seen = BTreeSet::new();
+    let names = rated.into_iter().map(|(_, name)| name);
+    names.filter(|name| seen.insert(*name)).collect()
+}
+
+/// The topics that tell something about the nodes that subscribe to them, by name.
+fn received_by<'s>(source: &'s FigureSource<'_>, nodes: &[NodeId]) -> Vec<&'s str> {
+    let all = source.mission.elements.subscribes.iter();
+    let own =
+        all.filter(|e| nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic));
+    let names: BTreeSet<&str> = own.map(|e| source.topic(e.topic)).collect();
+    names.into_iter().collect()
+}
+
+/// The names of topics as a node of this name sees them, an arrow before the first.
+fn arrowed(arrow: &str, node: &str, topics: Vec<&str>) -> Vec<String> {
+    let names = topics.into_iter().map(|topic| relative(topic, node));
+    let text = |(at, name): (usize, &str)| match at {
+        0 => format!("{arrow} {name}"),
+        _ => name.to_owned(),
+    };
+    names.enumerate().map(text).collect()
+}
+
+/// A topic's name inside the namespace of a node.
+pub(crate) fn relative<'t>(topic: &'t str, node: &str) -> &'t str {
+    let space = namespace(node);
+    let inside = if space == "/" {
+        topic.strip_prefix('/')
+    } else {
+        topic.strip_prefix(space).and_then(|t| t.strip_prefix('/'))
+    };
+    inside.unwrap_or_else(|| topic.strip_prefix('/').unwrap_or(topic))
+}
+
+fn silence(whole: Span) -> i64 {
+    SILENCE.0.max(whole.nanos() / SILENCE.1)
+}
+
+/// An interval at one rate, in messages per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) span: Span,
+    pub(crate) hz: f64,
+}
+
+/// The times at which the log has steps of rates, by topic and node.
+pub(crate) struct Steps(BTreeSet<(TopicId, Option<NodeId>, Stamp)>);
+
+impl Steps {
+    pub(crate) fn new(source: &FigureSource<'_>) -> Self {
+        let events = source.mission.log.events.iter();
+        let steps = events.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
+            let (node, topic) = source.mission.elements.ends(e.what);
+            Some((topic?, node, e.time))
         });
+        Self(steps.collect())
     }
-    bursts.concat()
+
+    fn has(&self, sender: &Sender, at: Stamp) -> bool {
+        let is = |node| self.0.contains(&(sender.topic, node, at));
+        is(sender.node) || is(None)
+    }
+
+    /// The rates of a sender: its stretches, joined unless a step of the log or a long silence separates
+    /// them.
+    pub(crate) fn pieces(&self, sender: &Sender, whole: Span) -> Vec<Piece> {
+        let least = silence(whole);
+        let parts =
+            |a: &Stretch, b: &Stretch| !self.has(sender, b.first) && b.first.since(a.last) < least;
+        let runs = sender.stretches.chunk_by(parts);
+        let piece = |run: &[Stretch]| {
+            let (start, end) = (run.first()?.first, run.last()?.last);
+            let nanos = end.since(start);
+            let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
+            let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
+            Some(Piece {
+                span: Span::new(start, end.plus(1)),
+                hz: match run {
+                    [one] => one.hz(),
+                    _ if nanos > 0 => mean,
+                    _ => 0.0,
+                },
+            })
+        };
+        runs.filter_map(piece).collect()
+    }
 }
 
-/// The label of a collapsed row: `8 nodes throughout`.
-pub(crate) fn folded_label(tracks: &[Track], all: &[usize]) -> String {
-    let word = match all.first().and_then(|at| tracks[*at].topic) {
-        Some(_) => "topic",
-        None => "node",
+/// The mean rate over the bars; `None` if they have no length.
+pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
+    let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
+    let time: f64 = pieces.iter().map(seconds).sum();
+    let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();
+    (time > 1e-3).then(|| count / time)
+}
+
+/// The bars of several senders together.
+fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
+    let pieces = summed(rates, whole);
+    let most = pieces.iter().map(|p| p.hz).fold(0.0, f64::max);
+    let bar = |piece: Piece| SendingBar {
+        span: piece.span,
+        share: if most > 0.0 { piece.hz / most } else { 1.0 },
     };
-    format!("{} throughout", words::count(all.len(), word))
+    pieces.into_iter().map(bar).collect()
+}
+
+/// The sum of several rates over time; pieces too short to be visible belong to their neighbours.
+fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
+    let all = || rates.iter().flatten();
+    let mut turns: Vec<(Stamp, f64, i64)> = all().map(|p| (p.span.start, p.hz, 1)).collect();
+    turns.extend(all().map(|p| (p.span.end, -p.hz, -1)));
+    turns.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.cmp(&a.2)).then(a.1.total_cmp(&b.1)));
+    let mut found: Vec<Piece> = Vec::new();
+    let (mut hz, mut many) = (0.0, 0);
+    for (pair, next) in turns.iter().zip(turns.iter().skip(1)) {
+        hz += pair.1;
+        many += pair.2;
+        let span = Span::new(pair.0, next.0);
+        if many == 0 || span.start >= span.end {
+            continue;
+        }
+        let short = span.nanos() < whole.nanos() / SEEN;
+        match found.last_mut() {
+            Some(last) if last.span.end == span.start && (short || same(last.hz, hz)) => {
+                last.span.end = span.end;
+            }
+            Some(last)
+                if last.span.end == span.start && last.span.nanos() < whole.nanos() / SEEN =>
+            {
+                (last.span.end, last.hz) = (span.end, f64::max(hz, 0.0));
+            }
+            _ => found.push(Piece {
+                span,
+                hz: f64::max(hz, 0.0),
+            }),
+        }
+    }
+    // Bars separated by a silence too short to be visible are drawn without it.
+    let mut joined: Vec<Piece> = Vec::new();
+    for piece in found {
+        match joined.last_mut() {
+            Some(last) if piece.span.start.since(last.span.end) < silence(whole) => {
+                last.span.end = piece.span.start;
+                if same(last.hz, piece.hz) {
+                    last.span.end = piece.span.end;
+                } else {
+                    joined.push(piece);
+                }
+            }
+            _ => joined.push(piece),
+        }
+    }
+    joined
+}
+
+/// Whether two rates cannot be distinguished as heights of bars.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 0.01 * a.max(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn span(from: i64, to: i64) -> Span {
+        Span::new(Stamp(from * SECOND), Stamp(to * SECOND))
+    }
+
+    fn reported(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
+        let pieces = |all: &&[(i64, i64, f64)]| {
+            let piece = |(from, to, hz): &(i64, i64, f64)| Piece {
+                span: span(*from, *to),
+                hz: *hz,
+            };
+            all.iter().map(piece).collect::<Vec<Piece>>()
+        };
+        let rates: Vec<Vec<Piece>> = rates.iter().map(pieces).collect();
+        let second = |at: Stamp| at.0 / SECOND;
+        let all = summed(&rates, span(0, 800)).into_iter();
+        all.map(|p| (second(p.span.start), second(p.span.end), libm::round(p.hz)))
+            .collect()
+    }
+
+    #[test]
+    fn rates_add_up_while_they_overlap() {
+        let found = reported(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
+        assert_eq!(found, [(0, 50, 10.0), (50, 100, 15.0), (100, 200, 5.0)]);
+    }
+
+    #[test]
+    fn invisibly_short_runs_are_not_steps() {
+        let found = reported(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
+        assert_eq!(found, [(0, 100, 15.0)]);
+        let found = reported(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
+        assert_eq!(found, [(0, 200, 10.0)]);
+        let found = reported(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
+        assert_eq!(found, [(0, 100, 10.0), (150, 200, 10.0)]);
+    }
 }

@@ -13,8 +13,9 @@ use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::picture::change_counts;
 use crate::draw::picture::title::SIDES;
-use crate::draw::timeline::course::{LifeLine, LifeLines};
-use crate::draw::timeline::marks::Sign;
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::marks::{RowMark, Sign};
+use crate::draw::timeline::rows::{Level, Row};
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, Id as _};
 use crate::mission::event_log::Kind;
@@ -134,12 +135,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         reported: reported(page, &places, clock),
         phases: phases(mission, clock),
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
-        takeovers: lives.map_or_else(Vec::new, |lives| {
-            let handovers = lives.handovers.iter();
-            handovers
-                .map(|h| (clock.secs(h.at), h.from, h.to, h.event))
-                .collect()
-        }),
+        takeovers: lives.map_or_else(Vec::new, |lives| takeovers(lives, clock)),
         sizes: [
             style.edge.size.min(style.topic.small).min(style.node.small),
             style.topic.size,
@@ -300,41 +296,46 @@ fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
     }
 }
 
-fn rows(lives_of: &LifeLines, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<RowData> {
-    let row = |(at, line): (usize, &LifeLine)| {
-        let place = line.what.and_then(|what| places.get(&what));
-        let lives = line.lives.iter().flat_map(|life| {
-            [
-                clock.secs(life.span.start),
-                clock.secs(life.span.end),
-                f64::from(u8::from(life.is_inferred)),
-            ]
-        });
-        let marks = lives_of.marks.iter().filter(|mark| mark.track == at);
-        let marks = marks.map(|mark| {
+fn rows(timeline: &Timeline, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<RowData> {
+    let row = |row: &Row| {
+        let place = row.what().and_then(|what| places.get(&what));
+        let is_inferred = f64::from(u8::from(row.is_inferred));
+        let lives = row
+            .lives
+            .iter()
+            .flat_map(|life| [clock.secs(life.start), clock.secs(life.end), is_inferred]);
+        let marks = row.marks.iter().filter_map(|mark| {
             let sign = match mark.sign {
                 Sign::Start => 0,
                 Sign::End => 1,
-                Sign::Dot => 2,
+                Sign::Dot | Sign::Letter => 2,
+                Sign::Handover => return None,
             };
-            (clock.secs(mark.at), sign, mark.event)
+            Some((clock.secs(mark.at), sign, *mark.events.first()?))
         });
-        let bars = line.bars.iter().flat_map(|bar| {
+        let bars = row.bars.iter().flat_map(|bar| {
             let ninths = libm::round(bar.share * 9.0).max(1.0);
             [clock.secs(bar.span.start), clock.secs(bar.span.end), ninths]
         });
-        let label = visible(&line.label).into_owned();
-        let place = place.map_or(-1, |at| i64::from(*at));
         RowData(
-            place,
-            label,
-            u8::from(line.is_inside),
+            place.map_or(-1, |at| i64::from(*at)),
+            visible(&row.labels.join(", ")).into_owned(),
+            u8::from(row.level == Level::Inside),
             lives.collect(),
             bars.collect(),
             marks.collect(),
         )
     };
-    lives_of.rows.iter().enumerate().map(row).collect()
+    timeline.rows.iter().map(row).collect()
+}
+
+fn takeovers(timeline: &Timeline, clock: PageClock) -> Vec<(f64, usize, usize, EventId)> {
+    let marks = timeline.marks().into_iter();
+    let takeover = |(to, mark): (usize, &RowMark)| {
+        let from = timeline.giver(mark)?;
+        Some((clock.secs(mark.at), from, to, *mark.events.first()?))
+    };
+    marks.filter_map(takeover).collect()
 }
 
 /// The text for the page and its type.

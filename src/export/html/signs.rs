@@ -6,7 +6,7 @@ use crate::draw::paint::classes::badge_shapes;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{LegendSign, signs};
 use crate::draw::style::Style;
-use crate::draw::timeline::course::LifeLines;
+use crate::draw::timeline::Timeline;
 use crate::draw::timeline::marks::Sign;
 use crate::graph::State;
 use crate::view::runs::word;
@@ -57,32 +57,23 @@ pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
 }
 
 /// The meaning of the marks that occur on the timeline, as HTML.
-pub(super) fn timeline(lives: Option<&LifeLines>) -> String {
-    let Some(lives) = lives else {
+pub(super) fn timeline(rows: Option<&Timeline>) -> String {
+    let Some(timeline) = rows else {
         return String::new();
     };
-    let has = |sign: fn(&Sign) -> bool| lives.marks.iter().any(|mark| sign(&mark.sign));
+    let marks = timeline.marks();
+    let has = |signs: &[Sign]| marks.iter().any(|(_, mark)| signs.contains(&mark.sign));
     let signs = [
+        (has(&[Sign::Start]), "start", "M18 3v14", "begins"),
+        (has(&[Sign::End]), "end", "M13 5l10 10m0 -10l-10 10", "ends"),
         (
-            has(|sign| matches!(sign, Sign::Start)),
-            "start",
-            "M18 3v14",
-            "begins",
-        ),
-        (
-            has(|sign| matches!(sign, Sign::End)),
-            "end",
-            "M13 5l10 10m0 -10l-10 10",
-            "ends",
-        ),
-        (
-            has(|sign| matches!(sign, Sign::Dot)),
+            has(&[Sign::Dot, Sign::Letter]),
             "event",
             "M13 10l5 -5l5 5l-5 5z",
             "changes",
         ),
         (
-            !lives.handovers.is_empty(),
+            has(&[Sign::Handover]),
             "takeover",
             "M18 3V17m-3 -4l3 4l3 -4",
             "handed over",

@@ -2,14 +2,15 @@
 //! lifelines of everything that differs, one mission above the other, aligned at the first messages.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::{DiffSubject, Difference, Where};
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::base::words;
-use crate::draw::timeline::course::{LifeLine, LifeLines};
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::rows::{Level, Row, of_nodes, of_topics};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
 use crate::evidence::{Confidence, Evidence};
 use crate::gate::facts::{Facts, Peer, Rate, TopicIn};
 use crate::gate::values::Pattern;
@@ -405,12 +406,6 @@ fn appeared(came: bool) -> Kind {
 /// The most nodes and topics that are drawn.
 const MOST: usize = 200;
 
-/// A node or topic that is drawn, and its track in each mission.
-struct Pair {
-    what: Element,
-    tracks: [Option<Track>; 2],
-}
-
 /// A title for each node and topic that differs, and below it a row for each mission; times count from 0. `drawn` is
 /// the mission of both.
 pub(crate) fn pairs(
@@ -418,88 +413,67 @@ pub(crate) fn pairs(
     subject: &DiffSubject,
     differing: &[Difference],
     drawn: &Mission,
-) -> LifeLines {
+) -> Timeline {
     let known = differing.iter().filter(|d| d.is_known);
     // An edge's name is that of both its ends.
     let names: BTreeSet<&str> = known.flat_map(|d| d.element.split(" → ")).collect();
     let all = NameFilter::default();
     let mut rows = Vec::new();
-    let kinds: [(TracksOf, PlaceOf); 2] = [
-        (of_nodes, |all, name| all.node(name).map(Element::Node)),
-        (of_topics, |all, name| all.topic(name).map(Element::Topic)),
-    ];
-    for (of, place) in kinds {
-        let mut pairs: BTreeMap<String, Pair> = BTreeMap::new();
+    for of in [of_nodes, of_topics] {
+        let mut pairs: BTreeMap<Arc<str>, [Row; 2]> = BTreeMap::new();
         for (side, mission) in missions.iter().enumerate() {
-            for track in of(&FigureSource::new(mission, &all, &all, false)) {
-                let name = &*track.name;
-                let Some(what) = place(&drawn.elements, name).filter(|_| names.contains(name))
-                else {
-                    continue;
-                };
-                let new = Pair {
-                    what,
-                    tracks: [None, None],
-                };
-                let pair = pairs.entry(name.to_owned()).or_insert(new);
-                pair.tracks[side] = Some(track);
+            for row in of(&FigureSource::new(mission, &all, &all, false)) {
+                if names.contains(&*row.name) {
+                    let name = Arc::clone(&row.name);
+                    pairs.entry(name).or_default()[side] = row;
+                }
             }
         }
-        rows.extend(pairs.into_iter().flat_map(|(name, pair)| {
-            let hz = pair
-                .tracks
-                .each_ref()
-                .map(|track| track.as_ref().and_then(|t| t.hz));
-            let hz = hz.map(|hz| hz.unwrap_or(0.0));
-            let most = hz[0].max(hz[1]);
-            let row = |label: String, side: usize| {
-                let share = if most > 0.0 { hz[side] / most } else { 1.0 };
-                let start = missions[side].span.start;
-                line(label, pair.what, pair.tracks[side].as_ref(), start, share)
-            };
-            let title = LifeLine {
-                label: name,
-                is_inside: false,
-                what: None,
-                lives: Vec::new(),
-                bars: Vec::new(),
-            };
-            let (first, second) = (
-                format!("A {}", subject.first),
-                format!("B {}", subject.second),
-            );
-            [title, row(first, 0), row(second, 1)]
-        }));
+        for (name, pair) in pairs {
+            rows.push(Row {
+                labels: vec![name.to_string()],
+                level: Level::Title,
+                ..Row::default()
+            });
+            let most = pair.iter().filter_map(|row| row.hz).fold(0.0, f64::max);
+            let is_topic = pair.iter().any(|row| row.topic.is_some());
+            let subjects = [("A", &subject.first), ("B", &subject.second)];
+            for ((row, mission), (side, subject)) in pair.into_iter().zip(missions).zip(subjects) {
+                let hz = row.hz.unwrap_or(0.0);
+                rows.push(Row {
+                    labels: vec![format!("{side} {subject}")],
+                    level: Level::Inside,
+                    nodes: drawn
+                        .elements
+                        .node(&name)
+                        .filter(|_| !is_topic)
+                        .into_iter()
+                        .collect(),
+                    topic: drawn.elements.topic(&name).filter(|_| is_topic),
+                    ..moved(
+                        row,
+                        mission.span.start,
+                        if most > 0.0 { hz / most } else { 1.0 },
+                    )
+                });
+            }
+        }
     }
     rows.truncate(3 * MOST);
-    LifeLines {
+    Timeline {
         rows,
-        ..LifeLines::default()
+        ..Timeline::default()
     }
 }
 
-/// The tracks of all nodes, or of all topics.
-type TracksOf = fn(&FigureSource<'_>) -> Vec<Track>;
-/// The element of a name.
-type PlaceOf = fn(&Elements, &str) -> Option<Element>;
-
-/// The row of a track, its times counted from `start`, and its highest rate drawn as `share` of all.
-fn line(label: String, what: Element, track: Option<&Track>, start: Stamp, share: f64) -> LifeLine {
-    let moved =
-        |span: Span| Span::new(Stamp(span.start.since(start)), Stamp(span.end.since(start)));
-    let lives = track.iter().flat_map(|t| &t.lives).map(|life| TrackLife {
-        span: moved(life.span),
-        ..*life
+/// A row with its times counted from `start`, and its highest rate drawn as `share` of all.
+fn moved(mut row: Row, start: Stamp, share: f64) -> Row {
+    let bars = row.bars.iter_mut().map(|bar| {
+        bar.share *= share;
+        &mut bar.span
     });
-    let bars = track.iter().flat_map(|t| &t.bars).map(|bar| SendingBar {
-        span: moved(bar.span),
-        share: bar.share * share,
-    });
-    LifeLine {
-        label,
-        is_inside: true,
-        what: Some(what),
-        lives: lives.collect(),
-        bars: bars.collect(),
+    for span in row.lives.iter_mut().chain(bars) {
+        *span = Span::new(Stamp(span.start.since(start)), Stamp(span.end.since(start)));
     }
+    row
 }

@@ -1,0 +1,249 @@
+//! The order of rows: by namespace, as a staircase of beginnings; or joined, a row for all that begin and end together.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::marks::{RowMark, Sentences, Sign};
+use super::rows::{Level, Row, SendingBar};
+use super::source::FigureSource;
+use crate::base::name::{last_part, namespace};
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
+use crate::graph::NodeId;
+use crate::mission::EventId;
+use crate::mission::event_log::{Event, Kind};
+
+/// The part of the mission, one in this many, up to which starts count as one burst of the staircase.
+const BURST: i64 = 66;
+/// The number of parts of the mission that make the grid on which ends are compared, and within which starts, or ends,
+/// of joined rows are one: about the width of a mark.
+const NEAR: i64 = 33;
+/// The least number of constant rows that are collapsed.
+const FEWEST_FOLDED: usize = 3;
+/// The most rows that are drawn separately in a figure without starts and stops.
+const MOST_OPEN: usize = 12;
+/// The name of the row for events without their own row.
+const OTHERS: &str = "other changes";
+/// The height of the bars of joined rows, as a share of the highest: they have no rate.
+const JOINED: f64 = 0.6;
+
+/// The rows below the titles of their namespaces, in the order in which they begin. If `is_folded`, those of a namespace
+/// that exist throughout are one row, unless they are marked.
+pub(super) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<Row> {
+    let givers = rows.iter().flat_map(|row| &row.marks);
+    let givers: BTreeSet<NodeId> = givers.filter_map(|mark| mark.from).collect();
+    let is_fixed = |row: &Row| {
+        let is_marked = row.marks.iter().any(|mark| mark.sign != Sign::Start);
+        let gives = row.nodes.iter().any(|id| givers.contains(id));
+        !is_marked && !gives && is_throughout(row, whole)
+    };
+    let many = rows.len();
+    let mut spaces: BTreeMap<String, Vec<Row>> = BTreeMap::new();
+    for row in rows {
+        let space = namespace(&row.name).to_owned();
+        spaces.entry(space).or_default().push(row);
+    }
+    let mut spaces: Vec<(String, Vec<Row>)> = spaces.into_iter().collect();
+    let start = |own: &[Row]| own.iter().map(Row::start).min();
+    spaces.sort_by_key(|(space, own)| (space != "/", start(own)));
+    let mut all = Vec::new();
+    for (space, mut own) in spaces {
+        if let [only] = &mut own[..] {
+            only.labels = vec![only.name.trim_start_matches('/').to_owned()];
+            all.append(&mut own);
+            continue;
+        }
+        for row in &mut own {
+            row.level = Level::Inside;
+            row.labels = vec![last_part(&row.name).to_owned()];
+        }
+        all.push(Row {
+            name: space.as_str().into(),
+            labels: vec![space],
+            level: Level::Title,
+            ..Row::default()
+        });
+        let (fixed, open): (Vec<Row>, Vec<Row>) = own.into_iter().partition(&is_fixed);
+        // If nothing else is shown, a few rows are more informative than their number.
+        let is_all = fixed.len() == many && many <= MOST_OPEN;
+        if is_folded && fixed.len() >= FEWEST_FOLDED && !is_all {
+            all.push(folded(fixed, whole));
+            all.extend(staircase(open, whole));
+        } else {
+            all.extend(staircase([fixed, open].concat(), whole));
+        }
+    }
+    all
+}
+
+/// Whether a row exists from (nearly) the first moment to the last, without a gap or a step.
+fn is_throughout(row: &Row, whole: Span) -> bool {
+    let steady = row.topic.is_none() || row.bars.len() == 1;
+    let start = row.start().since(whole.start);
+    row.lives.len() == 1 && start <= whole.nanos() / 20 && steady
+}
+
+/// One row for several that exist throughout.
+fn folded(rows: Vec<Row>, whole: Span) -> Row {
+    let word = match rows.first().and_then(|row| row.topic) {
+        Some(_) => "topic",
+        None => "node",
+    };
+    let count = words::count(rows.len(), word);
+    let mut beside: Vec<String> = rows.iter().map(|r| last_part(&r.name).to_owned()).collect();
+    beside.sort();
+    Row {
+        labels: vec![format!("{count} throughout")],
+        level: Level::Inside,
+        lives: vec![whole],
+        bars: vec![SendingBar {
+            span: whole,
+            share: 1.0,
+        }],
+        hz: rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b),
+        folded: rows.iter().map(|row| Arc::clone(&row.name)).collect(),
+        beside: [Vec::new(), beside],
+        marks: rows.into_iter().flat_map(|row| row.marks).collect(),
+        ..Row::default()
+    }
+}
+
+/// The rows sorted by burst of start, then by end, the latest first, then by name.
+fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
+    rows.sort_by_key(Row::start);
+    let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / NEAR).max(1));
+    // Elements that never end come first.
+    let end = |row: &Row| match row.is_ending() {
+        true => row.end().since(whole.start) / grid,
+        false => i64::MAX,
+    };
+    let close = |a: &Row, b: &Row| b.start().since(a.start()) <= near;
+    for burst in rows.chunk_by_mut(close) {
+        burst.sort_by(|a, b| end(b).cmp(&end(a)).then_with(|| a.name.cmp(&b.name)));
+    }
+    rows
+}
+
+/// A row for all that begin and end together, in at most `most` rows; only rows with events. Events without a row share
+/// the last one.
+pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Vec<Row> {
+    let whole = source.span();
+    let near = whole.nanos() / NEAR;
+    let begun = whole.start.plus(near);
+    let mut rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
+    for row in &mut rows {
+        // Elements that start with the recording look as if they existed from the beginning.
+        row.marks
+            .retain(|mark| mark.sign != Sign::Start || mark.at >= begun);
+    }
+    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
+    let is_shared = |last: &str| names.iter().filter(|n| last_part(n) == last).count() > 1;
+    for row in &mut rows {
+        row.labels = vec![match last_part(&row.name) {
+            last if is_shared(last) => row.name.to_string(),
+            last => last.to_owned(),
+        }];
+    }
+    let placed: BTreeSet<EventId> = rows
+        .iter()
+        .flat_map(|row| &row.marks)
+        .flat_map(|mark| mark.events.clone())
+        .collect();
+    let bursts = [Sign::Start, Sign::End].map(|sign| bursts(&rows, sign, near));
+    let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<Row>> = BTreeMap::new();
+    for row in rows.into_iter().filter(|row| !row.marks.is_empty()) {
+        let turns = row.marks.iter().filter_map(|mark| match mark.sign {
+            Sign::Start => Some((true, burst(&bursts[0], mark.at))),
+            Sign::End => Some((false, burst(&bursts[1], mark.at))),
+            _ => None,
+        });
+        groups.entry(turns.collect()).or_default().push(row);
+    }
+    let mut rows: Vec<Row> = groups.into_values().map(|own| joined(own, near)).collect();
+    rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
+    let mut others = unplaced(source, &placed);
+    while rows.len() + usize::from(!others.is_empty()) > most.max(1) {
+        let few = rows.iter().enumerate().min_by_key(|(at, row)| {
+            let members = row.labels.len() * row.marks.len();
+            (members, std::cmp::Reverse(*at))
+        });
+        let Some((at, _)) = few else { break };
+        others.extend(rows.remove(at).marks);
+    }
+    if !others.is_empty() {
+        others.sort_by_key(|mark| mark.at);
+        rows.push(Row {
+            labels: vec![OTHERS.to_owned()],
+            marks: others,
+            ..Row::default()
+        });
+    }
+    rows
+}
+
+/// The beginnings of the bursts of signs of a kind: signs that follow within a short time belong to the first
+/// of them.
+fn bursts(rows: &[Row], sign: Sign, near: i64) -> Vec<Stamp> {
+    let marks = rows.iter().flat_map(|row| &row.marks);
+    let mut times: Vec<Stamp> = marks.filter(|m| m.sign == sign).map(|m| m.at).collect();
+    times.sort_unstable();
+    times.dedup_by(|later, first| later.since(*first) <= near);
+    times
+}
+
+fn burst(bursts: &[Stamp], at: Stamp) -> Stamp {
+    let next = bursts.partition_point(|first| *first <= at);
+    next.checked_sub(1).map_or(at, |found| bursts[found])
+}
+
+/// One row for several, with one sign for simultaneous starts or ends.
+fn joined(rows: Vec<Row>, near: i64) -> Row {
+    let lives = rows.iter().flat_map(|row| row.lives.clone()).collect();
+    let lives = Span::joined(lives, 0);
+    let bar = |life: &Span| SendingBar {
+        span: *life,
+        share: JOINED,
+    };
+    let labels = rows.iter().flat_map(|row| row.labels.clone()).collect();
+    let mut all: Vec<RowMark> = rows.into_iter().flat_map(|row| row.marks).collect();
+    all.sort_by_key(|mark| mark.at);
+    let mut marks: Vec<RowMark> = Vec::new();
+    for mark in all {
+        let is_same = |other: &&mut RowMark| {
+            let apart = mark.at.since(other.at);
+            other.sign == mark.sign && mark.sign != Sign::Dot && apart.abs() <= near
+        };
+        match marks.iter_mut().rev().find(is_same) {
+            Some(other) => {
+                let is_later = (other.sign == Sign::End) == (mark.at > other.at);
+                other.at = if is_later { mark.at } else { other.at };
+                other.events.extend(mark.events);
+                other.title = format!("{}; {}", other.title, mark.title);
+            }
+            None => marks.push(mark),
+        }
+    }
+    Row {
+        bars: lives.iter().map(bar).collect(),
+        lives,
+        labels,
+        marks,
+        ..Row::default()
+    }
+}
+
+/// The events of the log without a row.
+fn unplaced(source: &FigureSource<'_>, placed: &BTreeSet<EventId>) -> Vec<RowMark> {
+    let sentences = Sentences::new(source);
+    let all = source.mission.log.headlines(source.span());
+    let others = all.filter(|(id, _)| !placed.contains(id));
+    let mark = |(id, event): (EventId, &Event)| {
+        let sign = match event.kind {
+            Kind::Started | Kind::Appeared => Sign::Start,
+            Kind::Stopped | Kind::Vanished => Sign::End,
+            _ => Sign::Dot,
+        };
+        sentences.mark(id, event, sign)
+    };
+    others.map(mark).collect()
+}

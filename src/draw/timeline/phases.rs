@@ -1,0 +1,168 @@
+//! The phases of the mission: their names in the band above rows, and their titles below a figure.
+
+use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
+use super::drawer::Axis;
+use super::notes::{TextRun, Unbroken, flow};
+use super::source::FigureSource;
+use crate::base::geometry::Point;
+use crate::base::time::Span;
+use crate::draw::scene::Stroke;
+use crate::mission::event_log::Phase;
+
+/// A phase in the band.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PhaseLabel {
+    pub(crate) span: Span,
+    /// Its names, the best first; the last is its number.
+    pub(crate) names: Vec<String>,
+    /// Whether elements begin or end in it one after another.
+    pub(crate) is_ramp: bool,
+}
+
+/// The phases by their numbers, which a figure explains below.
+pub(crate) fn numbered(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
+    let label = |(k, phase): (usize, &Phase)| PhaseLabel {
+        span: phase.span,
+        names: vec![(k + 1).to_string()],
+        is_ramp: phase.is_ramp,
+    };
+    source.phases.iter().enumerate().map(label).collect()
+}
+
+/// The phases with their names: the user's, else by the elements that start or end, else by their number. A
+/// phase without a name and with the same nodes as the previous one is merged with it.
+pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
+    let mut phases: Vec<PhaseLabel> = Vec::new();
+    for (k, phase) in source.phases.iter().enumerate() {
+        let counts = [('+', phase.nodes_added), ('−', phase.nodes_removed)];
+        let counts = counts.iter().filter(|(_, many)| *many > 0 && k > 0);
+        let counts: Vec<String> = counts.map(|(sign, n)| format!("{sign}{n}")).collect();
+        if let Some(last) = phases.last_mut()
+            && !source.is_named
+            && counts.is_empty()
+        {
+            last.span.end = phase.span.end;
+            continue;
+        }
+        let name = phase.name.to_string();
+        let mut names = match name.split_once(": ").filter(|_| !source.is_named) {
+            Some((count, those)) => {
+                let sign: String = count.chars().take(1).collect();
+                shorter(&sign, those, phase.nodes_added.max(phase.nodes_removed))
+            }
+            None => vec![name],
+        };
+        if !source.is_named && !counts.is_empty() {
+            names.push(counts.join(" "));
+        }
+        names.push((k + 1).to_string());
+        phases.push(PhaseLabel {
+            span: phase.span,
+            names,
+            is_ramp: false,
+        });
+    }
+    phases
+}
+
+/// The elements that began or ended, in fewer and fewer words: all that the phase names, then two and one of
+/// them.
+fn shorter(sign: &str, those: &str, all: u32) -> Vec<String> {
+    let mut names = vec![format!("{sign} {those}")];
+    let each = those.split(", ").flat_map(|part| part.split(" and "));
+    let each: Vec<&str> = each.collect();
+    for most in [2, 1] {
+        let rest = (all as usize).saturating_sub(most);
+        if each.len() > most && rest > 0 {
+            names.push(format!("{sign} {}, +{rest}", each[..most].join(", ")));
+        }
+    }
+    names
+}
+
+/// The title of a phase in a figure: `navigation (+4)`, `picking (+4 −4)`, `boot (11)`, `row (=)`, `(+2) as 3`.
+pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
+    let Some(phase) = source.phases.get(k) else {
+        return String::new();
+    };
+    let counts = match (k, phase.nodes_added, phase.nodes_removed) {
+        (0, all, _) => format!("({all})"),
+        (_, 0, 0) => "(=)".to_owned(),
+        (_, added, 0) => format!("(+{added})"),
+        (_, 0, removed) => format!("(−{removed})"),
+        (_, added, removed) => format!("(+{added} −{removed})"),
+    };
+    let name = if source.is_named || phase.is_ramp {
+        format!("{} ", phase.name)
+    } else {
+        String::new()
+    };
+    let again = phase.same_as.map(|k| format!(" as {}", k + 1));
+    format!("{name}{counts}{}", again.unwrap_or_default())
+}
+
+/// Draws the names of the phases from `y` on: at their positions on at most two lines if `axis` is long
+/// enough, else as running text. Returns the y at which they end.
+pub(crate) fn names(
+    canvas: &mut PaperCanvas<'_>,
+    source: &FigureSource<'_>,
+    width: f64,
+    y: f64,
+    at: Option<&Axis>,
+) -> f64 {
+    let titles: Vec<String> = (0..source.phases.len()).map(|k| title(source, k)).collect();
+    if let Some(end) = at.and_then(|axis| staircase(canvas, source, axis, y, &titles)) {
+        return end;
+    }
+    let items: Vec<Unbroken> = titles
+        .iter()
+        .enumerate()
+        .map(|(k, title)| {
+            vec![
+                TextRun::Words(Type::Strong, ink::TEXT, format!("{} ", k + 1)),
+                TextRun::Words(Type::Small, ink::TEXT, title.clone()),
+            ]
+        })
+        .collect();
+    flow(canvas, width, y, &items)
+}
+
+/// Draws the titles of the phases, set from the right: each is placed a line lower than every later one that
+/// it overlaps, so that no leader crosses a text. Returns the y at which they end; `None` if that takes more
+/// than three lines.
+fn staircase(
+    canvas: &mut PaperCanvas<'_>,
+    source: &FigureSource<'_>,
+    axis: &Axis,
+    y: f64,
+    titles: &[String],
+) -> Option<f64> {
+    let line = canvas.sizes.line();
+    let mut placed: Vec<(f64, f64, usize)> = Vec::new();
+    for (phase, title) in source.phases.iter().zip(titles).rev() {
+        let wide = canvas.width(title, Type::Small) + 0.7;
+        let left = axis.x(phase.span.start).min(axis.right - wide);
+        let under = placed
+            .iter()
+            .filter(|(other, ..)| left + wide + 1.2 > *other);
+        let row = under.map(|(.., row)| row + 1).max().unwrap_or(0);
+        placed.push((left, wide, row));
+    }
+    let rows = placed.iter().map(|(.., row)| row + 1).max()?;
+    if rows > 3 {
+        return None;
+    }
+    placed.reverse();
+    let leader = Stroke::solid(ink::RULE, HAIRLINE);
+    for ((phase, title), (left, _, row)) in source.phases.iter().zip(titles).zip(&placed) {
+        let middle = y + 0.5 + line * (*row as f64 + 0.5);
+        let x = axis.x(phase.span.start).max(axis.left + 0.1);
+        canvas.line(
+            Point::new(x, y),
+            Point::new(x, middle + line / 2.0),
+            &leader,
+        );
+        canvas.text(left + 0.7, middle, Type::Small, ink::TEXT, title);
+    }
+    Some(y + 0.5 + line * rows as f64)
+}
