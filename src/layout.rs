@@ -14,8 +14,6 @@ mod route;
 mod routes;
 mod spacing;
 
-pub(crate) use layered::parts::parts;
-pub(crate) use pack::shelves;
 pub use route::Route;
 
 use crate::base::error::{Error, Result};

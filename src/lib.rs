@@ -164,7 +164,7 @@ pub mod values {
         },
         layout::{Engine, Orientation},
         pipeline::{Body, Drawing, Purpose},
-        view::{Grouping, Hide, Mode, NameFilter, ViewOptions},
+        view::{Grouping, Hide, Mode, NameFilter, Presence, ViewOptions},
     };
 }
 

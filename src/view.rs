@@ -58,7 +58,7 @@ pub(crate) use nothing::{none_pass, nothing, unmatched, unmatched_topics};
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 use shown::sum;
 pub use shown::{Mark, Members, Shown};
-pub(crate) use still::Presence;
+pub use still::Presence;
 
 /// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
@@ -69,7 +69,8 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
         compares: mission.log.compares,
         ..assembled(viewed, options, frames)
     };
-    if options.is_still || view.frames.len() == 1 && !view.compares {
+    let is_still = options.is_still.unwrap_or(view.frames.len() == 1);
+    if is_still && !view.compares {
         view = still::still(view, mission);
     } else if options.is_picture {
         crowds::gather(&mut view, mission);
@@ -407,6 +408,11 @@ impl View {
     /// Whether there is a time axis to show: not for two compared missions, and not for one window.
     pub(crate) fn has_time(&self) -> bool {
         !self.compares && self.frames.len() > 1
+    }
+
+    /// Whether it is a still: one window, in which nothing changes.
+    pub(crate) fn is_still(&self) -> bool {
+        !self.compares && self.frames.len() == 1
     }
 
     /// Whether window `k` shows a change.

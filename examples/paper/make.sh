@@ -12,7 +12,7 @@ sha256sum "$bag" > SHA256SUMS
 "$bagreel" events "$bag" --format csv > events.csv
 # A column is 88 mm wide, the page 180 mm. Figures of that --width are included without scaling, so that 6 pt stay 6 pt.
 # With --bare, the legend is part of the caption in the .tex file.
-for figure in lives:88mm map:88mm steps:180mm; do
+for figure in lives:88mm graph:88mm steps:180mm; do
     "$bagreel" figure "$bag" --kind "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
         -o "${figure%%:*}.pdf" -o "${figure%%:*}.tex"
 done

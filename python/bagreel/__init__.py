@@ -141,7 +141,7 @@ def figure(
     source: str | os.PathLike[str] | None = None,
     infer: str | None = None,
 ) -> Rendered:
-    """Draws a figure for a paper, as `bagreel figure` does: lifelines, a map of publishers and subscribers, or the
+    """Draws a figure for a paper, as `bagreel figure` does: lifelines, the graph of publishers and subscribers, or the
     reconfigurations one by one; `width` is its width on paper (default 88mm).
     """
     offset, ns, topology = list(offset), list(ns), list(topology)

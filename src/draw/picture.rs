@@ -30,7 +30,7 @@ use self::gates::Gate;
 pub use self::ids::unshown;
 use self::ids::{arrow_id, encoded, item_id};
 use self::measured::MeasuredGraph;
-use self::page::{GraphFit, PageFrame};
+use self::page::{GraphFit, PageFrame, Strip};
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::{Point, Rect, Size};
@@ -89,6 +89,17 @@ impl Default for PageOptions {
 }
 
 impl PageOptions {
+    /// The strip at the bottom of a picture of this view.
+    pub(crate) fn strip(&self, view: &View) -> Strip {
+        if view.has_time() {
+            Strip::Timeline
+        } else if view.is_still() && !self.timeline.phases.is_empty() {
+            Strip::Phases
+        } else {
+            Strip::Nothing
+        }
+    }
+
     /// The title of the page; empty if none is given.
     pub(crate) fn title(&self) -> &str {
         self.title.as_deref().unwrap_or_default()
@@ -117,7 +128,7 @@ impl<'a> Measured<'a> {
         } else {
             Vec::new()
         };
-        let page = PageFrame::new(style, &options, legend.len(), view.has_time());
+        let page = PageFrame::new(style, &options, legend.len(), options.strip(view));
         Self {
             view,
             style,
@@ -231,7 +242,7 @@ impl<'a> Picture<'a> {
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
             timeline: Below::new(
-                page::below(style, &measured.options),
+                page::below(style, &measured.options, measured.options.strip(view)),
                 fonts,
                 page.timeline,
                 view,
@@ -308,7 +319,7 @@ impl<'a> Picture<'a> {
                 let (legend, style) = (&measured.legend, measured.style);
                 groups.push(legend::legend(legend, style, &measured.page));
             }
-            if measured.view.has_time() {
+            if measured.options.strip(measured.view) != Strip::Nothing {
                 groups.extend(self.timeline.ground());
             }
         }

@@ -8,7 +8,7 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::picture::PageOptions;
-use crate::draw::picture::page::{PageFrame, unit};
+use crate::draw::picture::page::{PageFrame, Strip, unit};
 use crate::draw::picture::title::Title;
 use crate::draw::scene::{Group, Scene, Stroke};
 use crate::draw::style::{Color, Style};
@@ -102,7 +102,7 @@ impl<'a> TopicTimeline<'a> {
             most = most_rows(&shown, style, &options);
         }
         let left_out = shorten(&mut shown, most, source);
-        let page = PageFrame::new(style, &options, 0, true);
+        let page = PageFrame::new(style, &options, 0, Strip::Timeline);
         let (drawer, scale) = placed(shown, &page, &options, fonts);
         if !is_sized {
             // A short timeline has no empty space below; encoders of video need an even number of rows.
@@ -385,7 +385,7 @@ fn room(page: &PageFrame, options: &PageOptions) -> Rect {
 
 /// The number of rows that are legible on this page.
 fn most_rows(timeline: &Timeline, style: &Style, options: &PageOptions) -> usize {
-    let page = PageFrame::new(style, options, 0, true);
+    let page = PageFrame::new(style, options, 0, Strip::Timeline);
     let pitch = sizes().pitch();
     let others = timeline.height(sizes(), pitch) - timeline.rows.len() as f64 * pitch + BELOW;
     let free = room(&page, options).h / SCALE.0 - others;

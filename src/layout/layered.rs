@@ -460,6 +460,31 @@ impl PlacedPart {
     }
 }
 
+impl PlacedPart {
+    /// The block with the places that its labels probably take, above lines to the right and beside lines down, so that
+    /// they do not cover the block next to it.
+    fn with_labels(&self, plan: &Plan, part: &Component, orientation: Orientation) -> Rect {
+        let block = Rect::new(0.0, 0.0, self.size.w, self.size.h);
+        let labels = part.links.iter().zip(&self.routes);
+        let labels = labels
+            .filter(|_| plan.is_labelled)
+            .filter_map(|(&i, route)| {
+                let size = plan.links[i].label?;
+                let line = Rect::of_points(route.points())?;
+                let middle = line.centre();
+                Some(match orientation {
+                    Orientation::LeftRight => {
+                        Rect::new(middle.x - size.w / 2.0, line.y - size.h, size.w, size.h)
+                    }
+                    Orientation::TopBottom => {
+                        Rect::new(line.right(), middle.y - size.h / 2.0, size.w, size.h)
+                    }
+                })
+            });
+        labels.fold(block, |all, label| all.union(&label))
+    }
+}
+
 /// All blocks packed, and the number of their crossings.
 pub(crate) fn assembled(
     plan: &Plan,
@@ -468,7 +493,11 @@ pub(crate) fn assembled(
     blocks: Vec<PlacedPart>,
     orientation: Orientation,
 ) -> (u64, Layout) {
-    let sizes: Vec<Size> = blocks.iter().map(|block| block.size).collect();
+    let bounds = parts.iter().zip(&blocks);
+    let bounds: Vec<Rect> = bounds
+        .map(|(part, block)| block.with_labels(plan, part, orientation))
+        .collect();
+    let sizes: Vec<Size> = bounds.iter().map(|b| Size::new(b.w, b.h)).collect();
     let (corners, size) = pack::pack(&sizes, options.page, PART_GAP);
     let crossings = blocks.iter().map(|block| block.crossings).sum();
     let mut layout = Layout {
@@ -479,7 +508,8 @@ pub(crate) fn assembled(
         clusters: vec![Rect::default(); plan.clusters.len()],
         ..Layout::default()
     };
-    for ((part, block), corner) in parts.iter().zip(blocks).zip(corners) {
+    for (((part, block), corner), bounds) in parts.iter().zip(blocks).zip(corners).zip(bounds) {
+        let corner = Point::new(corner.x - bounds.x, corner.y - bounds.y);
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {
             layout.boxes[v] = at.moved(corner);
         }

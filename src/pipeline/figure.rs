@@ -78,6 +78,7 @@ fn on_paper(sheet: &FigureSheet<'_>, drawing: &Drawing, width_mm: f64) -> Drawin
             mode: Mode::Nodes,
             is_picture: true,
             is_bundled: true,
+            is_still: Some(false),
             ..drawing.view.clone()
         },
         page: PageOptions {
@@ -97,7 +98,7 @@ fn of_graph(
 ) -> Result<(Scene, Vec<String>)> {
     let mission = sheet.source.mission;
     let mut drawing = on_paper(sheet, drawing, sheet.options.width_mm);
-    drawing.view.is_still = true;
+    drawing.view.is_still = Some(true);
     let composed = compose(mission, &drawing, watch);
     if composed.view.items.is_empty() {
         return Err(nothing(sheet.source));
@@ -235,13 +236,11 @@ fn weight(news: &News) -> usize {
 /// The drawing of a step that takes the smallest area of the page, with the number of columns that it spans: a
 /// high one costs more, since lines between boxes one below another are hard to follow. `None` if it fits in no number of columns.
 fn narrowest(drawing: &Drawing, news: &News, width_mm: f64) -> Option<(usize, Scene)> {
-    let unrated = news.view.without_rates();
-    let drawn = (1..=steps::columns(width_mm)).filter_map(|span| {
+    // Only rates that change are news.
+    let view = news.view.without_rates();
+    let drawn = steps::spans(width_mm).filter_map(|span| {
         let width = graph_width(width_mm, span) * PX_PER_MM;
-        // Rates are the first to give way.
-        let picture = narrow(drawing, &news.view, width);
-        let picture = picture.or_else(|| narrow(drawing, &unrated, width))?;
-        Some((span, picture))
+        Some((span, narrow(drawing, &view, width)?))
     });
     let cost = |(span, picture): &(usize, Scene)| {
         let Size { w, h } = picture.size;

@@ -195,8 +195,8 @@ pub struct ViewOptions {
     /// Whether one line between two nodes or collapsed namespaces stands for all topics in both directions, instead of an
     /// arrow for each; only with [`Mode::Nodes`].
     pub(crate) is_bundled: bool,
-    /// Whether all windows are drawn as one, in which nothing changes.
-    pub(crate) is_still: bool,
+    /// Whether all windows are drawn as one, in which nothing changes; `None` for a mission with a single window.
+    pub(crate) is_still: Option<bool>,
     /// Whether bundles also list nodes that never change as words if they have a single line.
     pub(crate) are_leaves_in_words: bool,
     /// Whether anonymous nodes are drawn under their full names, with a box for each run.

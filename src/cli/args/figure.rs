@@ -18,7 +18,7 @@ pub(crate) struct FigureArgs {
     /// `out/<bag name>.pdf`.
     #[arg(long = "output", short, value_name = "FILE")]
     pub(crate) outputs: Vec<OsString>,
-    /// Lifelines, a map of who publishes to whom, or the reconfigurations one by one.
+    /// Lifelines, the graph of who publishes to whom, or the reconfigurations one by one.
     #[arg(long, default_value = "lives", value_parser = one_of(FigureKind::ALL))]
     pub(crate) kind: FigureKind,
     /// Width on paper: `88mm`, `180mm`. [default: 88mm]
@@ -51,7 +51,7 @@ pub(crate) struct FigureArgs {
 /// The options of every kind of figure.
 #[derive(Debug, Default, Args)]
 pub(crate) struct FigureForm {
-    /// What a row or box represents. [default: the finest that fits]
+    /// What a row of `lives` represents. [default: the finest that fits]
     #[arg(long, value_name = "nodes|groups|topics", value_parser = one_of(RowKind::ALL))]
     pub(crate) rows: Option<RowKind>,
     /// Phases whose beginnings `steps` shows, such as `3,5`. [default: the six with most changes]

@@ -43,7 +43,7 @@ const SCREENS: [(&str, &str, &str); 13] = [
         "outputs kind width rows text phases start end ns_filter topic_filter",
         "
   bagreel figure run.bag -o lives.pdf                 lifelines, as wide as a column
-  bagreel figure run.bag --kind map -o map.pdf -o map.tex   publishers and subscribers, with LaTeX
+  bagreel figure run.bag --kind graph -o graph.pdf -o graph.tex   publishers and subscribers, with LaTeX
   bagreel figure run.bag --kind steps --steps 3,5 -o steps.pdf   how phases 3 and 5 begin",
     ),
     (

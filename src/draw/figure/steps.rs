@@ -39,13 +39,16 @@ pub(crate) struct StepPanel {
     pub(crate) left_out: usize,
 }
 
-/// The number of columns of a page of this width in millimetres: a column is at least as wide as two names.
-pub(crate) fn columns(width_mm: f64) -> usize {
-    match width_mm {
-        w if w >= 220.0 => 3,
-        w if w >= 130.0 => 2,
-        _ => 1,
-    }
+/// The narrowest panel in millimetres: a name of usual length on each side of an arrow.
+const NARROWEST: f64 = 42.0;
+/// The columns of a page, of which a panel spans some: halves and thirds of the page are whole numbers of them.
+const COLUMNS: usize = 6;
+
+/// The numbers of columns that a panel may span on a page of this width in millimetres: a third, half, two thirds or all
+/// of it.
+pub(crate) fn spans(width_mm: f64) -> impl Iterator<Item = usize> {
+    let spans = [2, 3, 4, COLUMNS].into_iter();
+    spans.filter(move |span| *span == COLUMNS || panel_width(width_mm, *span) >= NARROWEST)
 }
 
 /// The width in millimetres of the graph of a panel over so many columns.
@@ -54,12 +57,11 @@ pub(crate) fn graph_width(width_mm: f64, span: usize) -> f64 {
 }
 
 fn panel_width(width_mm: f64, span: usize) -> f64 {
-    let columns = columns(width_mm) as f64;
-    let one = (width_mm - BETWEEN * (columns - 1.0)) / columns;
-    (one + BETWEEN) * span as f64 - BETWEEN
+    let one = (width_mm + BETWEEN) / COLUMNS as f64;
+    one * span as f64 - BETWEEN
 }
 
-/// The page of these panels, in rows from left to right, with notes of repetitions and omissions.
+/// The page of these panels, each as high as possible and then as far to the left, with notes of repetitions and omissions.
 /// `left_out` smaller steps have no panel; those that repeat an earlier one are a sentence unless they were asked for.
 pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out: usize) -> Scene {
     let width = sheet.options.width_mm;
@@ -69,19 +71,19 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out
         Vec::new()
     };
     let mut canvas = sheet.canvas();
-    let columns = columns(width);
-    let (mut taken, mut top, mut bottom) = (0, 0.1, 0.1_f64);
+    let mut ends = [0.1; COLUMNS];
     let mut graphs = Vec::new();
     for (at, (panel, letter)) in panels.iter().zip('a'..='z').enumerate() {
-        if taken + panel.span > columns {
-            (taken, top) = (0, bottom + 1.2);
-        }
-        let left = if taken == 0 {
-            0.0
-        } else {
-            panel_width(width, taken) + BETWEEN
+        let end = |column: usize| {
+            let under = &ends[column..column + panel.span];
+            under.iter().copied().fold(0.0, f64::max)
         };
-        let corner = Point::new(left + 0.1, top);
+        let places = 0..=COLUMNS - panel.span.min(COLUMNS);
+        let column = places
+            .min_by(|a, b| end(*a).total_cmp(&end(*b)))
+            .unwrap_or(0);
+        let left = (width + BETWEEN) / COLUMNS as f64 * column as f64;
+        let corner = Point::new(left + 0.1, end(column));
         canvas.begin_step(at + 1, &panel.events);
         let wide = panel_width(width, panel.span) - 0.2;
         let (height, graph) = draw(&mut canvas, panel, letter, corner, wide);
@@ -91,11 +93,12 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, mut panels: Vec<StepPanel>, left_out
             group.id = format!("{letter}-{}", group.id);
             graphs.push(group);
         }
-        (taken, bottom) = (taken + panel.span, bottom.max(top + height));
+        ends[column..column + panel.span].fill(corner.y + height + 1.2);
     }
     canvas.begin("notes");
     let notes = notes(sheet, &panels, &repeated, left_out);
-    let y = flow(&mut canvas, width, bottom + 0.7, &notes);
+    let bottom = ends.into_iter().fold(0.0, f64::max);
+    let y = flow(&mut canvas, width, bottom - 0.5, &notes);
     let mut scene = canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Steps"));
     scene.groups.extend(graphs);
     scene

@@ -25,6 +25,17 @@ pub(crate) struct PageFrame {
     pub(crate) timeline: Rect,
 }
 
+/// What is at the bottom of the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Strip {
+    /// Nothing: two missions are compared, or a mission has a single window and no phases.
+    Nothing,
+    /// The phases of a still.
+    Phases,
+    /// The timeline of a film.
+    Timeline,
+}
+
 /// The scale and the position of the graph in its part of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GraphFit {
@@ -36,12 +47,7 @@ pub(crate) struct GraphFit {
 
 impl PageFrame {
     /// The page of these options, with `rows` rows of legend.
-    pub(crate) fn new(
-        style: &Style,
-        options: &PageOptions,
-        rows: usize,
-        has_timeline: bool,
-    ) -> Self {
+    pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize, bottom: Strip) -> Self {
         let size = options.size;
         let unit = unit(options);
         let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
@@ -51,8 +57,8 @@ impl PageFrame {
             if options.has_legend {
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
-            if has_timeline {
-                timeline = below(style, options).height(&options.timeline);
+            if bottom != Strip::Nothing {
+                timeline = below(style, options, bottom).height(&options.timeline);
             }
         }
         let margin = (style.page.margin * unit)
@@ -93,11 +99,12 @@ impl PageFrame {
 }
 
 /// The sizes of the timeline on a page.
-pub(crate) fn below<'a>(style: &'a Style, options: &PageOptions) -> BelowSizes<'a> {
+pub(crate) fn below<'a>(style: &'a Style, options: &PageOptions, strip: Strip) -> BelowSizes<'a> {
     BelowSizes {
         style,
         unit: unit(options),
         is_paper: options.width_mm.is_some(),
+        is_still: strip == Strip::Phases,
     }
 }
 

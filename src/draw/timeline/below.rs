@@ -30,6 +30,8 @@ pub(crate) struct BelowSizes<'a> {
     pub(crate) unit: f64,
     /// Whether the page is on paper, where text may be smaller than on a screen.
     pub(crate) is_paper: bool,
+    /// Whether it is below a still, which only needs the phases: nothing is before or after it.
+    pub(crate) is_still: bool,
 }
 
 impl BelowSizes<'_> {
@@ -46,7 +48,9 @@ impl BelowSizes<'_> {
 
     /// The distance from row to row in millimetres; messages have one high row.
     fn pitch(&self, timeline: &Timeline) -> f64 {
-        if timeline.rows.is_empty() {
+        if self.is_still {
+            0.0
+        } else if timeline.rows.is_empty() {
             self.style.timeline.height * self.unit / self.scale()
         } else {
             Self::sizes().pitch()
@@ -88,7 +92,9 @@ impl<'a> Below<'a> {
         let pitch = sizes.pitch(&timeline);
         let margin = sizes.style.page.margin * sizes.unit / scale;
         let wide = strip.w / scale - 2.0 * margin;
-        if timeline.rows.is_empty() {
+        if sizes.is_still {
+            timeline.rows.clear();
+        } else if timeline.rows.is_empty() {
             timeline.rows = vec![messages(view, wide * scale)];
         }
         let canvas = PaperCanvas::new(fonts, BelowSizes::sizes(), scale);

@@ -1,7 +1,6 @@
 //! The canvas that figures are drawn on: lengths in millimetres, four kinds of type, one palette; it becomes a scene.
 
 use crate::base::geometry::{Point, Rect, Size};
-use crate::base::words::visible;
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
@@ -34,11 +33,8 @@ pub(crate) mod ink {
     pub(crate) const TINT: Color = Color::of([0xee, 0xf1, 0xf5]);
     pub(crate) const RULE: Color = Color::of([0xa3, 0xab, 0xb8]);
     pub(crate) const ADDED: Color = Color::of([0x00, 0x79, 0x5c]);
-    pub(crate) const ADDED_FILL: Color = Color::of([0xe3, 0xf2, 0xec]);
     pub(crate) const REMOVED: Color = Color::of([0xc4, 0x49, 0x00]);
     pub(crate) const CHANGED: Color = Color::of([0x6a, 0x35, 0xc9]);
-    pub(crate) const CHANGED_FILL: Color = Color::of([0xef, 0xe9, 0xfb]);
-    pub(crate) const GROUND: Color = Color::of([0xf6, 0xf8, 0xfb]);
 }
 
 /// The kind of a text, which determines its size and weight.
@@ -123,18 +119,6 @@ impl<'a> PaperCanvas<'a> {
         if let Some(group) = self.group() {
             group.title = title;
         }
-    }
-
-    /// Begins the group of a box: the names of its members, and the events of the log about them.
-    pub(crate) fn begin_box<'n>(
-        &mut self,
-        names: impl Iterator<Item = &'n str>,
-        events: &[EventId],
-    ) {
-        let id = format!("node-{}", self.groups.len());
-        let names: Vec<String> = names.map(|name| visible(name).into_owned()).collect();
-        let name = vec![("name", names.join(" "))];
-        self.open(&id, "node", [name, event_data(events)].concat());
     }
 
     /// Begins the group of a step: its number, counted from 1, and the events of the log in it.

@@ -249,14 +249,3 @@ impl Places {
         from.or(to).map(|(_, row)| row).or_else(sender)
     }
 }
-
-/// The marks of some rows, with those of the topics that are taken over from them.
-pub(crate) fn on<'a>(rows: &'a [Row], of: &'a [usize]) -> impl Iterator<Item = &'a RowMark> {
-    let nodes: BTreeSet<NodeId> = of.iter().flat_map(|at| rows[*at].nodes.clone()).collect();
-    let all = rows.iter().enumerate();
-    let marks = all.flat_map(|(at, row)| row.marks.iter().map(move |mark| (at, mark)));
-    let own = marks.filter(move |(at, mark)| {
-        of.contains(at) || mark.from.is_some_and(|id| nodes.contains(&id))
-    });
-    own.map(|(_, mark)| mark)
-}

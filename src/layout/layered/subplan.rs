@@ -95,11 +95,6 @@ impl PlacedPart {
 }
 
 impl Component {
-    /// All of it as a separate plan.
-    pub(crate) fn plan(&self, whole: &Plan) -> Plan {
-        Subplan::new(whole, self, 0, |_| true).plan
-    }
-
     /// A cluster and those around it, the innermost first, without the outside.
     pub(crate) fn around(&self, cluster: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::successors(Some(cluster), |&c| Some(self.parent[c])).take_while(|&c| c != 0)

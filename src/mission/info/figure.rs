@@ -19,13 +19,13 @@ pub struct FigureInfo {
     pub shows: String,
 }
 
-/// The figures that fit, best first: lifelines if elements start or stop, else the map if edges are known.
+/// The figures that fit, best first: lifelines if elements start or stop, else the graph if edges are known.
 pub(crate) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.log.phases.len();
-    let fitting = [lives(mission), map(mission), steps(many)];
+    let fitting = [lives(mission), graph(mission), steps(many)];
     let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();
     if many <= 1 {
-        all.sort_by_key(|f| f.figure != "map");
+        all.sort_by_key(|f| f.figure != "graph");
     }
     all
 }
@@ -51,7 +51,7 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
     })
 }
 
-fn map(mission: &Mission) -> Option<FigureInfo> {
+fn graph(mission: &Mission) -> Option<FigureInfo> {
     let elements = &mission.elements;
     let is_shown = |node: NodeId| {
         let node = elements.nodes.get(node);
@@ -65,9 +65,9 @@ fn map(mission: &Mission) -> Option<FigureInfo> {
     });
     let both = both.count();
     (both > 0).then(|| FigureInfo {
-        figure: "map",
+        figure: "graph",
         shows: format!(
-            "who publishes to whom: over {}",
+            "who publishes to whom, and when: over {}",
             words::count(both, "topic")
         ),
     })
