@@ -45,12 +45,21 @@ impl Timeline {
         }
     }
 
-    /// The rows with events, at most `most`: elements that begin and end together are one.
+    /// The rows with events, at most `most`, with the names of phases: elements that begin and end together are one.
     pub(crate) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Self {
         Self {
             span: source.span(),
             phases: phases::named(source),
-            rows: arranged::together(source, rows, most),
+            rows: arranged::together(source, rows, most, false),
+        }
+    }
+
+    /// The same for paper, with one more row for all elements without events.
+    pub(crate) fn grouped(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Self {
+        Self {
+            span: source.span(),
+            phases: phases::numbered(source),
+            rows: arranged::together(source, rows, most, true),
         }
     }
 

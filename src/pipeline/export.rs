@@ -15,8 +15,7 @@ use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, StripWidth, strip};
 use crate::draw::timeline::Timeline;
-use crate::draw::timeline::marks::marked;
-use crate::draw::timeline::rows::{known, of_topics};
+use crate::draw::timeline::rows::{known, marked_topics};
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::topic_timeline::TopicTimeline;
 use crate::export::options::{self, Choice, FigureOptions};
@@ -404,11 +403,9 @@ fn show_timeline(
         page,
         is_sized,
     );
-    let remarks = timeline.remarks().into_iter();
-    all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = timeline.overview();
     let data = chosen(job, &mission, &mut all);
-    let lives = Timeline::by_namespace(&source, marked(&source, of_topics(&source)), false);
+    let lives = Timeline::by_namespace(&source, marked_topics(&source), false);
     // Each topic has its own row.
     let mut each = drawing.clone();
     each.view.group = Grouping::parse("none")?;

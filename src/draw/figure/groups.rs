@@ -3,11 +3,9 @@
 //! of them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
-use crate::base::name::{last_part, namespace};
-use crate::base::time::Span;
-use crate::draw::timeline::rows::{Row, SendingBar};
+use crate::base::name::namespace;
+use crate::draw::timeline::rows::Row;
 use crate::draw::timeline::source::FigureSource;
 use crate::mission::phases::configurations;
 
@@ -67,42 +65,6 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Row], depth: usize) ->
             members,
         })
         .collect()
-}
-
-/// A row per group: it exists while a member does, and sums the messages of all.
-pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Row], depth: usize) -> Vec<Row> {
-    groups(source, tracks, depth)
-        .iter()
-        .map(|group| match group.members[..] {
-            [only] => tracks[only].clone(),
-            _ => together(source, group, tracks),
-        })
-        .collect()
-}
-
-fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Row]) -> Row {
-    let members = || group.members.iter().map(|at| &tracks[*at]);
-    let lives = members().flat_map(|t| &t.lives).copied().collect();
-    let whole = source.span();
-    let sends = members().flat_map(|t| &t.bars).map(|b| b.span).collect();
-    let bar = |span: Span| SendingBar { span, share: 1.0 };
-    let first = members().next();
-    let more = group.members.len() - 1;
-    let space = group.space.trim_end_matches('/');
-    let name = first.map_or_else(String::new, |t| {
-        format!("{space}/{} +{more}", last_part(&t.name))
-    });
-    Row {
-        name: Arc::from(name),
-        nodes: members().flat_map(|t| &t.nodes).copied().collect(),
-        lives: Span::joined(lives, 0),
-        bars: Span::joined(sends, whole.nanos() / 83)
-            .into_iter()
-            .map(bar)
-            .collect(),
-        hz: members().filter_map(|t| t.hz).reduce(|a, b| a + b),
-        ..Row::default()
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
-use super::groups::depths;
 use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
@@ -75,21 +74,19 @@ impl<'a> FigureSheet<'a> {
         if rows.is_empty() {
             return Err(nothing(source));
         }
-        let timeline = |rows: Vec<Row>| Timeline::by_namespace(source, marked(source, rows), true);
-        let first = timeline(rows.clone());
+        let rows = marked(source, rows);
+        let each = Timeline::by_namespace(source, rows.clone(), true);
         let is_grouped = self.options.rows == Some(RowKind::Groups);
         let (mut scene, mut remarks) = (None, Vec::new());
         if !is_grouped {
-            scene = self.lives_page(&first, by_topics).filter(fits);
+            scene = self.lives_page(&each, by_topics).filter(fits);
         }
         if scene.is_none()
             && !by_topics
             && matches!(self.options.rows, None | Some(RowKind::Groups))
         {
-            scene = depths(&rows).find_map(|depth| {
-                let groups = super::groups::tracks(source, &rows, depth);
-                self.lives_page(&timeline(groups), by_topics).filter(fits)
-            });
+            let groups = Timeline::grouped(source, rows.clone(), self.most_rows());
+            scene = self.lives_page(&groups, by_topics).filter(fits);
             if scene.is_some() && !is_grouped {
                 let many = words::count(rows.len(), "node");
                 remarks.push(format!(
@@ -102,7 +99,7 @@ impl<'a> FigureSheet<'a> {
         } else {
             "--ns-filter"
         };
-        let scene = scene.ok_or_else(|| self.too_high(&first, &rows, flag))?;
+        let scene = scene.ok_or_else(|| self.too_high(&each, &rows, flag))?;
         Ok((scene, remarks))
     }
 
@@ -131,6 +128,11 @@ impl<'a> FigureSheet<'a> {
         Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
     }
 
+    /// The number of rows that fit on a page with their notes.
+    fn most_rows(&self) -> usize {
+        cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch())
+    }
+
     /// The error for a figure that does not fit, with a namespace that would fit.
     fn too_high(&self, timeline: &Timeline, rows: &[Row], flag: &str) -> Error {
         let canvas = self.canvas();
@@ -145,8 +147,7 @@ impl<'a> FigureSheet<'a> {
             );
         }
         let high = timeline.height(self.sizes, self.sizes.pitch());
-        let most = cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch());
-        let hint = filter_that_fits(rows, most, flag, "row");
+        let hint = filter_that_fits(rows, self.most_rows(), flag, "row");
         let rows = words::count(timeline.rows.len(), "row");
         Error::usage(
             format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::marks::{RowMark, Sentences, Sign};
+use super::marks::{RowMark, Sign};
 use super::rows::{Level, Row, SendingBar};
 use super::source::FigureSource;
 use crate::base::name::{last_part, namespace};
@@ -124,34 +124,34 @@ fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
     rows
 }
 
-/// A row for all that begin and end together, in at most `most` rows; only rows with events. Events without a row share
-/// the last one.
-pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Vec<Row> {
+/// A row for all that begin and end together, in at most `most` rows; those without events are none, or one if
+/// `is_complete`. Events without a row share the last one.
+pub(super) fn together(
+    source: &FigureSource<'_>,
+    rows: Vec<Row>,
+    most: usize,
+    is_complete: bool,
+) -> Vec<Row> {
     let whole = source.span();
     let near = whole.nanos() / NEAR;
     let begun = whole.start.plus(near);
     let mut rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
+    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
+    let is_shared = |last: &str| names.iter().filter(|n| last_part(n) == last).count() > 1;
     for row in &mut rows {
         // Elements that start with the recording look as if they existed from the beginning.
         row.marks
             .retain(|mark| mark.sign != Sign::Start || mark.at >= begun);
-    }
-    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
-    let is_shared = |last: &str| names.iter().filter(|n| last_part(n) == last).count() > 1;
-    for row in &mut rows {
         row.labels = vec![match last_part(&row.name) {
             last if is_shared(last) => row.name.to_string(),
             last => last.to_owned(),
         }];
     }
-    let placed: BTreeSet<EventId> = rows
-        .iter()
-        .flat_map(|row| &row.marks)
-        .flat_map(|mark| mark.events.clone())
-        .collect();
     let bursts = [Sign::Start, Sign::End].map(|sign| bursts(&rows, sign, near));
+    let (open, fixed): (Vec<Row>, Vec<Row>) =
+        rows.into_iter().partition(|row| !row.marks.is_empty());
     let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<Row>> = BTreeMap::new();
-    for row in rows.into_iter().filter(|row| !row.marks.is_empty()) {
+    for row in open {
         let turns = row.marks.iter().filter_map(|mark| match mark.sign {
             Sign::Start => Some((true, burst(&bursts[0], mark.at))),
             Sign::End => Some((false, burst(&bursts[1], mark.at))),
@@ -161,7 +161,7 @@ pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -
     }
     let mut rows: Vec<Row> = groups.into_values().map(|own| joined(own, near)).collect();
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
-    let mut others = unplaced(source, &placed);
+    let mut others = unplaced(source, &rows);
     while rows.len() + usize::from(!others.is_empty()) > most.max(1) {
         let few = rows.iter().enumerate().min_by_key(|(at, row)| {
             let members = row.labels.len() * row.marks.len();
@@ -177,6 +177,9 @@ pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -
             marks: others,
             ..Row::default()
         });
+    }
+    if is_complete && !fixed.is_empty() {
+        rows.insert(0, folded(fixed, whole));
     }
     rows
 }
@@ -205,6 +208,7 @@ fn joined(rows: Vec<Row>, near: i64) -> Row {
         share: JOINED,
     };
     let labels = rows.iter().flat_map(|row| row.labels.clone()).collect();
+    let hz = rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b);
     let mut all: Vec<RowMark> = rows.into_iter().flat_map(|row| row.marks).collect();
     all.sort_by_key(|mark| mark.at);
     let mut marks: Vec<RowMark> = Vec::new();
@@ -225,6 +229,7 @@ fn joined(rows: Vec<Row>, near: i64) -> Row {
     }
     Row {
         bars: lives.iter().map(bar).collect(),
+        hz,
         lives,
         labels,
         marks,
@@ -233,8 +238,10 @@ fn joined(rows: Vec<Row>, near: i64) -> Row {
 }
 
 /// The events of the log without a row.
-fn unplaced(source: &FigureSource<'_>, placed: &BTreeSet<EventId>) -> Vec<RowMark> {
-    let sentences = Sentences::new(source);
+fn unplaced(source: &FigureSource<'_>, rows: &[Row]) -> Vec<RowMark> {
+    let marks = rows.iter().flat_map(|row| &row.marks);
+    let placed: BTreeSet<EventId> = marks.flat_map(|mark| mark.events.clone()).collect();
+    let parts = source.mission.log.all_parts();
     let all = source.mission.log.headlines(source.span());
     let others = all.filter(|(id, _)| !placed.contains(id));
     let mark = |(id, event): (EventId, &Event)| {
@@ -243,7 +250,7 @@ fn unplaced(source: &FigureSource<'_>, placed: &BTreeSet<EventId>) -> Vec<RowMar
             Kind::Stopped | Kind::Vanished => Sign::End,
             _ => Sign::Dot,
         };
-        sentences.mark(id, event, sign)
+        RowMark::new(source, &parts, (id, event), sign)
     };
     others.map(mark).collect()
 }

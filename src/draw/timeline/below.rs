@@ -138,10 +138,8 @@ impl<'a> Below<'a> {
         let time = frame.shown();
         let mut canvas = self.canvas();
         self.drawer.now(&mut canvas, time, &|row| row.is_in(time));
-        let mut groups = canvas.into_styled(self.style);
-        let mut canvas = self.canvas();
         self.drawer.marks(&mut canvas);
-        groups.extend(canvas.into_styled(self.style));
+        let mut groups = canvas.into_styled(self.style);
         groups.push(self.drawer.playhead(time, self.scale, self.style));
         groups
     }

@@ -47,10 +47,12 @@ pub(crate) fn notes(
         if !row.folded.is_empty() {
             let names: Vec<&str> = row.folded.iter().map(|name| last_part(name)).collect();
             let names = words::some_of(&names, MOST_NAMED);
-            items.push(sentence(
-                ink::QUIET,
-                format!("Throughout in {space}: {names}."),
-            ));
+            let within = match space {
+                "" => String::new(),
+                space => format!(" in {space}"),
+            };
+            let text = format!("Throughout{within}: {names}.");
+            items.push(sentence(ink::QUIET, text));
         }
     }
     let has_words = |id| {
@@ -129,8 +131,7 @@ pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
 }
 
 fn sign(canvas: &mut PaperCanvas<'_>, sign: Sign, x: f64, y: f64) {
-    let pitch = canvas.sizes.pitch();
-    put(canvas, sign, Point::new(x, y), pitch);
+    put(canvas, sign, Point::new(x, y), 1.0);
 }
 
 fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {

@@ -1,7 +1,7 @@
 //! A row per node or topic: the times at which it existed and published, and its rates. Lifetimes and rates are
 //! those of the mission's history; the height of a bar only changes where the log has another rate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::marks::{RowMark, marked};
@@ -96,8 +96,13 @@ pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
     if source.knows_publishers() {
         marked(source, of_nodes(source))
     } else {
-        marked(source, of_topics(source))
+        marked_topics(source)
     }
+}
+
+/// A row per topic that carried a message, with their events.
+pub(crate) fn marked_topics(source: &FigureSource<'_>) -> Vec<Row> {
+    marked(source, of_topics(source))
 }
 
 /// A row per role.
@@ -286,53 +291,38 @@ fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
     pieces.into_iter().map(bar).collect()
 }
 
-/// The sum of several rates over time; pieces too short to be visible belong to their neighbours.
+/// The sum of several rates over time. Pieces too short to be visible belong to their neighbours, and so do silences.
 fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
-    let all = || rates.iter().flatten();
-    let mut turns: Vec<(Stamp, f64, i64)> = all().map(|p| (p.span.start, p.hz, 1)).collect();
-    turns.extend(all().map(|p| (p.span.end, -p.hz, -1)));
-    turns.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.cmp(&a.2)).then(a.1.total_cmp(&b.1)));
+    // The changes of the rate, and of the number of senders.
+    let mut turns: BTreeMap<Stamp, (f64, i64)> = BTreeMap::new();
+    for piece in rates.iter().flatten() {
+        for (at, sign) in [(piece.span.start, 1), (piece.span.end, -1)] {
+            let turn = turns.entry(at).or_default();
+            *turn = (turn.0 + piece.hz * sign as f64, turn.1 + sign);
+        }
+    }
+    let is_short = |span: Span| span.nanos() < whole.nanos() / SEEN;
     let mut found: Vec<Piece> = Vec::new();
     let (mut hz, mut many) = (0.0, 0);
-    for (pair, next) in turns.iter().zip(turns.iter().skip(1)) {
-        hz += pair.1;
-        many += pair.2;
-        let span = Span::new(pair.0, next.0);
-        if many == 0 || span.start >= span.end {
-            continue;
-        }
-        let short = span.nanos() < whole.nanos() / SEEN;
-        match found.last_mut() {
-            Some(last) if last.span.end == span.start && (short || same(last.hz, hz)) => {
-                last.span.end = span.end;
+    for ((at, turn), end) in turns.iter().zip(turns.keys().skip(1)) {
+        (hz, many) = (hz + turn.0, many + turn.1);
+        let new = Piece {
+            span: Span::new(*at, *end),
+            hz: f64::max(hz, 0.0),
+        };
+        let before = found.last_mut();
+        match before.filter(|last| at.since(last.span.end) < silence(whole)) {
+            _ if many == 0 => {}
+            Some(last) if same(last.hz, new.hz) || is_short(new.span) => last.span.end = *end,
+            Some(last) if is_short(last.span) => (last.span.end, last.hz) = (*end, new.hz),
+            Some(last) => {
+                last.span.end = *at;
+                found.push(new);
             }
-            Some(last)
-                if last.span.end == span.start && last.span.nanos() < whole.nanos() / SEEN =>
-            {
-                (last.span.end, last.hz) = (span.end, f64::max(hz, 0.0));
-            }
-            _ => found.push(Piece {
-                span,
-                hz: f64::max(hz, 0.0),
-            }),
+            None => found.push(new),
         }
     }
-    // Bars separated by a silence too short to be visible are drawn without it.
-    let mut joined: Vec<Piece> = Vec::new();
-    for piece in found {
-        match joined.last_mut() {
-            Some(last) if piece.span.start.since(last.span.end) < silence(whole) => {
-                last.span.end = piece.span.start;
-                if same(last.hz, piece.hz) {
-                    last.span.end = piece.span.end;
-                } else {
-                    joined.push(piece);
-                }
-            }
-            _ => joined.push(piece),
-        }
-    }
-    joined
+    found
 }
 
 /// Whether two rates cannot be distinguished as heights of bars.
