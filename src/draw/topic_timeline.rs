@@ -12,11 +12,13 @@ use crate::draw::picture::title::Title;
 use crate::draw::scene::{Scene, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::arranged::{by_namespace, together};
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
-use crate::draw::timeline::drawer::{Axis, Density, Drawer};
-use crate::draw::timeline::rows::{Row, marked_topics};
+use crate::draw::timeline::drawer::{Density, Drawer};
+use crate::draw::timeline::rows::{Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
-use crate::draw::timeline::{Timeline, phases};
+
 use crate::graph::{Element, ElementState, NodeId};
 use crate::view::{Frame, View};
 
@@ -27,12 +29,6 @@ const SCALE: (f64, f64) = (4.26, 5.6);
 const NARROW: f64 = 960.0;
 /// The largest page that a timeline grows to if the user chose none.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
-/// The widths of types and of rates, in millimetres, and the space between columns.
-const TYPES: f64 = 58.0;
-const RATES: f64 = 15.0;
-const BETWEEN: f64 = 2.4;
-/// The largest fraction of the width for the names of topics.
-const MOST_NAMES: f64 = 0.29;
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
@@ -78,14 +74,10 @@ impl<'a> TopicTimeline<'a> {
         mut options: PageOptions,
         is_sized: bool,
     ) -> Self {
-        let rows: Vec<Row> = marked_topics(source).into_iter().map(Row::plain).collect();
-        let topics = rows.len();
-        let named = |timeline: Timeline| Timeline {
-            phases: phases::named(source),
-            ..timeline
-        };
-        let each = |is_folded| named(Timeline::by_namespace(source, rows.clone(), is_folded));
-        let (mut timeline, pitch) = (each(false), sizes().pitch());
+        let rows: Vec<Row> = of_topics(source).into_iter().map(Row::plain).collect();
+        let (topics, pitch) = (rows.len(), sizes().pitch());
+        let each = |is_folded| by_namespace(rows.clone(), source.span(), is_folded);
+        let mut timeline = Timeline::named(source, each(false));
         let others = timeline.height(sizes(), 0.0) + BELOW;
         let most = |options: &PageOptions| {
             let free = room(style, options).h / SCALE.0 - others;
@@ -99,10 +91,10 @@ impl<'a> TopicTimeline<'a> {
         }
         let most = most(&options);
         if timeline.rows.len() > most {
-            timeline = each(true);
+            timeline.rows = each(true);
         }
         if timeline.rows.len() > most {
-            timeline = named(Timeline::grouped(source, rows.clone(), most));
+            timeline.rows = together(source, rows, most, true);
         }
         let room = room(style, &options);
         let high = others + timeline.rows.len() as f64 * pitch;
@@ -114,25 +106,8 @@ impl<'a> TopicTimeline<'a> {
             let end = libm::ceil((room.y + high * scale) / 2.0) * 2.0;
             options.size.h = end.min(options.size.h);
         }
-        let (left, wide) = (room.x / scale, room.w / scale);
         let canvas = PaperCanvas::new(fonts, sizes(), scale);
-        let names = timeline.names_width(&canvas, Type::Name, wide * MOST_NAMES);
-        let types = if wide > 150.0 { TYPES } else { 0.0 };
-        let right = (left + wide - types - RATES - BETWEEN).max(left + names + 10.0);
-        let drawer = Drawer {
-            density: Density::Page,
-            top: room.y / scale,
-            left,
-            axis: Axis {
-                left: left + names,
-                right,
-                span: timeline.span,
-            },
-            pitch,
-            rates: Some(right + RATES),
-            beside: (types > 0.0).then_some((left + wide - types + BETWEEN, types - BETWEEN)),
-            timeline,
-        };
+        let drawer = Drawer::new(timeline, Density::Page, &canvas, room.scaled(1.0 / scale));
         Self {
             title: Title::new(style, fonts, &page, view, &options),
             view,

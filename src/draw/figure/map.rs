@@ -424,11 +424,10 @@ fn paint(
     for (at, lines) in drawn.labels.iter().enumerate() {
         placed.label(canvas, at, lines);
     }
-    let marked = marks::marked(sheet.source, tracks.to_vec());
     let boxes = drawn.looks.iter().zip(&drawn.members);
     for ((look, members), rect) in boxes.zip(&placed.boxes) {
         let names = members.iter().map(|at| &*tracks[*at].name);
-        let events: BTreeSet<_> = marks::on(&marked, members)
+        let events: BTreeSet<_> = marks::on(tracks, members)
             .flat_map(|m| m.events.clone())
             .collect();
         canvas.begin_box(names, &events.into_iter().collect::<Vec<_>>());

@@ -21,7 +21,7 @@ use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, ink};
 use crate::draw::timeline::drawer::clock;
-use crate::draw::timeline::marks::{Sign, marked};
+use crate::draw::timeline::marks::Sign;
 use crate::draw::timeline::notes::{Unbroken, flow, sentence};
 use crate::draw::timeline::phases::title;
 use crate::draw::timeline::rows::{Row, of_nodes};
@@ -104,7 +104,7 @@ impl<'s> StepSource<'s> {
             depth: depths(&tracks).next().unwrap_or(1),
             talks: Talks::new(sheet.source, &tracks),
             found: configurations(sheet.source.mission, sheet.source.phases),
-            tracks: marked(sheet.source, tracks),
+            tracks,
             sheet,
         })
     }

@@ -7,7 +7,7 @@ use super::marks::{RowMark, Sign};
 use super::rows::{Level, Row, SendingBar};
 use super::source::FigureSource;
 use crate::base::name::{last_part, namespace};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::NodeId;
 use crate::mission::EventId;
@@ -29,7 +29,7 @@ const JOINED: f64 = 0.6;
 
 /// The rows below the titles of their namespaces, in the order in which they begin. If `is_folded`, those of a namespace
 /// that exist throughout are one row, unless they are marked.
-pub(super) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<Row> {
+pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<Row> {
     let givers = rows.iter().flat_map(|row| &row.marks);
     let givers: BTreeSet<NodeId> = givers.filter_map(|mark| mark.from).collect();
     let is_fixed = |row: &Row| {
@@ -126,7 +126,7 @@ fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
 
 /// A row for all that begin and end together, in at most `most` rows; those without events are none, or one if
 /// `is_complete`. Events without a row share the last one.
-pub(super) fn together(
+pub(crate) fn together(
     source: &FigureSource<'_>,
     rows: Vec<Row>,
     most: usize,
@@ -147,19 +147,23 @@ pub(super) fn together(
             last => last.to_owned(),
         }];
     }
-    let bursts = [Sign::Start, Sign::End].map(|sign| bursts(&rows, sign, near));
     let (open, fixed): (Vec<Row>, Vec<Row>) =
         rows.into_iter().partition(|row| !row.marks.is_empty());
-    let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<Row>> = BTreeMap::new();
+    let mut rows: Vec<Row> = Vec::new();
     for row in open {
-        let turns = row.marks.iter().filter_map(|mark| match mark.sign {
-            Sign::Start => Some((true, burst(&bursts[0], mark.at))),
-            Sign::End => Some((false, burst(&bursts[1], mark.at))),
-            _ => None,
-        });
-        groups.entry(turns.collect()).or_default().push(row);
+        match rows.iter_mut().find(|first| first.is_with(&row, near)) {
+            Some(first) => first.join(row),
+            None => rows.push(row),
+        }
     }
-    let mut rows: Vec<Row> = groups.into_values().map(|own| joined(own, near)).collect();
+    for row in &mut rows {
+        row.lives = Span::joined(std::mem::take(&mut row.lives), 0);
+        let bar = |life: &Span| SendingBar {
+            span: *life,
+            share: JOINED,
+        };
+        row.bars = row.lives.iter().map(bar).collect();
+    }
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
     let mut others = unplaced(source, &rows);
     while rows.len() + usize::from(!others.is_empty()) > most.max(1) {
@@ -184,56 +188,36 @@ pub(super) fn together(
     rows
 }
 
-/// The beginnings of the bursts of signs of a kind: signs that follow within a short time belong to the first
-/// of them.
-fn bursts(rows: &[Row], sign: Sign, near: i64) -> Vec<Stamp> {
-    let marks = rows.iter().flat_map(|row| &row.marks);
-    let mut times: Vec<Stamp> = marks.filter(|m| m.sign == sign).map(|m| m.at).collect();
-    times.sort_unstable();
-    times.dedup_by(|later, first| later.since(*first) <= near);
-    times
-}
-
-fn burst(bursts: &[Stamp], at: Stamp) -> Stamp {
-    let next = bursts.partition_point(|first| *first <= at);
-    next.checked_sub(1).map_or(at, |found| bursts[found])
-}
-
-/// One row for several, with one sign for simultaneous starts or ends.
-fn joined(rows: Vec<Row>, near: i64) -> Row {
-    let lives = rows.iter().flat_map(|row| row.lives.clone()).collect();
-    let lives = Span::joined(lives, 0);
-    let bar = |life: &Span| SendingBar {
-        span: *life,
-        share: JOINED,
-    };
-    let labels = rows.iter().flat_map(|row| row.labels.clone()).collect();
-    let hz = rows.iter().filter_map(|row| row.hz).reduce(|a, b| a + b);
-    let mut all: Vec<RowMark> = rows.into_iter().flat_map(|row| row.marks).collect();
-    all.sort_by_key(|mark| mark.at);
-    let mut marks: Vec<RowMark> = Vec::new();
-    for mark in all {
-        let is_same = |other: &&mut RowMark| {
-            let apart = mark.at.since(other.at);
-            other.sign == mark.sign && mark.sign != Sign::Dot && apart.abs() <= near
-        };
-        match marks.iter_mut().rev().find(is_same) {
-            Some(other) => {
-                let is_later = (other.sign == Sign::End) == (mark.at > other.at);
-                other.at = if is_later { mark.at } else { other.at };
-                other.events.extend(mark.events);
-                other.title = format!("{}; {}", other.title, mark.title);
-            }
-            None => marks.push(mark),
-        }
+impl Row {
+    /// Whether it begins and ends as often as another row, each time nearly at the same time.
+    fn is_with(&self, other: &Self, near: i64) -> bool {
+        let is_same =
+            |(a, b): (&RowMark, &RowMark)| a.sign == b.sign && a.at.since(b.at).abs() <= near;
+        self.turns().count() == other.turns().count()
+            && self.turns().zip(other.turns()).all(is_same)
     }
-    Row {
-        bars: lives.iter().map(bar).collect(),
-        hz,
-        lives,
-        labels,
-        marks,
-        ..Row::default()
+
+    /// Takes a row that begins and ends with it, with one sign for each time: the first start, the last end.
+    fn join(&mut self, other: Self) {
+        self.labels.extend(other.labels);
+        self.lives.extend(other.lives);
+        self.hz = [self.hz, other.hz]
+            .into_iter()
+            .flatten()
+            .reduce(|a, b| a + b);
+        (self.topic, self.beside) = (None, <[Vec<String>; 2]>::default());
+        let (turns, dots): (Vec<RowMark>, Vec<RowMark>) =
+            other.marks.into_iter().partition(RowMark::is_turn);
+        let own = self.marks.iter_mut().filter(|mark| mark.is_turn());
+        for (own, other) in own.zip(turns) {
+            own.at = match own.sign {
+                Sign::Start => own.at.min(other.at),
+                _ => own.at.max(other.at),
+            };
+            own.events.extend(other.events);
+            own.title = format!("{}; {}", own.title, other.title);
+        }
+        self.marks.extend(dots);
     }
 }
 

@@ -2,8 +2,8 @@
 //! playhead at the window.
 
 use super::Timeline;
-use super::canvas::{MM_PER_PT, PaperCanvas, Sizes, Type};
-use super::drawer::{Axis, Density, Drawer};
+use super::canvas::{MM_PER_PT, PaperCanvas, Sizes};
+use super::drawer::{Density, Drawer};
 use super::rows::{Row, SendingBar};
 use crate::base::cast;
 use crate::base::geometry::Rect;
@@ -19,8 +19,6 @@ const SMALLEST_TEXT: f64 = 10.0;
 const AROUND: f64 = 7.0;
 /// The narrowest bar of messages, in pixels.
 const NARROWEST: f64 = 2.5;
-/// The largest fraction of the width for the names of rows.
-const NAMES: f64 = 0.22;
 
 /// The scale and the page of a timeline below a frame.
 #[derive(Clone, Copy)]
@@ -91,22 +89,11 @@ impl<'a> Below<'a> {
         if timeline.rows.is_empty() {
             timeline.rows = vec![messages(view, wide * scale)];
         }
+        timeline.span = span;
         let canvas = PaperCanvas::new(fonts, BelowSizes::sizes(), scale);
-        let names = timeline.names_width(&canvas, Type::Strong, wide * NAMES);
-        let drawer = Drawer {
-            timeline,
-            density: Density::Frame,
-            top: (strip.y + AROUND * sizes.unit) / scale,
-            left: margin,
-            axis: Axis {
-                left: margin + names,
-                right: margin + wide.max(names + 1.0 / scale),
-                span,
-            },
-            pitch,
-            rates: None,
-            beside: None,
-        };
+        let place = Rect::new(margin, (strip.y + AROUND * sizes.unit) / scale, wide, 0.0);
+        let mut drawer = Drawer::new(timeline, Density::Frame, &canvas, place);
+        drawer.pitch = pitch;
         Self {
             style: sizes.style,
             fonts,

@@ -27,6 +27,8 @@ const TICK: f64 = 2.24 / 2.75;
 /// millimetres.
 const LETTER: f64 = 1.08 / 2.75;
 const APART: f64 = 2.3;
+/// The least width of a page with a column beside the rows, in millimetres.
+const WIDE: f64 = 150.0;
 /// The most names that are written for a row, and beside it.
 const MOST_NAMES: (usize, usize) = (3, 12);
 
@@ -102,7 +104,7 @@ pub(crate) fn clock(nanos: i64) -> String {
     words::moment(second * 1_000_000_000)
 }
 
-/// Draws the band from `y` down; phases of an odd number are darker, ramps are hatched.
+/// Draws the band from `y` down; phases of an odd number are darker.
 pub(crate) fn band(
     canvas: &mut PaperCanvas<'_>,
     axis: &Axis,
@@ -113,9 +115,6 @@ pub(crate) fn band(
     for (k, phase) in phases.iter().enumerate() {
         let cell = axis.rect(phase.span, y, BAND.0);
         canvas.fill(cell, ink::BAND[k % 2]);
-        if phase.is_ramp {
-            hatch(canvas, cell);
-        }
         phase.write(
             canvas,
             cell,
@@ -144,16 +143,6 @@ impl PhaseLabel {
         };
         let at = cell.centre();
         canvas.text_middle(at.x, at.y, face.of, face.color, &name);
-    }
-}
-
-fn hatch(canvas: &mut PaperCanvas<'_>, rect: Rect) {
-    let stroke = Stroke::solid(ink::RULE, HAIRLINE);
-    let mut x = rect.x + 1.0;
-    while x < rect.right() {
-        let top = Point::new((x + rect.h * 0.5).min(rect.right()), rect.y);
-        canvas.line(Point::new(x, rect.bottom()), top, &stroke);
-        x += 1.4;
     }
 }
 
@@ -208,16 +197,6 @@ impl Timeline {
         let has_band = !self.phases.is_empty();
         if has_band { BAND.0 + BAND.1 } else { 0.0 }
     }
-
-    /// The width of the column of names in text of this kind: that of the widest, at most `most`.
-    pub(crate) fn names_width(&self, canvas: &PaperCanvas<'_>, of: Type, most: f64) -> f64 {
-        let one = |row: &Row| {
-            let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
-            canvas.width(&text, row.face(of)) + row.indent()
-        };
-        let widest = self.rows.iter().map(one).fold(0.0, f64::max);
-        (widest + GAP).min(most)
-    }
 }
 
 impl Row {
@@ -239,12 +218,73 @@ impl Row {
     }
 }
 
-impl Drawer {
+/// The columns of a density, in millimetres.
+struct Columns {
+    /// The largest width of names.
+    names: f64,
+    /// The width of rates.
+    rates: f64,
+    /// The width of the column beside the rows, on a page of at least [`WIDE`].
+    beside: f64,
+}
+
+impl Density {
+    fn columns(self, width: f64) -> Columns {
+        let is_wide = width >= WIDE;
+        let (names, rates, beside) = match self {
+            Self::Frame => (width * 0.22, 0.0, 0.0),
+            // Types of messages are longer than the names of topics, and rates have a unit.
+            Self::Page => (width.min(WIDE) * 0.36, 17.0, 58.0),
+            Self::Paper => (width.min(WIDE) * 0.36, 5.1, 68.0),
+        };
+        Columns {
+            names,
+            rates,
+            beside: if is_wide { beside } else { 0.0 },
+        }
+    }
+
     /// The kinds of text of names: usual, and those of rows that are in the window.
-    fn names(&self) -> [Type; 2] {
-        match self.density {
-            Density::Frame => [Type::Small, Type::Strong],
-            Density::Page | Density::Paper => [Type::Name; 2],
+    fn names(self) -> [Type; 2] {
+        match self {
+            Self::Frame => [Type::Small, Type::Strong],
+            Self::Page | Self::Paper => [Type::Name; 2],
+        }
+    }
+}
+
+impl Drawer {
+    /// A timeline of this width at the top left corner of `place`.
+    pub(crate) fn new(
+        timeline: Timeline,
+        density: Density,
+        canvas: &PaperCanvas<'_>,
+        place: Rect,
+    ) -> Self {
+        let columns = density.columns(place.w);
+        let one = |row: &Row| {
+            let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
+            canvas.width(&text, row.face(density.names()[1])) + row.indent()
+        };
+        let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
+        let unit = canvas.width("min:s", Type::Small) + 1.5;
+        let left = place.x + names.min(columns.names).max(unit);
+        let beside = place.right() - columns.beside;
+        let gap = if columns.beside > 0.0 { 1.8 } else { 0.0 };
+        let right = beside - gap - columns.rates;
+        Self {
+            density,
+            top: place.y,
+            left: place.x,
+            axis: Axis {
+                left,
+                right: right.max(left + 0.2),
+                span: timeline.span,
+            },
+            pitch: canvas.sizes.pitch(),
+            rates: (columns.rates > 0.0).then_some(right + columns.rates),
+            beside: (columns.beside > 0.0).then_some((beside, columns.beside)),
+            timeline,
         }
     }
 
@@ -329,7 +369,7 @@ impl Drawer {
         let (is_folded, is_paper) = (!row.folded.is_empty(), self.density == Density::Paper);
         if row.level == Level::Title || is_folded || is_paper {
             let color = if is_folded { ink::QUIET } else { ink::TEXT };
-            let of = self.names()[0];
+            let of = self.density.names()[0];
             self.name(canvas, y, row, Face { of, color });
         }
         if row.level == Level::Title {
@@ -365,7 +405,7 @@ impl Drawer {
     fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, face: Face) {
         let room = self.axis.left - self.left - GAP - row.indent() + 0.01;
         // In the widest kind, so that the words are the same in every window.
-        let widest = row.face(self.names()[1]);
+        let widest = row.face(self.density.names()[1]);
         let fits = |label: &str| canvas.width(label, widest) <= room;
         let label = fitting(&row.labels, MOST_NAMES.0, fits);
         let label = canvas.cut(&label, widest, room);
@@ -418,7 +458,7 @@ impl Drawer {
                 self.bar(canvas, y, &bar, ink::BAR);
             }
             let color = if is_now { ink::TEXT } else { ink::QUIET };
-            let of = self.names()[usize::from(is_now)];
+            let of = self.density.names()[usize::from(is_now)];
             self.name(canvas, y, row, Face { of, color });
         }
         let shared = |phase: &&PhaseLabel| {

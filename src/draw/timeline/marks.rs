@@ -49,6 +49,10 @@ pub(crate) struct RowMark {
 }
 
 impl RowMark {
+    pub(super) fn is_turn(&self) -> bool {
+        matches!(self.sign, Sign::Start | Sign::End)
+    }
+
     /// The mark of an event; `parts` are those of all events.
     pub(super) fn new(
         source: &FigureSource<'_>,
@@ -152,9 +156,9 @@ impl Row {
     }
 
     /// The ticks and crosses.
-    fn turns(&self) -> impl Iterator<Item = &RowMark> {
+    pub(super) fn turns(&self) -> impl Iterator<Item = &RowMark> {
         let marks = self.marks.iter();
-        marks.filter(|mark| matches!(mark.sign, Sign::Start | Sign::End))
+        marks.filter(|mark| mark.is_turn())
     }
 
     /// Whether it ends for good: its last tick or cross is a cross.

@@ -15,8 +15,6 @@ pub(crate) struct PhaseLabel {
     pub(crate) span: Span,
     /// Its names, the best first; the last is its number.
     pub(crate) names: Vec<String>,
-    /// Whether elements begin or end in it one after another.
-    pub(crate) is_ramp: bool,
 }
 
 /// The phases by their numbers, which a figure explains below.
@@ -24,7 +22,6 @@ pub(crate) fn numbered(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
     let label = |(k, phase): (usize, &Phase)| PhaseLabel {
         span: phase.span,
         names: vec![(k + 1).to_string()],
-        is_ramp: phase.is_ramp,
     };
     source.phases.iter().enumerate().map(label).collect()
 }
@@ -59,7 +56,6 @@ pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
         phases.push(PhaseLabel {
             span: phase.span,
             names,
-            is_ramp: false,
         });
     }
     phases

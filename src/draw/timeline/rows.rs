@@ -91,21 +91,16 @@ impl Row {
     }
 }
 
-/// A row per role, or per topic if publishers are unknown, with their events.
+/// A row per role, or per topic if publishers are unknown.
 pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
     if source.knows_publishers() {
-        marked(source, of_nodes(source))
+        of_nodes(source)
     } else {
-        marked_topics(source)
+        of_topics(source)
     }
 }
 
-/// A row per topic that carried a message, with their events.
-pub(crate) fn marked_topics(source: &FigureSource<'_>) -> Vec<Row> {
-    marked(source, of_topics(source))
-}
-
-/// A row per role.
+/// A row per role, with its events.
 pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
     let steps = Steps::new(source);
     let row = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
@@ -123,10 +118,10 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
         }
     };
     let rows = source.roles.iter().map(row);
-    rows.filter(|row| !row.lives.is_empty()).collect()
+    marked(source, rows.filter(|row| !row.lives.is_empty()).collect())
 }
 
-/// A row per topic that carried a message.
+/// A row per topic that carried a message, with its events.
 pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
     let steps = Steps::new(source);
     let row = |id: TopicId| {
@@ -141,8 +136,8 @@ pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
         }
     };
     let rows = source.shown_topics().map(row);
-    rows.filter(|row| !row.lives.is_empty() && !row.bars.is_empty())
-        .collect()
+    let rows = rows.filter(|row| !row.lives.is_empty() && !row.bars.is_empty());
+    marked(source, rows.collect())
 }
 
 /// The row of some elements drawn as one, without its name.
