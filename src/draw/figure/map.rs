@@ -14,10 +14,10 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
+use crate::draw::timeline::Timeline;
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use crate::draw::timeline::drawer::{self, Axis};
+use crate::draw::timeline::drawer::{Density, Drawer};
 use crate::draw::timeline::legend::MOST_NAMED;
-use crate::draw::timeline::marks;
 use crate::draw::timeline::notes::{flow, sentence};
 use crate::draw::timeline::phases;
 use crate::draw::timeline::rows::{Row, of_nodes};
@@ -166,22 +166,12 @@ fn below(
 ) -> f64 {
     let width = sheet.options.width_mm;
     let mut y = end + 1.2;
-    canvas.begin("phases");
     if !sheet.source.phases.is_empty() {
-        let axis = Axis {
-            left: 0.0,
-            right: width,
-            span: sheet.source.span(),
-        };
-        let phases = phases::numbered(sheet.source);
-        drawer::band(canvas, &axis, y, &phases, Type::Head);
-        y += drawer::BAND.0;
-        let wide = width >= 150.0;
-        if !wide {
-            y = axis.draw(canvas, y, false);
-        }
+        let timeline = Timeline::new(sheet.source, Vec::new());
+        let place = Rect::new(0.0, y, width, 0.0);
+        y = Drawer::new(timeline, Density::Paper, canvas, place).ground(canvas);
         canvas.begin("words");
-        y = phases::names(canvas, sheet.source, width, y, wide.then_some(&axis));
+        y = phases::names(canvas, sheet.source, width, y);
     }
     canvas.begin("notes");
     let mut text = String::new();
@@ -427,9 +417,8 @@ fn paint(
     let boxes = drawn.looks.iter().zip(&drawn.members);
     for ((look, members), rect) in boxes.zip(&placed.boxes) {
         let names = members.iter().map(|at| &*tracks[*at].name);
-        let events: BTreeSet<_> = marks::on(tracks, members)
-            .flat_map(|m| m.events.clone())
-            .collect();
+        let marks = members.iter().flat_map(|at| &tracks[*at].marks);
+        let events: BTreeSet<_> = marks.flat_map(|mark| mark.events.clone()).collect();
         canvas.begin_box(names, &events.into_iter().collect::<Vec<_>>());
         match look {
             MapBox::Capsule(name, phases) => capsule(canvas, *rect, name, phases),

@@ -101,7 +101,7 @@ impl<'a> FigureSheet<'a> {
         drawer.marks(&mut canvas);
         canvas.begin("words");
         if self.options.is_named || !self.options.is_bare {
-            y = names(&mut canvas, self.source, width, y, None);
+            y = names(&mut canvas, self.source, width, y);
         }
         y = flow(&mut canvas, width, y, &legend::letters(timeline));
         if !self.options.is_bare {

@@ -136,14 +136,16 @@ pub(crate) fn together(
     let near = whole.nanos() / NEAR;
     let begun = whole.start.plus(near);
     let mut rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
-    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
-    let is_shared = |last: &str| names.iter().filter(|n| last_part(n) == last).count() > 1;
+    let mut named: BTreeMap<String, usize> = BTreeMap::new();
+    for row in &rows {
+        *named.entry(last_part(&row.name).to_owned()).or_default() += 1;
+    }
     for row in &mut rows {
         // Elements that start with the recording look as if they existed from the beginning.
         row.marks
             .retain(|mark| mark.sign != Sign::Start || mark.at >= begun);
         row.labels = vec![match last_part(&row.name) {
-            last if is_shared(last) => row.name.to_string(),
+            last if named[last] > 1 => row.name.to_string(),
             last => last.to_owned(),
         }];
     }

@@ -14,7 +14,7 @@ use crate::draw::scene::{Form, Group, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 
 /// The height of the band of phases, and the space below it, in millimetres.
-pub(crate) const BAND: (f64, f64) = (3.3, 0.9);
+const BAND: (f64, f64) = (3.3, 0.9);
 /// The space between the rows and the axis, in millimetres.
 const BELOW: f64 = 0.4;
 /// The space between the names and the rows, and the indentation of rows below a title, in millimetres.
@@ -66,7 +66,7 @@ impl Axis {
 
     /// Draws the axis at `y` with round times below, and its end; returns the y at which it ends below. `unit` is
     /// whether the form of the times is written before them.
-    pub(crate) fn draw(&self, canvas: &mut PaperCanvas<'_>, y: f64, unit: bool) -> f64 {
+    fn draw(&self, canvas: &mut PaperCanvas<'_>, y: f64, unit: bool) -> f64 {
         let ruler = Stroke::solid(ink::TEXT, HAIRLINE);
         canvas.line(Point::new(self.left, y), Point::new(self.right, y), &ruler);
         let middle = y + 0.9 + canvas.cap(Type::Small) / 2.0 + 0.35;
@@ -104,37 +104,13 @@ pub(crate) fn clock(nanos: i64) -> String {
     words::moment(second * 1_000_000_000)
 }
 
-/// Draws the band from `y` down; phases of an odd number are darker.
-pub(crate) fn band(
-    canvas: &mut PaperCanvas<'_>,
-    axis: &Axis,
-    y: f64,
-    phases: &[PhaseLabel],
-    of: Type,
-) {
-    for (k, phase) in phases.iter().enumerate() {
-        let cell = axis.rect(phase.span, y, BAND.0);
-        canvas.fill(cell, ink::BAND[k % 2]);
-        phase.write(
-            canvas,
-            cell,
-            Face {
-                of,
-                color: ink::TEXT,
-            },
-        );
-    }
-}
-
 impl PhaseLabel {
     /// Writes the best name that fits.
-    fn write(&self, canvas: &mut PaperCanvas<'_>, cell: Rect, face: Face) {
+    fn write(&self, canvas: &mut PaperCanvas<'_>, cell: Rect, of: Type, color: Color) {
         // The text of the current phase is bold, and has the same words.
-        let (bold, room) = (face.of.bold(), cell.w - 0.6);
-        let name = self
-            .names
-            .iter()
-            .find(|name| canvas.width(name, bold) <= room);
+        let (bold, room) = (of.bold(), cell.w - 0.6);
+        let mut names = self.names.iter();
+        let name = names.find(|name| canvas.width(name, bold) <= room);
         let is_number = |name: &String| name.chars().all(|c| c.is_ascii_digit());
         // Truncated words are more informative than a number, if enough of them remain.
         let name = match name.filter(|name| room < 9.0 || !is_number(name)) {
@@ -142,7 +118,7 @@ impl PhaseLabel {
             None => canvas.cut(self.names.first().map_or("", |n| n), bold, room),
         };
         let at = cell.centre();
-        canvas.text_middle(at.x, at.y, face.of, face.color, &name);
+        canvas.text_middle(at.x, at.y, of, color, &name);
     }
 }
 
@@ -158,13 +134,6 @@ fn fitting(names: &[String], most: usize, fits: impl Fn(&str) -> bool) -> String
     let most = names.len().min(most);
     let found = (1..=most).rev().map(text).find(|text| fits(text));
     found.unwrap_or_else(|| text(most.min(1)))
-}
-
-/// The look of a text.
-#[derive(Clone, Copy)]
-struct Face {
-    of: Type,
-    color: Color,
 }
 
 /// A timeline at its place on a canvas; all lengths in millimetres.
@@ -201,49 +170,22 @@ impl Timeline {
 
 impl Row {
     fn indent(&self) -> f64 {
-        if self.level == Level::Inside {
-            GAP
-        } else {
-            0.0
+        match self.level {
+            Level::Inside => GAP,
+            Level::Title | Level::Outside => 0.0,
         }
     }
 
     /// The kind of text of its name, if that of other rows is `of`.
     fn face(&self, of: Type) -> Type {
-        if self.level == Level::Title {
-            Type::Head
-        } else {
-            of
+        match self.level {
+            Level::Title => Type::Head,
+            Level::Inside | Level::Outside => of,
         }
     }
-}
-
-/// The columns of a density, in millimetres.
-struct Columns {
-    /// The largest width of names.
-    names: f64,
-    /// The width of rates.
-    rates: f64,
-    /// The width of the column beside the rows, on a page of at least [`WIDE`].
-    beside: f64,
 }
 
 impl Density {
-    fn columns(self, width: f64) -> Columns {
-        let is_wide = width >= WIDE;
-        let (names, rates, beside) = match self {
-            Self::Frame => (width * 0.22, 0.0, 0.0),
-            // Types of messages are longer than the names of topics, and rates have a unit.
-            Self::Page => (width.min(WIDE) * 0.36, 17.0, 58.0),
-            Self::Paper => (width.min(WIDE) * 0.36, 5.1, 68.0),
-        };
-        Columns {
-            names,
-            rates,
-            beside: if is_wide { beside } else { 0.0 },
-        }
-    }
-
     /// The kinds of text of names: usual, and those of rows that are in the window.
     fn names(self) -> [Type; 2] {
         match self {
@@ -261,29 +203,35 @@ impl Drawer {
         canvas: &PaperCanvas<'_>,
         place: Rect,
     ) -> Self {
-        let columns = density.columns(place.w);
+        // The largest width of names, and the widths of rates and of what is beside the rows.
+        let (most, rates, mut beside) = match density {
+            Density::Frame => (place.w * 0.22, 0.0, 0.0),
+            Density::Page => (place.w.min(WIDE) * 0.36, 12.0, 58.0),
+            Density::Paper => (place.w.min(WIDE) * 0.36, 5.1, 68.0),
+        };
+        if place.w < WIDE {
+            beside = 0.0;
+        }
         let one = |row: &Row| {
             let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
             canvas.width(&text, row.face(density.names()[1])) + row.indent()
         };
         let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
         let unit = canvas.width("min:s", Type::Small) + 1.5;
-        let left = place.x + names.min(columns.names).max(unit);
-        let beside = place.right() - columns.beside;
-        let gap = if columns.beside > 0.0 { 1.8 } else { 0.0 };
-        let right = beside - gap - columns.rates;
+        let left = place.x + names.min(most).max(unit);
+        let end = place.right() - beside - if beside > 0.0 { 1.8 } else { 0.0 };
         Self {
             density,
             top: place.y,
             left: place.x,
             axis: Axis {
                 left,
-                right: right.max(left + 0.2),
+                right: (end - rates).max(left + 0.2),
                 span: timeline.span,
             },
             pitch: canvas.sizes.pitch(),
-            rates: (columns.rates > 0.0).then_some(right + columns.rates),
-            beside: (columns.beside > 0.0).then_some((beside, columns.beside)),
+            rates: (rates > 0.0).then_some(end),
+            beside: (beside > 0.0).then_some((place.right() - beside, beside)),
             timeline,
         }
     }
@@ -345,8 +293,12 @@ impl Drawer {
                 );
             }
         }
-        let of = if is_paper { Type::Head } else { small };
-        band(canvas, &self.axis, self.top, phases, of);
+        for (k, phase) in phases.iter().enumerate() {
+            let cell = self.axis.rect(phase.span, self.top, BAND.0);
+            canvas.fill(cell, ink::BAND[k % 2]);
+            let of = if is_paper { Type::Head } else { small };
+            phase.write(canvas, cell, of, ink::TEXT);
+        }
         let mut head = self.top + BAND.0 / 2.0;
         if !phases.is_empty() && self.density != Density::Frame {
             canvas.text_end(self.axis.left - 0.9, head, small, quiet, "phase");
@@ -355,7 +307,8 @@ impl Drawer {
             // In the row of the first namespace, or above it.
             head = self.top - canvas.sizes.line() / 2.0;
         }
-        if let Some(right) = self.rates.filter(|_| is_paper) {
+        let has_rows = !self.timeline.rows.is_empty();
+        if let Some(right) = self.rates.filter(|_| is_paper && has_rows) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
         let is_of_nodes = self.timeline.rows.iter().any(|row| !row.nodes.is_empty());
@@ -369,8 +322,7 @@ impl Drawer {
         let (is_folded, is_paper) = (!row.folded.is_empty(), self.density == Density::Paper);
         if row.level == Level::Title || is_folded || is_paper {
             let color = if is_folded { ink::QUIET } else { ink::TEXT };
-            let of = self.density.names()[0];
-            self.name(canvas, y, row, Face { of, color });
+            self.name(canvas, y, row, self.density.names()[0], color);
         }
         if row.level == Level::Title {
             return;
@@ -402,20 +354,14 @@ impl Drawer {
     }
 
     /// Draws the name of a row.
-    fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, face: Face) {
+    fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, of: Type, color: Color) {
         let room = self.axis.left - self.left - GAP - row.indent() + 0.01;
         // In the widest kind, so that the words are the same in every window.
         let widest = row.face(self.density.names()[1]);
         let fits = |label: &str| canvas.width(label, widest) <= room;
         let label = fitting(&row.labels, MOST_NAMES.0, fits);
         let label = canvas.cut(&label, widest, room);
-        canvas.text(
-            self.left + row.indent(),
-            y,
-            row.face(face.of),
-            face.color,
-            &label,
-        );
+        canvas.text(self.left + row.indent(), y, row.face(of), color, &label);
     }
 
     /// Draws a text in the column of rates.
@@ -459,7 +405,7 @@ impl Drawer {
             }
             let color = if is_now { ink::TEXT } else { ink::QUIET };
             let of = self.density.names()[usize::from(is_now)];
-            self.name(canvas, y, row, Face { of, color });
+            self.name(canvas, y, row, of, color);
         }
         let shared = |phase: &&PhaseLabel| {
             let end = phase.span.end.min(time.end);
@@ -469,8 +415,7 @@ impl Drawer {
         if let Some(phase) = phase.filter(|_| time.nanos() < self.axis.span.nanos()) {
             let cell = self.axis.rect(phase.span, self.top, BAND.0);
             canvas.fill(cell, ink::TEXT);
-            let (of, color) = (Type::Strong, ink::PAPER);
-            phase.write(canvas, cell, Face { of, color });
+            phase.write(canvas, cell, Type::Strong, ink::PAPER);
         }
     }
 

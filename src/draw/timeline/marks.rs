@@ -88,8 +88,11 @@ pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> 
             && places.nodes(from) != Some(to)
         {
             arrows += 1;
+            let topic = source.mission.elements.ends(event.what).1;
             rows[to].marks.push(RowMark {
-                text: last_part(source.name(event.what)).to_owned(),
+                text: topic
+                    .map_or("", |id| last_part(source.topic(id)))
+                    .to_owned(),
                 from: Some(from),
                 ..mark(Sign::Handover)
             });
@@ -249,15 +252,4 @@ impl Places {
         let [from, to] = self.hands(source, event);
         from.or(to).map(|(_, row)| row).or_else(sender)
     }
-}
-
-/// The marks of some rows, with those of the topics that are taken over from them.
-pub(crate) fn on<'a>(rows: &'a [Row], of: &'a [usize]) -> impl Iterator<Item = &'a RowMark> {
-    let nodes: BTreeSet<NodeId> = of.iter().flat_map(|at| rows[*at].nodes.clone()).collect();
-    let all = rows.iter().enumerate();
-    let marks = all.flat_map(|(at, row)| row.marks.iter().map(move |mark| (at, mark)));
-    let own = marks.filter(move |(at, mark)| {
-        of.contains(at) || mark.from.is_some_and(|id| nodes.contains(&id))
-    });
-    own.map(|(_, mark)| mark)
 }

@@ -10,7 +10,7 @@ use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::history::{Sender, Stretch};
-use crate::graph::{EdgeId, Element, NodeId, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::event_log::Kind;
 
 /// The length above which a silence visibly interrupts a bar: in nanoseconds, and as a fraction of the
@@ -102,7 +102,13 @@ pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
 
 /// A row per role, with its events.
 pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
-    let steps = Steps::new(source);
+    let (steps, elements) = (Steps::new(source), &source.mission.elements);
+    let mut received = ById::like(&elements.nodes, BTreeSet::new());
+    for edge in &elements.subscribes {
+        if source.shows(edge.topic) && !source.is_hub(edge.topic) {
+            received[edge.node].insert(source.topic(edge.topic));
+        }
+    }
     let row = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
         let publications = source.publications(nodes);
         let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
@@ -111,8 +117,12 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
             name: Arc::clone(role),
             nodes: nodes.clone(),
             beside: [
-                arrowed("→", role, sent_by(source, &steps, &publications)),
-                arrowed("←", role, received_by(source, nodes)),
+                arrowed(
+                    "→",
+                    role,
+                    sent_by(source, &steps, &publications).into_iter(),
+                ),
+                arrowed("←", role, nodes.iter().flat_map(|id| received[*id].clone())),
             ],
             ..own
         }
@@ -149,7 +159,13 @@ fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: 
     let rates: Vec<Vec<Piece>> = senders.iter().map(|s| steps.pieces(s, whole)).collect();
     let hz = rates.iter().filter_map(|pieces| mean(pieces));
     let hz = hz.reduce(|a, b| a + b);
-    let mut bars = bars(&rates, whole);
+    let pieces = summed(&rates, whole);
+    let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
+    let bar = |piece: &Piece| SendingBar {
+        span: piece.span,
+        share: if most > 0.0 { piece.hz / most } else { 1.0 },
+    };
+    let mut bars: Vec<SendingBar> = pieces.iter().map(bar).collect();
     if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
         && life.end.since(bar.span.end) <= silence(whole)
         && life.end == whole.end
@@ -178,28 +194,20 @@ fn sent_by<'s>(source: &'s FigureSource<'_>, steps: &Steps, edges: &[EdgeId]) ->
     };
     let mut rated: Vec<(f64, &str)> = edges.iter().filter_map(rated).collect();
     rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    rated.into_iter().map(|(_, name)| name).collect()
+}
+
+/// The names of topics as a node of this name sees them, each once, an arrow before the first.
+fn arrowed<'t>(arrow: &str, node: &str, topics: impl Iterator<Item = &'t str>) -> Vec<String> {
     let mut seen = BTreeSet::new();
-    let names = rated.into_iter().map(|(_, name)| name);
-    names.filter(|name| seen.insert(*name)).collect()
-}
-
-/// The topics that tell something about the nodes that subscribe to them, by name.
-fn received_by<'s>(source: &'s FigureSource<'_>, nodes: &[NodeId]) -> Vec<&'s str> {
-    let all = source.mission.elements.subscribes.iter();
-    let own =
-        all.filter(|e| nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic));
-    let names: BTreeSet<&str> = own.map(|e| source.topic(e.topic)).collect();
-    names.into_iter().collect()
-}
-
-/// The names of topics as a node of this name sees them, an arrow before the first.
-fn arrowed(arrow: &str, node: &str, topics: Vec<&str>) -> Vec<String> {
-    let names = topics.into_iter().map(|topic| relative(topic, node));
-    let text = |(at, name): (usize, &str)| match at {
-        0 => format!("{arrow} {name}"),
-        _ => name.to_owned(),
-    };
-    names.enumerate().map(text).collect()
+    let topics = topics.filter(|topic| seen.insert(*topic));
+    let mut names: Vec<String> = topics
+        .map(|topic| relative(topic, node).to_owned())
+        .collect();
+    if let Some(first) = names.first_mut() {
+        first.insert_str(0, &format!("{arrow} "));
+    }
+    names
 }
 
 /// A topic's name inside the namespace of a node.
@@ -273,17 +281,6 @@ pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
     let time: f64 = pieces.iter().map(seconds).sum();
     let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();
     (time > 1e-3).then(|| count / time)
-}
-
-/// The bars of several senders together.
-fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
-    let pieces = summed(rates, whole);
-    let most = pieces.iter().map(|p| p.hz).fold(0.0, f64::max);
-    let bar = |piece: Piece| SendingBar {
-        span: piece.span,
-        share: if most > 0.0 { piece.hz / most } else { 1.0 },
-    };
-    pieces.into_iter().map(bar).collect()
 }
 
 /// The sum of several rates over time. Pieces too short to be visible belong to their neighbours, and so do silences.

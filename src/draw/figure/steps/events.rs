@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::StepSource;
 use crate::base::time::Span;
-use crate::draw::timeline::marks::{self, Sign};
+use crate::draw::timeline::marks::Sign;
 use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::EventId;
 use crate::mission::event_log::Detail;
@@ -70,7 +70,8 @@ impl StepSource<'_> {
     /// The events in the step into phase `k` on the rows of a box.
     pub(super) fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EventId> {
         let time = self.time(k);
-        let own = marks::on(&self.tracks, members).filter(|mark| time.contains(mark.at));
+        let marks = members.iter().flat_map(|at| &self.tracks[*at].marks);
+        let own = marks.filter(|mark| time.contains(mark.at));
         own.flat_map(|mark| mark.events.clone()).collect()
     }
 }
