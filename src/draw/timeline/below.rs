@@ -143,14 +143,11 @@ fn messages(view: &View, width: f64) -> Row {
         messages as f64 * 1e9 / nanos.max(1.0)
     };
     let busiest = view.frames.chunks(per_bar).map(rate).fold(0.0, f64::max);
-    let starts = view.frames.iter().step_by(per_bar).map(|f| f.span.start);
-    let ends = starts.skip(1).chain(view.frames.last().map(|f| f.span.end));
-    let bars = view.frames.chunks(per_bar).zip(ends);
-    let bars = bars.filter_map(|(frames, end)| {
-        let (start, rate) = (frames.first()?.span.start, rate(frames));
-        (rate > 0.0).then(|| SendingBar {
-            span: Span::new(start, end),
-            share: rate / busiest,
+    let bars = view.frames.chunks(per_bar).filter_map(|frames| {
+        let (first, last) = (frames.first()?, frames.last()?);
+        (busiest > 0.0).then(|| SendingBar {
+            span: Span::new(first.span.start, last.span.end),
+            share: rate(frames) / busiest,
         })
     });
     Row {

@@ -169,18 +169,12 @@ impl Timeline {
 }
 
 impl Row {
-    fn indent(&self) -> f64 {
+    /// The kind of text of its name, if that of usual rows is `of`, and its indentation.
+    fn face(&self, of: Type) -> (Type, f64) {
         match self.level {
-            Level::Inside => GAP,
-            Level::Title | Level::Outside => 0.0,
-        }
-    }
-
-    /// The kind of text of its name, if that of other rows is `of`.
-    fn face(&self, of: Type) -> Type {
-        match self.level {
-            Level::Title => Type::Head,
-            Level::Inside | Level::Outside => of,
+            Level::Title => (Type::Head, 0.0),
+            Level::Outside => (of, 0.0),
+            Level::Inside => (of, GAP),
         }
     }
 }
@@ -214,7 +208,8 @@ impl Drawer {
         }
         let one = |row: &Row| {
             let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
-            canvas.width(&text, row.face(density.names()[1])) + row.indent()
+            let (of, indent) = row.face(density.names()[1]);
+            canvas.width(&text, of) + indent
         };
         let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
         let unit = canvas.width("min:s", Type::Small) + 1.5;
@@ -355,13 +350,13 @@ impl Drawer {
 
     /// Draws the name of a row.
     fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, of: Type, color: Color) {
-        let room = self.axis.left - self.left - GAP - row.indent() + 0.01;
         // In the widest kind, so that the words are the same in every window.
-        let widest = row.face(self.density.names()[1]);
+        let (widest, indent) = row.face(self.density.names()[1]);
+        let room = self.axis.left - self.left - GAP - indent + 0.01;
         let fits = |label: &str| canvas.width(label, widest) <= room;
         let label = fitting(&row.labels, MOST_NAMES.0, fits);
         let label = canvas.cut(&label, widest, room);
-        canvas.text(self.left + row.indent(), y, row.face(of), color, &label);
+        canvas.text(self.left + indent, y, row.face(of).0, color, &label);
     }
 
     /// Draws a text in the column of rates.
