@@ -4,7 +4,6 @@
 //! Text is never scaled.
 
 pub(crate) mod graph;
-mod groups;
 pub(crate) mod page;
 pub(crate) mod steps;
 mod tex;

@@ -35,22 +35,20 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// The rows by namespace, in the order in which they begin. If `is_folded`, those of a namespace that exist
-    /// throughout are one.
-    pub(crate) fn by_namespace(source: &FigureSource<'_>, rows: Vec<Row>, is_folded: bool) -> Self {
+    /// These rows with numbered phases.
+    pub(crate) fn new(source: &FigureSource<'_>, rows: Vec<Row>) -> Self {
         Self {
             span: source.span(),
             phases: phases::numbered(source),
-            rows: arranged::by_namespace(rows, source.span(), is_folded),
+            rows,
         }
     }
 
-    /// The rows with events, at most `most`: elements that begin and end together are one.
-    pub(crate) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Self {
+    /// These rows with named phases.
+    pub(crate) fn named(source: &FigureSource<'_>, rows: Vec<Row>) -> Self {
         Self {
-            span: source.span(),
             phases: phases::named(source),
-            rows: arranged::together(source, rows, most),
+            ..Self::new(source, rows)
         }
     }
 

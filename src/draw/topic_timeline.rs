@@ -5,22 +5,21 @@ use std::collections::BTreeSet;
 
 use crate::base::cast;
 use crate::base::geometry::{Rect, Size};
-use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::picture::PageOptions;
 use crate::draw::picture::page::{PageFrame, Strip, unit};
 use crate::draw::picture::title::Title;
-use crate::draw::scene::{Group, Scene, Stroke};
+use crate::draw::scene::{Scene, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
 use crate::draw::timeline::Timeline;
+use crate::draw::timeline::arranged::{by_namespace, together};
 use crate::draw::timeline::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
-use crate::draw::timeline::drawer::{Axis, Density, Drawer};
-use crate::draw::timeline::marks::marked;
-use crate::draw::timeline::phases;
-use crate::draw::timeline::rows::{Level, Row, of_topics};
+use crate::draw::timeline::drawer::{Density, Drawer};
+use crate::draw::timeline::rows::{Row, of_topics};
 use crate::draw::timeline::source::FigureSource;
-use crate::graph::{Element, ElementState, NodeId, TopicId};
+
+use crate::graph::{Element, ElementState, NodeId};
 use crate::view::{Frame, View};
 
 /// The least and the largest number of pixels per millimetre of the drawing, so that small text has at least
@@ -30,12 +29,6 @@ const SCALE: (f64, f64) = (4.26, 5.6);
 const NARROW: f64 = 960.0;
 /// The largest page that a timeline grows to if the user chose none.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
-/// The widths of types and of rates, in millimetres, and the space between columns.
-const TYPES: f64 = 58.0;
-const RATES: f64 = 15.0;
-const BETWEEN: f64 = 2.4;
-/// The largest fraction of the width for the names of topics.
-const MOST_NAMES: f64 = 0.29;
 /// The height below the rows in millimetres, for nodes and for the line that explains why this is not a graph.
 const BELOW: f64 = 9.0;
 /// The height of a node in millimetres.
@@ -52,11 +45,8 @@ pub(crate) struct TopicTimeline<'a> {
     /// Pixels per millimetre.
     scale: f64,
     drawer: Drawer,
-    /// The window of the mission that each frame shows.
-    windows: Vec<usize>,
-    ground: Vec<Group>,
-    /// The number of topics that have no row because they do not fit.
-    left_out: usize,
+    /// The number of topics.
+    topics: usize,
 }
 
 /// The whole timeline in one drawing, and the position of the playhead in each window.
@@ -74,7 +64,8 @@ pub struct Overview {
 
 impl<'a> TopicTimeline<'a> {
     /// The timeline of the nodes and topics that pass the filters of `source`. Unless `is_sized`, the page
-    /// grows until all topics are legible; topics that still do not fit are counted.
+    /// grows until all topics are legible. If they still do not fit, those of a namespace that exist throughout are one
+    /// row, else all that begin and end together.
     pub(crate) fn new(
         source: &'a FigureSource<'a>,
         view: &'a View,
@@ -83,143 +74,144 @@ impl<'a> TopicTimeline<'a> {
         mut options: PageOptions,
         is_sized: bool,
     ) -> Self {
+        let rows: Vec<Row> = of_topics(source).into_iter().map(Row::plain).collect();
+        let (topics, pitch) = (rows.len(), sizes().pitch());
+        let each = |is_folded| by_namespace(rows.clone(), source.span(), is_folded);
+        let mut timeline = Timeline::named(source, each(false));
+        let others = timeline.height(sizes(), 0.0) + BELOW;
+        let most = |options: &PageOptions| {
+            let free = room(style, options).h / SCALE.0 - others;
+            cast::to_usize((free / pitch).max(1.0))
+        };
         if !is_sized {
             options.size.w = options.size.w.min(NARROW);
+            if most(&options) < topics {
+                options.size = LARGEST;
+            }
         }
-        let rows = marked(source, of_topics(source));
-        let rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
-        let timeline = |is_folded| Timeline {
-            phases: phases::named(source),
-            ..Timeline::by_namespace(source, rows.clone(), is_folded)
-        };
-        let mut shown = timeline(false);
-        if !is_sized && most_rows(&shown, style, &options) < shown.rows.len() {
-            options.size = LARGEST;
+        let most = most(&options);
+        if timeline.rows.len() > most {
+            timeline.rows = each(true);
         }
-        let mut most = most_rows(&shown, style, &options);
-        if most < shown.rows.len() {
-            shown = timeline(true);
-            most = most_rows(&shown, style, &options);
+        if timeline.rows.len() > most {
+            timeline.rows = together(source, rows, most, true);
         }
-        let left_out = shorten(&mut shown, most, source);
+        let room = room(style, &options);
+        let high = others + timeline.rows.len() as f64 * pitch;
+        let largest = SCALE.1 * unit(&options).max(1.0);
+        let scale = (room.h / high).clamp(SCALE.0, largest);
         let page = PageFrame::new(style, &options, 0, Strip::Timeline);
-        let (drawer, scale) = placed(shown, &page, &options, fonts);
         if !is_sized {
             // A short timeline has no empty space below; encoders of video need an even number of rows.
-            let end = drawer.top + drawer.timeline.height(sizes(), drawer.pitch) + BELOW;
-            options.size.h = (libm::ceil(end * scale / 2.0) * 2.0).min(options.size.h);
+            let end = libm::ceil((room.y + high * scale) / 2.0) * 2.0;
+            options.size.h = end.min(options.size.h);
         }
-        let mission = source.mission;
-        let window = |start| mission.windows.partition_point(|w| w.span.start < start);
-        let mut page = Self {
+        let canvas = PaperCanvas::new(fonts, sizes(), scale);
+        let drawer = Drawer::new(timeline, Density::Page, &canvas, room.scaled(1.0 / scale));
+        Self {
             title: Title::new(style, fonts, &page, view, &options),
-            windows: view.frames.iter().map(|f| window(f.span.start)).collect(),
-            ground: Vec::new(),
             view,
             source,
             style,
             fonts,
             options,
-            drawer,
             scale,
-            left_out,
-        };
-        page.ground = page.ground();
-        page
-    }
-
-    /// Remarks for the user; lower case, no period.
-    pub(crate) fn remarks(&self) -> Vec<String> {
-        let many = words::count(self.left_out, "topic");
-        let remark = format!(
-            "{many} with the fewest messages do not fit; show them with `--topic-filter` or a larger `--size`"
-        );
-        (self.left_out > 0).then_some(remark).into_iter().collect()
+            drawer,
+            topics,
+        }
     }
 
     /// The timeline in window `k` of the view.
     pub(crate) fn scene(&self, k: usize) -> Scene {
-        let mut scene = self.empty();
-        let Some(frame) = self.view.frames.get(k) else {
-            return scene;
-        };
-        if !self.options.bare {
-            let phase = self.options.phases.get(k).map_or("", String::as_str);
-            scene.groups.extend(self.title.words(frame, phase));
+        let many = self.view.frames.len();
+        let phase = self.options.phases.get(k).map_or("", String::as_str);
+        let empty = Frame::empty(0, self.source.span());
+        let frame = self.view.frames.get(k);
+        Scene {
+            title: format!("{}, window {} of {many}", self.options.title(), k + 1),
+            ..self.page(frame.unwrap_or(&empty), phase, true)
         }
-        let window = self.windows.get(k).copied().unwrap_or(0);
-        scene.groups.extend(self.now(window, frame.shown()));
-        scene.title = format!(
-            "{}, window {} of {}",
-            self.options.title(),
-            frame.index + 1,
-            self.view.frames.len()
-        );
-        scene
     }
 
     /// All windows in one drawing.
     pub(crate) fn overview(&self) -> Overview {
-        let mut scene = self.empty();
-        if !self.options.bare {
-            let span = self.source.span();
-            let rows = self.drawer.timeline.rows.iter();
-            let shown = rows.map(|row| row.folded.len() + usize::from(row.topic.is_some()));
-            let topics = words::count(shown.sum::<usize>() + self.left_out, "topic");
-            let mut whole = Frame::empty(0, span);
-            whole.messages = self.source.mission.messages;
-            whole.note = format!("{topics} over {}", words::duration(span.nanos()));
-            scene.groups.extend(self.title.words(&whole, ""));
-        }
-        let mut canvas = self.canvas();
-        let rate = |row: &Row| row.hz.map(words::rate);
-        self.window(&mut canvas, self.source.span(), &|_| true, &rate, &|_| true);
-        scene.groups.extend(canvas.into_styled(self.style));
-        scene.groups.extend(self.marks());
-        scene.title = format!("Topics over time of {}", self.options.title());
-        let heads = self
-            .view
-            .frames
-            .iter()
-            .map(|f| self.drawer.window(f.span).scaled(self.scale));
+        let mut whole = Frame::empty(0, self.source.span());
+        let length = words::duration(whole.span.nanos());
+        whole.messages = self.source.mission.messages;
+        whole.note = format!("{} over {length}", words::count(self.topics, "topic"));
+        let heads = self.view.frames.iter();
+        let heads = heads.map(|f| self.drawer.window(f.span).scaled(self.scale));
         Overview {
-            scene,
+            scene: Scene {
+                title: format!("Topics over time of {}", self.options.title()),
+                ..self.page(&whole, "", false)
+            },
             heads: heads.collect(),
             color: self.style.timeline.head,
             title: self.options.title().to_owned(),
         }
     }
 
-    fn empty(&self) -> Scene {
+    /// The page of a window, or of the whole time, with its rates and nodes.
+    fn page(&self, frame: &Frame, phase: &str, is_window: bool) -> Scene {
+        let (mission, time) = (self.source.mission, frame.shown());
+        let windows = &mission.windows;
+        let at = windows.partition_point(|w| w.span.start < frame.span.start);
+        let graph = mission.graphs.get(at).filter(|_| is_window);
+        let seconds = windows.get(at).map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
+        let count = |row: &Row| {
+            let state = graph.as_ref()?.get(Element::Topic(row.topic?));
+            state.map(ElementState::messages).filter(|count| *count > 0)
+        };
+        let mut canvas = PaperCanvas::new(self.fonts, sizes(), self.scale);
+        let end = self.drawer.ground(&mut canvas);
+        let is_now = |row: &Row| match row.topic {
+            Some(_) => !is_window || count(row).is_some(),
+            None => row.is_in(time),
+        };
+        self.drawer.now(&mut canvas, time, &is_now);
+        self.drawer.marks(&mut canvas);
+        canvas.begin("rates");
+        let rows = self.drawer.timeline.rows.iter().enumerate();
+        for (k, row) in rows.filter(|(_, row)| row.topic.is_some()) {
+            let rate = if is_window {
+                count(row).map(|count| words::rate_of(count, seconds))
+            } else {
+                row.hz.map(words::rate)
+            };
+            let color = if rate.is_some() {
+                ink::TEXT
+            } else {
+                ink::QUIET
+            };
+            let text = rate.as_deref().unwrap_or("–");
+            self.drawer.rate(&mut canvas, self.drawer.y(k), text, color);
+        }
+        canvas.begin("nodes");
+        let alive = graph.iter().flat_map(|g| g.nodes().map(|(id, _)| id));
+        let alive: BTreeSet<NodeId> = alive.collect();
+        self.nodes(&mut canvas, &|id| !is_window || alive.contains(id));
+        canvas.begin("why");
+        let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
+        let why = canvas.cut(&self.why(), Type::Small, wide);
+        let y = end + LABEL + 1.6 + sizes().line() / 2.0;
+        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &why);
+        let mut groups = Vec::new();
+        if !self.options.bare {
+            groups.push(self.title.ground());
+            groups.extend(self.title.words(frame, phase));
+        }
+        groups.extend(canvas.into_styled(self.style));
+        if is_window {
+            groups.push(self.drawer.playhead(time, self.scale, self.style));
+        }
         Scene {
             size: self.options.size,
             width_mm: self.options.width_mm,
             background: self.style.background(),
             title: String::new(),
-            groups: self.ground.clone(),
+            groups,
         }
-    }
-
-    fn canvas(&self) -> PaperCanvas<'a> {
-        PaperCanvas::new(self.fonts, sizes(), self.scale)
-    }
-
-    /// The parts that are equal in every frame: band, pale bars, starts and ends, types, axis, and the reason
-    /// why this is not a graph.
-    fn ground(&self) -> Vec<Group> {
-        let mut canvas = self.canvas();
-        let end = self.drawer.ground(&mut canvas);
-        canvas.begin("why");
-        let y = end + LABEL + 1.6 + sizes().line() / 2.0;
-        let wide = self.options.size.w / self.scale - 2.0 * self.drawer.left;
-        let text = canvas.cut(&self.why(), Type::Small, wide);
-        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, &text);
-        let mut groups = Vec::new();
-        if !self.options.bare {
-            groups.push(self.title.ground());
-        }
-        groups.extend(canvas.into_styled(self.style));
-        groups
     }
 
     /// The reason why this is not a graph, and how to get one.
@@ -232,73 +224,11 @@ impl<'a> TopicTimeline<'a> {
         } else {
             "most publishers are unknown; add them with --topology FILE, or draw what is known with --mode all".to_owned()
         };
-        let left_out = match self.left_out {
-            0 => String::new(),
-            more => format!("{} more not drawn; ", words::count(more, "topic")),
-        };
-        format!("{left_out}{why}. Tick: first message; cross: last; frame: this window.")
+        format!("{why}. Tick: first message; cross: last; frame: this window.")
     }
 
-    /// The parts that change from frame to frame.
-    fn now(&self, window: usize, span: Span) -> Vec<Group> {
-        let mission = self.source.mission;
-        let graph = mission.graphs.get(window);
-        let seconds = mission
-            .windows
-            .get(window)
-            .map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
-        let count = |row: &Row| {
-            let topic = Element::Topic(row.topic?);
-            graph.as_ref()?.get(topic).map(ElementState::messages)
-        };
-        let rate = |row: &Row| {
-            let count = count(row).filter(|n| *n > 0)?;
-            Some(words::rate_of(count, seconds))
-        };
-        let nodes = graph.iter().flat_map(|g| g.nodes().map(|(id, _)| id));
-        let alive: BTreeSet<NodeId> = nodes.collect();
-        let is_there = |nodes: &[NodeId]| nodes.iter().any(|n| alive.contains(n));
-        let mut canvas = self.canvas();
-        let is_now = |row: &Row| count(row).unwrap_or(0) > 0;
-        self.window(&mut canvas, span, &is_now, &rate, &is_there);
-        let mut groups = canvas.into_styled(self.style);
-        groups.extend(self.marks());
-        groups.push(self.drawer.playhead(span, self.scale, self.style));
-        groups
-    }
-
-    /// Draws what depends on the window: bars and names, rates, and nodes.
-    fn window(
-        &self,
-        canvas: &mut PaperCanvas<'_>,
-        span: Span,
-        is_now: &dyn Fn(&Row) -> bool,
-        rate: &dyn Fn(&Row) -> Option<String>,
-        is_there: &dyn Fn(&[NodeId]) -> bool,
-    ) {
-        self.drawer.now(canvas, span, is_now);
-        canvas.begin("rates");
-        for (k, row) in self.drawer.timeline.rows.iter().enumerate() {
-            let (y, rate) = (self.drawer.y(k), rate(row));
-            match rate {
-                Some(rate) => self.drawer.rate(canvas, y, &rate, ink::TEXT),
-                None if row.topic.is_some() => self.drawer.rate(canvas, y, "–", ink::QUIET),
-                None => {}
-            }
-        }
-        canvas.begin("nodes");
-        self.nodes(canvas, is_there);
-    }
-
-    fn marks(&self) -> Vec<Group> {
-        let mut canvas = self.canvas();
-        self.drawer.marks(&mut canvas);
-        canvas.into_styled(self.style)
-    }
-
-    /// Draws as many of the known nodes as fit, as labels in a row; those for which `is_there` is true are
-    /// emphasized.
-    fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
+    /// Draws as many of the known nodes as fit, as labels in a row; those that are in the window emphasized.
+    fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&NodeId) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
             let node = elements.nodes.get(*id);
@@ -306,33 +236,29 @@ impl<'a> TopicTimeline<'a> {
         };
         let roles = self.source.roles.iter();
         let all: Vec<_> = roles.filter(|(_, n)| n.iter().any(is_known)).collect();
-        if all.is_empty() {
-            return;
-        }
         let y = self.drawer.end() + sizes().line() + 2.0 + LABEL / 2.0;
-        canvas.text(self.drawer.left, y, Type::Small, ink::QUIET, "nodes known");
+        if !all.is_empty() {
+            let left = self.drawer.left;
+            canvas.text(left, y, Type::Small, ink::QUIET, "nodes known");
+        }
         let mut x = self.drawer.axis.left;
         let end = self.options.size.w / self.scale - self.drawer.left;
-        for (k, &(role, nodes)) in all.iter().enumerate() {
+        for (k, (role, nodes)) in all.iter().enumerate() {
             let wide = canvas.width(role, Type::Small) + 2.4;
-            let more = format!("+{}", all.len() - k);
             let rest = if k + 1 < all.len() { 8.0 } else { 0.0 };
             if x + wide + rest > end {
+                let more = format!("+{}", all.len() - k);
                 canvas.text(x, y, Type::Small, ink::QUIET, &more);
                 return;
             }
-            let (fill, color) = if is_there(nodes) {
+            let (fill, color) = if nodes.iter().any(is_there) {
                 (ink::BAND[1], ink::TEXT)
             } else {
                 (ink::PAPER, ink::QUIET)
             };
             let place = Rect::new(x, y - LABEL / 2.0, wide, LABEL);
-            canvas.frame(
-                place,
-                LABEL / 2.0,
-                fill,
-                &Stroke::solid(ink::RULE, HAIRLINE),
-            );
+            let line = Stroke::solid(ink::RULE, HAIRLINE);
+            canvas.frame(place, LABEL / 2.0, fill, &line);
             canvas.text(x + 1.2, y, Type::Small, color, role);
             x += wide + 1.4;
         }
@@ -343,85 +269,11 @@ fn sizes() -> Sizes {
     Sizes::of_names(7.0)
 }
 
-/// Keeps the rows of the busiest topics, at most `most` rows; returns the number of topics left out.
-fn shorten(timeline: &mut Timeline, most: usize, source: &FigureSource<'_>) -> usize {
-    let messages = |topic: &TopicId| -> u64 {
-        let rows = source.mission.graphs.rows(Element::Topic(*topic));
-        rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
-    };
-    let rows = &mut timeline.rows;
-    let mut order: Vec<TopicId> = rows.iter().filter_map(|row| row.topic).collect();
-    order.sort_by_cached_key(|topic| std::cmp::Reverse(messages(topic)));
-    let mut left = 0;
-    while rows.len() > most {
-        let least = order.pop();
-        let is_least = |row: &Row| row.topic.is_some() && row.topic == least;
-        let Some(at) = rows.iter().position(is_least) else {
-            break;
-        };
-        rows.remove(at);
-        left += 1;
-        // The title of a namespace whose last row this was.
-        let is_last = rows.get(at).is_none_or(|row| row.level != Level::Inside);
-        if is_last && at > 0 && rows[at - 1].level == Level::Title {
-            rows.remove(at - 1);
-        }
-    }
-    left
-}
-
 /// The part of the page for the timeline.
-fn room(page: &PageFrame, options: &PageOptions) -> Rect {
-    let margin = page.graph.x;
-    let top = page.title.bottom().max(margin / 2.0) + margin / 2.0;
-    let size = options.size;
-    Rect::new(
-        margin,
-        top,
-        size.w - 2.0 * margin,
-        (size.h - top - margin / 2.0).max(1.0),
-    )
-}
-
-/// The number of rows that are legible on this page.
-fn most_rows(timeline: &Timeline, style: &Style, options: &PageOptions) -> usize {
+fn room(style: &Style, options: &PageOptions) -> Rect {
     let page = PageFrame::new(style, options, 0, Strip::Timeline);
-    let pitch = sizes().pitch();
-    let others = timeline.height(sizes(), pitch) - timeline.rows.len() as f64 * pitch + BELOW;
-    let free = room(&page, options).h / SCALE.0 - others;
-    cast::to_usize((free / pitch).max(1.0))
-}
-
-/// The timeline at its place, and the number of pixels per millimetre.
-fn placed(
-    timeline: Timeline,
-    page: &PageFrame,
-    options: &PageOptions,
-    fonts: &Fonts,
-) -> (Drawer, f64) {
-    let room = room(page, options);
-    let canvas = PaperCanvas::new(fonts, sizes(), 1.0);
-    let pitch = sizes().pitch();
-    let high = timeline.height(sizes(), pitch) + BELOW;
-    let largest = SCALE.1 * unit(options).max(1.0);
-    let scale = (room.h / high).clamp(SCALE.0, largest);
-    let (left, wide) = (room.x / scale, room.w / scale);
-    let names = timeline.names_width(&canvas, Type::Name, wide * MOST_NAMES);
-    let types = if wide > 150.0 { TYPES } else { 0.0 };
-    let right = (left + wide - types - RATES - BETWEEN).max(left + names + 10.0);
-    let drawer = Drawer {
-        density: Density::Page,
-        top: room.y / scale,
-        left,
-        axis: Axis {
-            left: left + names,
-            right,
-            span: timeline.span,
-        },
-        pitch,
-        rates: Some(right + RATES),
-        beside: (types > 0.0).then_some((left + wide - types + BETWEEN, types - BETWEEN)),
-        timeline,
-    };
-    (drawer, scale)
+    let (margin, size) = (page.graph.x, options.size);
+    let top = page.title.bottom().max(margin / 2.0) + margin / 2.0;
+    let height = (size.h - top - margin / 2.0).max(1.0);
+    Rect::new(margin, top, size.w - 2.0 * margin, height)
 }

@@ -19,7 +19,6 @@ use self::presence::{Presence, is_topics, presences};
 use crate::base::time::{Span, Stamp};
 use crate::graph::history::Sending;
 use crate::graph::{Elements, TopicId};
-use crate::mission::Mission;
 use crate::mission::event_log::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
@@ -77,14 +76,6 @@ pub(crate) fn of_spans(
     let found: Vec<Configuration> = spans.iter().map(of).collect();
     let unit = if is_topics(&present) { "topic" } else { "node" };
     reported(spans, &found, &vec![false; spans.len()], unit)
-}
-
-/// The majority graph of each of these phases.
-pub(crate) fn configurations(mission: &Mission, phases: &[Phase]) -> Vec<Configuration> {
-    let (elements, sending) = (&mission.elements, &mission.sending);
-    let present = presences(elements, sending, mission.span);
-    let of = |phase: &Phase| configuration(elements, sending, &present, phase.span);
-    phases.iter().map(of).collect()
 }
 
 fn configuration(

@@ -15,7 +15,7 @@ use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, StripWidth, strip};
 use crate::draw::timeline::Timeline;
-use crate::draw::timeline::marks::marked;
+use crate::draw::timeline::arranged::{by_namespace, together};
 use crate::draw::timeline::rows::{known, of_topics};
 use crate::draw::timeline::source::FigureSource;
 use crate::draw::topic_timeline::TopicTimeline;
@@ -214,7 +214,8 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
     let known = (is_drawn && !is_timeline).then(|| known(&source));
     if let Some(known) = &known {
         let most = rows(drawing.page.size.h);
-        drawing.page.timeline = Timeline::together(&source, known.clone(), most);
+        let rows = together(&source, known.clone(), most, false);
+        drawing.page.timeline = Timeline::named(&source, rows);
     }
     let Composed {
         view,
@@ -248,7 +249,7 @@ fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<R
         .as_ref()
         .and_then(|view| unfolded::drawn((view, part.as_ref()), &drawing, &job.outputs));
     let known = known.filter(|_| opened.is_some());
-    let lives = known.map(|known| Timeline::by_namespace(&source, known, false));
+    let lives = known.map(|known| Timeline::new(&source, by_namespace(known, mission.span, false)));
     let lives = job.sequence.pairs.clone().or(lives);
     let strip = match figure {
         Some(_) => None,
@@ -404,11 +405,12 @@ fn show_timeline(
         page,
         is_sized,
     );
-    let remarks = timeline.remarks().into_iter();
-    all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = timeline.overview();
     let data = chosen(job, &mission, &mut all);
-    let lives = Timeline::by_namespace(&source, marked(&source, of_topics(&source)), false);
+    let lives = Timeline::new(
+        &source,
+        by_namespace(of_topics(&source), mission.span, false),
+    );
     // Each topic has its own row.
     let mut each = drawing.clone();
     each.view.group = Grouping::parse("none")?;

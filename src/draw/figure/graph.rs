@@ -1,17 +1,16 @@
 //! The graph on paper: the picture of the whole mission with the times of each node, above the band of phases.
 
 use super::page::FigureSheet;
-use crate::base::geometry::Size;
+use crate::base::geometry::{Rect, Size};
 use crate::draw::scene::Scene;
-use crate::draw::timeline::canvas::{PX_PER_MM, Type, ink};
-use crate::draw::timeline::drawer::{self, Axis};
+use crate::draw::timeline::Timeline;
+use crate::draw::timeline::canvas::{PX_PER_MM, ink};
+use crate::draw::timeline::drawer::{Density, Drawer};
 use crate::draw::timeline::notes::{flow, sentence};
 use crate::draw::timeline::phases;
 
 /// The space between the graph and the band in millimetres.
 const BELOW: f64 = 1.2;
-/// The width in millimetres from which the names of phases fit below their places in the band.
-const WIDE: f64 = 150.0;
 
 /// The page of a picture of the mission in one window, which is as wide as the page.
 pub(crate) fn page(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
@@ -19,27 +18,11 @@ pub(crate) fn page(sheet: &FigureSheet<'_>, picture: Scene) -> Scene {
     let mut canvas = sheet.canvas();
     let mut y = picture.size.h / PX_PER_MM;
     if !source.phases.is_empty() {
-        canvas.begin("phases");
-        let axis = Axis {
-            left: 0.0,
-            right: width,
-            span: source.span(),
-        };
-        y += BELOW;
-        let labels = phases::numbered(source);
-        drawer::band(&mut canvas, &axis, y, &labels, Type::Head);
-        y += drawer::BAND.0;
-        if width < WIDE {
-            y = axis.draw(&mut canvas, y, false);
-        }
+        let timeline = Timeline::new(source, Vec::new());
+        let place = Rect::new(0.0, y + BELOW, width, 0.0);
+        y = Drawer::new(timeline, Density::Paper, &canvas, place).ground(&mut canvas);
         canvas.begin("words");
-        y = phases::names(
-            &mut canvas,
-            source,
-            width,
-            y,
-            (width >= WIDE).then_some(&axis),
-        );
+        y = phases::names(&mut canvas, source, width, y);
     }
     canvas.begin("notes");
     if !sheet.options.is_bare {

@@ -1,16 +1,15 @@
 //! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
-use super::groups::depths;
 use super::{FigureOptions, MOST_HEIGHT, RowKind};
 use crate::base::cast;
 use crate::base::error::{Error, Result};
-use crate::base::geometry::Size;
+use crate::base::geometry::{Rect, Size};
 use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
-use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type};
-use crate::draw::timeline::drawer::{Axis, Density, Drawer};
-use crate::draw::timeline::marks::marked;
+use crate::draw::timeline::arranged::{by_namespace, together};
+use crate::draw::timeline::canvas::{PX_PER_MM, PaperCanvas, Sizes};
+use crate::draw::timeline::drawer::{Density, Drawer};
 use crate::draw::timeline::notes::flow;
 use crate::draw::timeline::phases::names;
 use crate::draw::timeline::rows::{Row, of_nodes, of_topics};
@@ -19,12 +18,6 @@ use crate::draw::timeline::{Timeline, legend};
 
 /// The shortest legible time axis, in millimetres.
 const SHORTEST_AXIS: f64 = 15.0;
-
-/// The least width of a figure with a column of the topics that each row publishes and subscribes to, and the
-/// width of that column; in millimetres.
-const WIDE: (f64, f64) = (150.0, 68.0);
-/// The largest fraction of the width for the names of rows.
-const MOST_NAMES: f64 = 0.36;
 
 /// The parts of a page.
 pub(crate) struct FigureSheet<'a> {
@@ -67,8 +60,9 @@ impl<'a> FigureSheet<'a> {
     /// [`Error::Usage`] if nothing is left, or if it does not fit even as groups.
     pub(crate) fn lives(&self) -> Result<(Scene, Vec<String>)> {
         let source = self.source;
-        let by_topics = match self.options.rows {
-            Some(rows) => rows == RowKind::Topics,
+        let kind = self.options.rows;
+        let by_topics = match kind {
+            Some(kind) => kind == RowKind::Topics,
             None => !source.knows_publishers(),
         };
         let rows = if by_topics {
@@ -79,35 +73,27 @@ impl<'a> FigureSheet<'a> {
         if rows.is_empty() {
             return Err(nothing(source));
         }
-        let timeline = |rows: Vec<Row>| Timeline::by_namespace(source, marked(source, rows), true);
-        let first = timeline(rows.clone());
-        let is_grouped = self.options.rows == Some(RowKind::Groups);
-        let (mut scene, mut remarks) = (None, Vec::new());
-        if !is_grouped {
-            scene = self.lives_page(&first, by_topics).filter(fits);
-        }
-        if scene.is_none()
-            && !by_topics
-            && matches!(self.options.rows, None | Some(RowKind::Groups))
-        {
-            scene = depths(&rows).find_map(|depth| {
-                let groups = super::groups::tracks(source, &rows, depth);
-                self.lives_page(&timeline(groups), by_topics).filter(fits)
-            });
-            if scene.is_some() && !is_grouped {
-                let many = words::count(rows.len(), "node");
-                remarks.push(format!(
-                    "{many} do not fit on a page; rows are groups of nodes that start and stop together"
-                ));
-            }
-        }
-        let flag = if by_topics {
-            "--topic-filter"
-        } else {
-            "--ns-filter"
+        let page = |rows| {
+            self.lives_page(&Timeline::new(source, rows), by_topics)
+                .filter(fits)
         };
-        let scene = scene.ok_or_else(|| self.too_high(&first, &rows, flag))?;
-        Ok((scene, remarks))
+        let each = by_namespace(rows.clone(), source.span(), true);
+        let scene = || page(each.clone()).filter(|_| kind != Some(RowKind::Groups));
+        if let Some(scene) = scene() {
+            return Ok((scene, Vec::new()));
+        }
+        let grouped = || page(together(source, rows.clone(), self.most_rows(), true));
+        match grouped().filter(|_| kind.is_none_or(|kind| kind == RowKind::Groups)) {
+            Some(scene) if kind.is_some() => Ok((scene, Vec::new())),
+            Some(scene) => {
+                let many = words::count(rows.len(), if by_topics { "topic" } else { "node" });
+                let remark = format!(
+                    "{many} do not fit on a page; those that start and stop together are one row"
+                );
+                Ok((scene, vec![remark]))
+            }
+            None => Err(self.too_high(&Timeline::new(source, each), &rows, by_topics)),
+        }
     }
 
     /// The page of some rows, of any height; `None` if it is too narrow.
@@ -119,11 +105,11 @@ impl<'a> FigureSheet<'a> {
         drawer.marks(&mut canvas);
         canvas.begin("words");
         if self.options.is_named || !self.options.is_bare {
-            y = names(&mut canvas, self.source, width, y, None);
+            y = names(&mut canvas, self.source, width, y);
         }
         y = flow(&mut canvas, width, y, &legend::letters(timeline));
         if !self.options.is_bare {
-            let notes = legend::notes(self.source, timeline, drawer.beside.is_some());
+            let notes = legend::notes(timeline, drawer.beside.is_some());
             y = flow(&mut canvas, width, y, &notes);
             y = flow(&mut canvas, width, y + 0.15, &legend::signs(timeline));
         }
@@ -135,8 +121,13 @@ impl<'a> FigureSheet<'a> {
         Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
     }
 
+    /// The number of rows that fit on a page with their notes.
+    fn most_rows(&self) -> usize {
+        cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch())
+    }
+
     /// The error for a figure that does not fit, with a namespace that would fit.
-    fn too_high(&self, timeline: &Timeline, rows: &[Row], flag: &str) -> Error {
+    fn too_high(&self, timeline: &Timeline, rows: &[Row], by_topics: bool) -> Error {
         let canvas = self.canvas();
         let width = self.options.width_mm;
         if lives_drawer(timeline, &canvas, width).is_none() {
@@ -149,8 +140,12 @@ impl<'a> FigureSheet<'a> {
             );
         }
         let high = timeline.height(self.sizes, self.sizes.pitch());
-        let most = cast::to_usize((MOST_HEIGHT - 30.0) / self.sizes.pitch());
-        let hint = filter_that_fits(rows, most, flag, "row");
+        let flag = if by_topics {
+            "--topic-filter"
+        } else {
+            "--ns-filter"
+        };
+        let hint = filter_that_fits(rows, self.most_rows(), flag, "row");
         let rows = words::count(timeline.rows.len(), "row");
         Error::usage(
             format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
@@ -205,24 +200,10 @@ pub(crate) fn fits(scene: &Scene) -> bool {
 
 /// A page of rows over time; `None` if too little is left for the time axis.
 fn lives_drawer(timeline: &Timeline, canvas: &PaperCanvas<'_>, width: f64) -> Option<Drawer> {
-    let most = width.min(WIDE.0) * MOST_NAMES;
-    let names = timeline.names_width(canvas, Type::Name, most);
-    let beside = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
-    let right = width - beside - 5.2;
-    let left = names.max(canvas.width("min:s", Type::Small) + 1.5);
     let has_band = !timeline.phases.is_empty();
-    (right - left >= SHORTEST_AXIS).then(|| Drawer {
-        timeline: timeline.clone(),
-        density: Density::Paper,
-        top: if has_band { 0.0 } else { canvas.sizes.line() },
-        left: 0.0,
-        axis: Axis {
-            left,
-            right,
-            span: timeline.span,
-        },
-        pitch: canvas.sizes.pitch(),
-        rates: Some(right + 5.1),
-        beside: (width >= WIDE.0).then_some((width - WIDE.1, WIDE.1)),
-    })
+    let top = if has_band { 0.0 } else { canvas.sizes.line() };
+    let place = Rect::new(0.0, top, width, 0.0);
+    let drawer = Drawer::new(timeline.clone(), Density::Paper, canvas, place);
+    let axis = drawer.axis.right - drawer.axis.left;
+    (axis >= SHORTEST_AXIS).then_some(drawer)
 }

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::marks::{RowMark, Sentences, Sign};
+use super::marks::{RowMark, Sign};
 use super::rows::{Level, Row, SendingBar};
 use super::source::FigureSource;
 use crate::base::name::{last_part, namespace};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::graph::NodeId;
 use crate::mission::EventId;
@@ -29,7 +29,7 @@ const JOINED: f64 = 0.6;
 
 /// The rows below the titles of their namespaces, in the order in which they begin. If `is_folded`, those of a namespace
 /// that exist throughout are one row, unless they are marked.
-pub(super) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<Row> {
+pub(crate) fn by_namespace(rows: Vec<Row>, whole: Span, is_folded: bool) -> Vec<Row> {
     let givers = rows.iter().flat_map(|row| &row.marks);
     let givers: BTreeSet<NodeId> = givers.filter_map(|mark| mark.from).collect();
     let is_fixed = |row: &Row| {
@@ -124,44 +124,50 @@ fn staircase(mut rows: Vec<Row>, whole: Span) -> Vec<Row> {
     rows
 }
 
-/// A row for all that begin and end together, in at most `most` rows; only rows with events. Events without a row share
-/// the last one.
-pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -> Vec<Row> {
+/// A row for all that begin and end together, in at most `most` rows; those without events are none, or one if
+/// `is_complete`. Events without a row share the last one.
+pub(crate) fn together(
+    source: &FigureSource<'_>,
+    rows: Vec<Row>,
+    most: usize,
+    is_complete: bool,
+) -> Vec<Row> {
     let whole = source.span();
     let near = whole.nanos() / NEAR;
     let begun = whole.start.plus(near);
     let mut rows: Vec<Row> = rows.into_iter().map(Row::plain).collect();
+    let mut named: BTreeMap<String, usize> = BTreeMap::new();
+    for row in &rows {
+        *named.entry(last_part(&row.name).to_owned()).or_default() += 1;
+    }
     for row in &mut rows {
         // Elements that start with the recording look as if they existed from the beginning.
         row.marks
             .retain(|mark| mark.sign != Sign::Start || mark.at >= begun);
-    }
-    let names: Vec<Arc<str>> = rows.iter().map(|row| Arc::clone(&row.name)).collect();
-    let is_shared = |last: &str| names.iter().filter(|n| last_part(n) == last).count() > 1;
-    for row in &mut rows {
         row.labels = vec![match last_part(&row.name) {
-            last if is_shared(last) => row.name.to_string(),
+            last if named[last] > 1 => row.name.to_string(),
             last => last.to_owned(),
         }];
     }
-    let placed: BTreeSet<EventId> = rows
-        .iter()
-        .flat_map(|row| &row.marks)
-        .flat_map(|mark| mark.events.clone())
-        .collect();
-    let bursts = [Sign::Start, Sign::End].map(|sign| bursts(&rows, sign, near));
-    let mut groups: BTreeMap<Vec<(bool, Stamp)>, Vec<Row>> = BTreeMap::new();
-    for row in rows.into_iter().filter(|row| !row.marks.is_empty()) {
-        let turns = row.marks.iter().filter_map(|mark| match mark.sign {
-            Sign::Start => Some((true, burst(&bursts[0], mark.at))),
-            Sign::End => Some((false, burst(&bursts[1], mark.at))),
-            _ => None,
-        });
-        groups.entry(turns.collect()).or_default().push(row);
+    let (open, fixed): (Vec<Row>, Vec<Row>) =
+        rows.into_iter().partition(|row| !row.marks.is_empty());
+    let mut rows: Vec<Row> = Vec::new();
+    for row in open {
+        match rows.iter_mut().find(|first| first.is_with(&row, near)) {
+            Some(first) => first.join(row),
+            None => rows.push(row),
+        }
     }
-    let mut rows: Vec<Row> = groups.into_values().map(|own| joined(own, near)).collect();
+    for row in &mut rows {
+        row.lives = Span::joined(std::mem::take(&mut row.lives), 0);
+        let bar = |life: &Span| SendingBar {
+            span: *life,
+            share: JOINED,
+        };
+        row.bars = row.lives.iter().map(bar).collect();
+    }
     rows.sort_by(|a, b| (a.start(), &a.labels).cmp(&(b.start(), &b.labels)));
-    let mut others = unplaced(source, &placed);
+    let mut others = unplaced(source, &rows);
     while rows.len() + usize::from(!others.is_empty()) > most.max(1) {
         let few = rows.iter().enumerate().min_by_key(|(at, row)| {
             let members = row.labels.len() * row.marks.len();
@@ -178,63 +184,50 @@ pub(super) fn together(source: &FigureSource<'_>, rows: Vec<Row>, most: usize) -
             ..Row::default()
         });
     }
+    if is_complete && !fixed.is_empty() {
+        rows.insert(0, folded(fixed, whole));
+    }
     rows
 }
 
-/// The beginnings of the bursts of signs of a kind: signs that follow within a short time belong to the first
-/// of them.
-fn bursts(rows: &[Row], sign: Sign, near: i64) -> Vec<Stamp> {
-    let marks = rows.iter().flat_map(|row| &row.marks);
-    let mut times: Vec<Stamp> = marks.filter(|m| m.sign == sign).map(|m| m.at).collect();
-    times.sort_unstable();
-    times.dedup_by(|later, first| later.since(*first) <= near);
-    times
-}
-
-fn burst(bursts: &[Stamp], at: Stamp) -> Stamp {
-    let next = bursts.partition_point(|first| *first <= at);
-    next.checked_sub(1).map_or(at, |found| bursts[found])
-}
-
-/// One row for several, with one sign for simultaneous starts or ends.
-fn joined(rows: Vec<Row>, near: i64) -> Row {
-    let lives = rows.iter().flat_map(|row| row.lives.clone()).collect();
-    let lives = Span::joined(lives, 0);
-    let bar = |life: &Span| SendingBar {
-        span: *life,
-        share: JOINED,
-    };
-    let labels = rows.iter().flat_map(|row| row.labels.clone()).collect();
-    let mut all: Vec<RowMark> = rows.into_iter().flat_map(|row| row.marks).collect();
-    all.sort_by_key(|mark| mark.at);
-    let mut marks: Vec<RowMark> = Vec::new();
-    for mark in all {
-        let is_same = |other: &&mut RowMark| {
-            let apart = mark.at.since(other.at);
-            other.sign == mark.sign && mark.sign != Sign::Dot && apart.abs() <= near
-        };
-        match marks.iter_mut().rev().find(is_same) {
-            Some(other) => {
-                let is_later = (other.sign == Sign::End) == (mark.at > other.at);
-                other.at = if is_later { mark.at } else { other.at };
-                other.events.extend(mark.events);
-                other.title = format!("{}; {}", other.title, mark.title);
-            }
-            None => marks.push(mark),
-        }
+impl Row {
+    /// Whether it begins and ends as often as another row, each time nearly at the same time.
+    fn is_with(&self, other: &Self, near: i64) -> bool {
+        let is_same =
+            |(a, b): (&RowMark, &RowMark)| a.sign == b.sign && a.at.since(b.at).abs() <= near;
+        self.turns().count() == other.turns().count()
+            && self.turns().zip(other.turns()).all(is_same)
     }
-    Row {
-        bars: lives.iter().map(bar).collect(),
-        lives,
-        labels,
-        marks,
-        ..Row::default()
+
+    /// Takes a row that begins and ends with it, with one sign for each time: the first start, the last end.
+    fn join(&mut self, other: Self) {
+        self.labels.extend(other.labels);
+        self.lives.extend(other.lives);
+        self.hz = [self.hz, other.hz]
+            .into_iter()
+            .flatten()
+            .reduce(|a, b| a + b);
+        (self.topic, self.beside) = (None, <[Vec<String>; 2]>::default());
+        let (turns, dots): (Vec<RowMark>, Vec<RowMark>) =
+            other.marks.into_iter().partition(RowMark::is_turn);
+        let own = self.marks.iter_mut().filter(|mark| mark.is_turn());
+        for (own, other) in own.zip(turns) {
+            own.at = match own.sign {
+                Sign::Start => own.at.min(other.at),
+                _ => own.at.max(other.at),
+            };
+            own.events.extend(other.events);
+            own.title = format!("{}; {}", own.title, other.title);
+        }
+        self.marks.extend(dots);
     }
 }
 
 /// The events of the log without a row.
-fn unplaced(source: &FigureSource<'_>, placed: &BTreeSet<EventId>) -> Vec<RowMark> {
-    let sentences = Sentences::new(source);
+fn unplaced(source: &FigureSource<'_>, rows: &[Row]) -> Vec<RowMark> {
+    let marks = rows.iter().flat_map(|row| &row.marks);
+    let placed: BTreeSet<EventId> = marks.flat_map(|mark| mark.events.clone()).collect();
+    let parts = source.mission.log.all_parts();
     let all = source.mission.log.headlines(source.span());
     let others = all.filter(|(id, _)| !placed.contains(id));
     let mark = |(id, event): (EventId, &Event)| {
@@ -243,7 +236,7 @@ fn unplaced(source: &FigureSource<'_>, placed: &BTreeSet<EventId>) -> Vec<RowMar
             Kind::Stopped | Kind::Vanished => Sign::End,
             _ => Sign::Dot,
         };
-        sentences.mark(id, event, sign)
+        RowMark::new(source, &parts, (id, event), sign)
     };
     others.map(mark).collect()
 }

@@ -2,8 +2,8 @@
 //! playhead at the window.
 
 use super::Timeline;
-use super::canvas::{MM_PER_PT, PaperCanvas, Sizes, Type};
-use super::drawer::{Axis, Density, Drawer};
+use super::canvas::{MM_PER_PT, PaperCanvas, Sizes};
+use super::drawer::{Density, Drawer};
 use super::rows::{Row, SendingBar};
 use crate::base::cast;
 use crate::base::geometry::Rect;
@@ -19,8 +19,6 @@ const SMALLEST_TEXT: f64 = 10.0;
 const AROUND: f64 = 7.0;
 /// The narrowest bar of messages, in pixels.
 const NARROWEST: f64 = 2.5;
-/// The largest fraction of the width for the names of rows.
-const NAMES: f64 = 0.22;
 
 /// The scale and the page of a timeline below a frame.
 #[derive(Clone, Copy)]
@@ -97,22 +95,11 @@ impl<'a> Below<'a> {
         } else if timeline.rows.is_empty() {
             timeline.rows = vec![messages(view, wide * scale)];
         }
+        timeline.span = span;
         let canvas = PaperCanvas::new(fonts, BelowSizes::sizes(), scale);
-        let names = timeline.names_width(&canvas, Type::Strong, wide * NAMES);
-        let drawer = Drawer {
-            timeline,
-            density: Density::Frame,
-            top: (strip.y + AROUND * sizes.unit) / scale,
-            left: margin,
-            axis: Axis {
-                left: margin + names,
-                right: margin + wide.max(names + 1.0 / scale),
-                span,
-            },
-            pitch,
-            rates: None,
-            beside: None,
-        };
+        let place = Rect::new(margin, (strip.y + AROUND * sizes.unit) / scale, wide, 0.0);
+        let mut drawer = Drawer::new(timeline, Density::Frame, &canvas, place);
+        drawer.pitch = pitch;
         Self {
             style: sizes.style,
             fonts,
@@ -144,10 +131,8 @@ impl<'a> Below<'a> {
         let time = frame.shown();
         let mut canvas = self.canvas();
         self.drawer.now(&mut canvas, time, &|row| row.is_in(time));
-        let mut groups = canvas.into_styled(self.style);
-        let mut canvas = self.canvas();
         self.drawer.marks(&mut canvas);
-        groups.extend(canvas.into_styled(self.style));
+        let mut groups = canvas.into_styled(self.style);
         groups.push(self.drawer.playhead(time, self.scale, self.style));
         groups
     }
@@ -164,14 +149,11 @@ fn messages(view: &View, width: f64) -> Row {
         messages as f64 * 1e9 / nanos.max(1.0)
     };
     let busiest = view.frames.chunks(per_bar).map(rate).fold(0.0, f64::max);
-    let starts = view.frames.iter().step_by(per_bar).map(|f| f.span.start);
-    let ends = starts.skip(1).chain(view.frames.last().map(|f| f.span.end));
-    let bars = view.frames.chunks(per_bar).zip(ends);
-    let bars = bars.filter_map(|(frames, end)| {
-        let (start, rate) = (frames.first()?.span.start, rate(frames));
-        (rate > 0.0).then(|| SendingBar {
-            span: Span::new(start, end),
-            share: rate / busiest,
+    let bars = view.frames.chunks(per_bar).filter_map(|frames| {
+        let (first, last) = (frames.first()?, frames.last()?);
+        (busiest > 0.0).then(|| SendingBar {
+            span: Span::new(first.span.start, last.span.end),
+            share: rate(frames) / busiest,
         })
     });
     Row {

@@ -114,8 +114,8 @@ impl<'a> PaperCanvas<'a> {
     /// Begins the group of a mark: its class, and the events of the log that it shows. The log's sentence about
     /// them is its title.
     pub(crate) fn begin_mark(&mut self, class: &str, events: &[EventId], title: String) {
-        let id = format!("mark-{}", self.groups.len());
-        self.open(&id, &format!("mark {class}"), event_data(events));
+        let id = format!("{class}-{}", self.groups.len());
+        self.open(&id, class, event_data(events));
         if let Some(group) = self.group() {
             group.title = title;
         }

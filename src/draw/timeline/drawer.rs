@@ -14,7 +14,7 @@ use crate::draw::scene::{Form, Group, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 
 /// The height of the band of phases, and the space below it, in millimetres.
-pub(crate) const BAND: (f64, f64) = (3.3, 0.9);
+const BAND: (f64, f64) = (3.3, 0.9);
 /// The space between the rows and the axis, in millimetres.
 const BELOW: f64 = 0.4;
 /// The space between the names and the rows, and the indentation of rows below a title, in millimetres.
@@ -27,6 +27,8 @@ const TICK: f64 = 2.24 / 2.75;
 /// millimetres.
 const LETTER: f64 = 1.08 / 2.75;
 const APART: f64 = 2.3;
+/// The least width of a page with a column beside the rows, in millimetres.
+const WIDE: f64 = 150.0;
 /// The most names that are written for a row, and beside it.
 const MOST_NAMES: (usize, usize) = (3, 12);
 
@@ -56,9 +58,15 @@ impl Axis {
         self.left + part * (self.right - self.left)
     }
 
+    /// The rectangle of a time, from `y` on.
+    fn rect(&self, time: Span, y: f64, height: f64) -> Rect {
+        let left = self.x(time.start);
+        Rect::new(left, y, self.x(time.end) - left, height)
+    }
+
     /// Draws the axis at `y` with round times below, and its end; returns the y at which it ends below. `unit` is
     /// whether the form of the times is written before them.
-    pub(crate) fn draw(&self, canvas: &mut PaperCanvas<'_>, y: f64, unit: bool) -> f64 {
+    fn draw(&self, canvas: &mut PaperCanvas<'_>, y: f64, unit: bool) -> f64 {
         let ruler = Stroke::solid(ink::TEXT, HAIRLINE);
         canvas.line(Point::new(self.left, y), Point::new(self.right, y), &ruler);
         let middle = y + 0.9 + canvas.cap(Type::Small) / 2.0 + 0.35;
@@ -96,53 +104,21 @@ pub(crate) fn clock(nanos: i64) -> String {
     words::moment(second * 1_000_000_000)
 }
 
-/// Draws the band from `y` down; phases of an odd number are darker, ramps are hatched.
-pub(crate) fn band(
-    canvas: &mut PaperCanvas<'_>,
-    axis: &Axis,
-    y: f64,
-    phases: &[PhaseLabel],
-    of: Type,
-) {
-    for (k, phase) in phases.iter().enumerate() {
-        phase_cell(canvas, axis, y, phase, (ink::BAND[k % 2], of, ink::TEXT));
-    }
-}
-
-fn phase_cell(
-    canvas: &mut PaperCanvas<'_>,
-    axis: &Axis,
-    y: f64,
-    phase: &PhaseLabel,
-    (fill, of, color): (Color, Type, Color),
-) {
-    let (left, right) = (axis.x(phase.span.start), axis.x(phase.span.end));
-    let cell = Rect::new(left, y, right - left, BAND.0);
-    canvas.fill(cell, fill);
-    if phase.is_ramp {
-        hatch(canvas, cell);
-    }
-    // The text of the current phase is bold, and has the same words.
-    let wide = |canvas: &PaperCanvas<'_>, name: &str| canvas.width(name, of.bold());
-    let room = cell.w - 0.6;
-    let name = phase.names.iter().find(|name| wide(canvas, name) <= room);
-    let is_number = |name: &String| name.chars().all(|c| c.is_ascii_digit());
-    // Truncated words are more informative than a number, if enough of them remain.
-    let name = match name.filter(|name| room < 9.0 || !is_number(name)) {
-        Some(name) => name.clone(),
-        None => canvas.cut(phase.names.first().map_or("", |n| n), of.bold(), room),
-    };
-    let middle = cell.centre();
-    canvas.text_middle(middle.x, middle.y, of, color, &name);
-}
-
-fn hatch(canvas: &mut PaperCanvas<'_>, rect: Rect) {
-    let stroke = Stroke::solid(ink::RULE, HAIRLINE);
-    let mut x = rect.x + 1.0;
-    while x < rect.right() {
-        let top = Point::new((x + rect.h * 0.5).min(rect.right()), rect.y);
-        canvas.line(Point::new(x, rect.bottom()), top, &stroke);
-        x += 1.4;
+impl PhaseLabel {
+    /// Writes the best name that fits.
+    fn write(&self, canvas: &mut PaperCanvas<'_>, cell: Rect, of: Type, color: Color) {
+        // The text of the current phase is bold, and has the same words.
+        let (bold, room) = (of.bold(), cell.w - 0.6);
+        let mut names = self.names.iter();
+        let name = names.find(|name| canvas.width(name, bold) <= room);
+        let is_number = |name: &String| name.chars().all(|c| c.is_ascii_digit());
+        // Truncated words are more informative than a number, if enough of them remain.
+        let name = match name.filter(|name| room < 9.0 || !is_number(name)) {
+            Some(name) => name.clone(),
+            None => canvas.cut(self.names.first().map_or("", |n| n), bold, room),
+        };
+        let at = cell.centre();
+        canvas.text_middle(at.x, at.y, of, color, &name);
     }
 }
 
@@ -190,33 +166,68 @@ impl Timeline {
         let has_band = !self.phases.is_empty();
         if has_band { BAND.0 + BAND.1 } else { 0.0 }
     }
+}
 
-    /// The width of the column of names in text of this kind: that of the widest, at most `most`.
-    pub(crate) fn names_width(&self, canvas: &PaperCanvas<'_>, of: Type, most: f64) -> f64 {
-        let one = |row: &Row| {
-            let of = if row.level == Level::Title {
-                Type::Head
-            } else {
-                of
-            };
-            let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
-            canvas.width(&text, of) + indent(row)
-        };
-        let widest = self.rows.iter().map(one).fold(0.0, f64::max);
-        (widest + GAP).min(most)
+impl Row {
+    /// The kind of text of its name, if that of usual rows is `of`, and its indentation.
+    fn face(&self, of: Type) -> (Type, f64) {
+        match self.level {
+            Level::Title => (Type::Head, 0.0),
+            Level::Outside => (of, 0.0),
+            Level::Inside => (of, GAP),
+        }
     }
 }
 
-fn indent(row: &Row) -> f64 {
-    if row.level == Level::Inside { GAP } else { 0.0 }
+impl Density {
+    /// The kinds of text of names: usual, and those of rows that are in the window.
+    fn names(self) -> [Type; 2] {
+        match self {
+            Self::Frame => [Type::Small, Type::Strong],
+            Self::Page | Self::Paper => [Type::Name; 2],
+        }
+    }
 }
 
 impl Drawer {
-    /// The kinds of text of names: usual, and those of rows that are in the window.
-    fn names(&self) -> [Type; 2] {
-        match self.density {
-            Density::Frame => [Type::Small, Type::Strong],
-            Density::Page | Density::Paper => [Type::Name; 2],
+    /// A timeline of this width at the top left corner of `place`.
+    pub(crate) fn new(
+        timeline: Timeline,
+        density: Density,
+        canvas: &PaperCanvas<'_>,
+        place: Rect,
+    ) -> Self {
+        // The largest width of names, and the widths of rates and of what is beside the rows.
+        let (most, rates, mut beside) = match density {
+            Density::Frame => (place.w * 0.22, 0.0, 0.0),
+            Density::Page => (place.w.min(WIDE) * 0.36, 12.0, 58.0),
+            Density::Paper => (place.w.min(WIDE) * 0.36, 5.1, 68.0),
+        };
+        if place.w < WIDE {
+            beside = 0.0;
+        }
+        let one = |row: &Row| {
+            let text = fitting(&row.labels, MOST_NAMES.0, |_| true);
+            let (of, indent) = row.face(density.names()[1]);
+            canvas.width(&text, of) + indent
+        };
+        let names = timeline.rows.iter().map(one).fold(0.0, f64::max) + GAP;
+        let unit = canvas.width("min:s", Type::Small) + 1.5;
+        let left = place.x + names.min(most).max(unit);
+        let end = place.right() - beside - if beside > 0.0 { 1.8 } else { 0.0 };
+        Self {
+            density,
+            top: place.y,
+            left: place.x,
+            axis: Axis {
+                left,
+                right: (end - rates).max(left + 0.2),
+                span: timeline.span,
+            },
+            pitch: canvas.sizes.pitch(),
+            rates: (rates > 0.0).then_some(end),
+            beside: (beside > 0.0).then_some((place.right() - beside, beside)),
+            timeline,
         }
     }
 
@@ -237,9 +248,12 @@ impl Drawer {
 
     /// The frame around a window.
     pub(crate) fn window(&self, time: Span) -> Rect {
-        let (left, right) = (self.axis.x(time.start), self.axis.x(time.end));
         let top = self.begin() - 0.4;
-        Rect::new(left, top, (right - left).max(0.3), self.end() - top)
+        let place = self.axis.rect(time, top, self.end() - top);
+        Rect {
+            w: place.w.max(0.3),
+            ..place
+        }
     }
 
     /// Draws what is the same in every window: band, bars and axis; returns the y at which the axis ends below.
@@ -257,43 +271,42 @@ impl Drawer {
 
     /// The band, its columns behind the rows, and the heads of the other columns.
     fn columns(&self, canvas: &mut PaperCanvas<'_>) {
-        let (phases, bottom) = (&self.timeline.phases, self.end());
+        let (phases, is_paper) = (&self.timeline.phases, self.density == Density::Paper);
         let (small, quiet) = (Type::Small, ink::QUIET);
-        let middle = self.top + BAND.0 / 2.0;
-        let top = self.top + BAND.0;
+        let (top, bottom) = (self.top + BAND.0, self.end());
         for (k, phase) in phases.iter().enumerate() {
-            let (left, right) = (self.axis.x(phase.span.start), self.axis.x(phase.span.end));
+            let column = self.axis.rect(phase.span, top, bottom - top);
             if k % 2 == 0 {
-                canvas.fill(Rect::new(left, top, right - left, bottom - top), ink::TINT);
+                canvas.fill(column, ink::TINT);
+            }
+            if k > 0 {
+                let dashed = Stroke::dashed(ink::RULE, HAIRLINE, &[0.7, 0.6]);
+                canvas.line(
+                    Point::new(column.x, top),
+                    Point::new(column.x, bottom),
+                    &dashed,
+                );
             }
         }
-        for phase in phases.iter().skip(1) {
-            let x = self.axis.x(phase.span.start);
-            let dashed = Stroke::dashed(ink::RULE, HAIRLINE, &[0.7, 0.6]);
-            canvas.line(Point::new(x, top), Point::new(x, bottom), &dashed);
+        for (k, phase) in phases.iter().enumerate() {
+            let cell = self.axis.rect(phase.span, self.top, BAND.0);
+            canvas.fill(cell, ink::BAND[k % 2]);
+            let of = if is_paper { Type::Head } else { small };
+            phase.write(canvas, cell, of, ink::TEXT);
         }
-        let of = if self.density == Density::Paper {
-            Type::Head
-        } else {
-            Type::Small
-        };
-        band(canvas, &self.axis, self.top, phases, of);
+        let mut head = self.top + BAND.0 / 2.0;
         if !phases.is_empty() && self.density != Density::Frame {
-            canvas.text_end(self.axis.left - 0.9, middle, small, quiet, "phase");
+            canvas.text_end(self.axis.left - 0.9, head, small, quiet, "phase");
         }
-        if self.density != Density::Paper {
-            return;
+        if phases.is_empty() {
+            // In the row of the first namespace, or above it.
+            head = self.top - canvas.sizes.line() / 2.0;
         }
-        // Without a band the heads are in the row of the first namespace, or above it.
-        let head = if phases.is_empty() {
-            self.top - canvas.sizes.line() / 2.0
-        } else {
-            middle
-        };
-        if let Some(right) = self.rates {
+        let has_rows = !self.timeline.rows.is_empty();
+        if let Some(right) = self.rates.filter(|_| is_paper && has_rows) {
             canvas.text_end(right, head, small, quiet, "Hz");
         }
-        let is_of_nodes = self.timeline.rows.iter().all(|row| row.topic.is_none());
+        let is_of_nodes = self.timeline.rows.iter().any(|row| !row.nodes.is_empty());
         if let Some((x, _)) = self.beside.filter(|_| is_of_nodes) {
             let text = "→ publishes  ← subscribes, as far as known";
             canvas.text(x, head, small, quiet, text);
@@ -301,38 +314,34 @@ impl Drawer {
     }
 
     fn row(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row) {
-        let is_folded = !row.folded.is_empty();
-        if row.level == Level::Title || is_folded || self.density == Density::Paper {
+        let (is_folded, is_paper) = (!row.folded.is_empty(), self.density == Density::Paper);
+        if row.level == Level::Title || is_folded || is_paper {
             let color = if is_folded { ink::QUIET } else { ink::TEXT };
-            self.name(canvas, y, row, (self.names()[0], color));
+            self.name(canvas, y, row, self.density.names()[0], color);
         }
         if row.level == Level::Title {
             return;
         }
-        if self.density == Density::Frame {
-            let guide = Stroke::solid(ink::BAND[0], HAIRLINE);
-            let (left, right) = (self.axis.left, self.axis.right);
-            canvas.line(Point::new(left, y), Point::new(right, y), &guide);
-        } else if !is_folded {
-            let dash: &[f64] = if row.is_inferred { &[0.55, 0.5] } else { &[] };
-            let stroke = Stroke::dashed(ink::LINE, 0.28, dash);
-            for life in &row.lives {
-                let [from, to] = [life.start, life.end].map(|at| Point::new(self.axis.x(at), y));
-                canvas.line(from, to, &stroke);
-            }
+        let (mut lives, mut stroke) = (&row.lives[..], Stroke::solid(ink::LINE, 0.28));
+        if row.is_inferred {
+            stroke.dash = vec![0.55, 0.5];
         }
-        let is_dark = self.density == Density::Paper && !is_folded;
+        let guide = [self.axis.span];
+        if self.density == Density::Frame {
+            (lives, stroke) = (&guide, Stroke::solid(ink::BAND[0], HAIRLINE));
+        }
+        for life in lives.iter().filter(|_| !is_folded) {
+            let [from, to] = [life.start, life.end].map(|at| Point::new(self.axis.x(at), y));
+            canvas.line(from, to, &stroke);
+        }
+        let is_dark = is_paper && !is_folded;
         let color = if is_dark { ink::BAR } else { ink::FOLDED };
         for bar in &row.bars {
             self.bar(canvas, y, bar, color);
         }
-        if self.density == Density::Paper {
-            self.rate(
-                canvas,
-                y,
-                &row.hz.map_or("–".to_owned(), number),
-                ink::QUIET,
-            );
+        if is_paper {
+            let rate = row.hz.map_or("–".to_owned(), number);
+            self.rate(canvas, y, &rate, ink::QUIET);
         }
         if let Some((x, width)) = self.beside {
             beside(canvas, row, Point::new(x, y), width);
@@ -340,23 +349,14 @@ impl Drawer {
     }
 
     /// Draws the name of a row.
-    fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, (of, color): (Type, Color)) {
-        let of = if row.level == Level::Title {
-            Type::Head
-        } else {
-            of
-        };
-        let room = self.axis.left - self.left - GAP - indent(row);
+    fn name(&self, canvas: &mut PaperCanvas<'_>, y: f64, row: &Row, of: Type, color: Color) {
         // In the widest kind, so that the words are the same in every window.
-        let widest = if row.level == Level::Title {
-            of
-        } else {
-            self.names()[1]
-        };
-        let fits = |label: &str| canvas.width(label, widest) <= room + 0.01;
+        let (widest, indent) = row.face(self.density.names()[1]);
+        let room = self.axis.left - self.left - GAP - indent + 0.01;
+        let fits = |label: &str| canvas.width(label, widest) <= room;
         let label = fitting(&row.labels, MOST_NAMES.0, fits);
-        let label = canvas.cut(&label, widest, room + 0.01);
-        canvas.text(self.left + indent(row), y, of, color, &label);
+        let label = canvas.cut(&label, widest, room);
+        canvas.text(self.left + indent, y, row.face(of).0, color, &label);
     }
 
     /// Draws a text in the column of rates.
@@ -368,9 +368,9 @@ impl Drawer {
 
     fn bar(&self, canvas: &mut PaperCanvas<'_>, y: f64, bar: &SendingBar, color: Color) {
         let high = (BAR.0 + (BAR.1 - BAR.0) * bar.share) * self.pitch;
-        let (from, to) = (self.axis.x(bar.span.start), self.axis.x(bar.span.end));
-        let wide = (to - from).max(0.25);
-        canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
+        let place = self.axis.rect(bar.span, y - high / 2.0, high);
+        let w = place.w.max(0.25);
+        canvas.fill(Rect { w, ..place }, color);
     }
 
     /// Draws what a window adds to the ground: dark bars, the current phase, and the names, those for which `is_now`
@@ -399,19 +399,18 @@ impl Drawer {
                 self.bar(canvas, y, &bar, ink::BAR);
             }
             let color = if is_now { ink::TEXT } else { ink::QUIET };
-            let text = (self.names()[usize::from(is_now)], color);
-            self.name(canvas, y, row, text);
+            let of = self.density.names()[usize::from(is_now)];
+            self.name(canvas, y, row, of, color);
         }
         let shared = |phase: &&PhaseLabel| {
-            let (from, to) = (
-                phase.span.start.max(time.start),
-                phase.span.end.min(time.end),
-            );
-            to.since(from)
+            let end = phase.span.end.min(time.end);
+            end.since(phase.span.start.max(time.start))
         };
-        if let Some(phase) = self.timeline.phases.iter().max_by_key(shared) {
-            let looks = (ink::TEXT, Type::Strong, ink::PAPER);
-            phase_cell(canvas, &self.axis, self.top, phase, looks);
+        let phase = self.timeline.phases.iter().max_by_key(shared);
+        if let Some(phase) = phase.filter(|_| time.nanos() < self.axis.span.nanos()) {
+            let cell = self.axis.rect(phase.span, self.top, BAND.0);
+            canvas.fill(cell, ink::TEXT);
+            phase.write(canvas, cell, Type::Strong, ink::PAPER);
         }
     }
 
@@ -428,155 +427,118 @@ impl Drawer {
     /// Draws the marks: ticks, crosses and small circles, then arrows, then letters beside them.
     pub(crate) fn marks(&self, canvas: &mut PaperCanvas<'_>) {
         let all = self.timeline.marks();
-        let mut taken: Vec<TakenPlace> = Vec::new();
         let of = |sign: Sign| all.iter().filter(move |(_, mark)| mark.sign == sign);
-        for sign in [Sign::Start, Sign::End, Sign::Dot] {
-            for &(row, mark) in of(sign) {
-                let at = Point::new(self.axis.x(mark.at), self.y(row));
+        let at = |row: usize, mark: &RowMark| Point::new(self.axis.x(mark.at), self.y(row));
+        for &(row, mark) in [Sign::Start, Sign::End, Sign::Dot].into_iter().flat_map(of) {
+            self.begin_mark(canvas, mark);
+            let size = if self.density == Density::Frame {
+                1.3
+            } else {
+                1.0
+            };
+            put(canvas, mark.sign, at(row, mark), size);
+        }
+        // The places that the next arrows and letters avoid.
+        let mut taken: Vec<Rect> = Vec::new();
+        let mut named = Vec::new();
+        for &(to, mark) in of(Sign::Handover) {
+            if let Some(from) = self.timeline.giver(mark).filter(|from| *from != to) {
                 self.begin_mark(canvas, mark);
-                put(canvas, sign, at, self.pitch);
-                if sign == Sign::End {
-                    taken.push(TakenPlace::at(at));
+                let (from_y, tip) = (self.y(from), at(to, mark));
+                let x = arrow(canvas, from_y, tip, &mut taken);
+                let pair = (from.min(to), from.max(to), &mark.text);
+                if !named.contains(&pair) {
+                    named.push(pair);
+                    let y = from_y + (tip.y - from_y) * 0.66;
+                    self.topic(canvas, Point::new(x, y), &mark.text, &mut taken);
                 }
             }
         }
-        let mut named: Vec<([usize; 2], &str)> = Vec::new();
-        for &(to, mark) in of(Sign::Handover) {
-            if let Some(from) = self.timeline.giver(mark).filter(|from| *from != to) {
-                let pair = ([from.min(to), from.max(to)], mark.text.as_str());
-                let is_named = named.contains(&pair);
-                named.push(pair);
-                self.arrow(canvas, (from, to), mark, is_named, &mut taken);
-            }
-        }
+        let ends = of(Sign::End).map(|(row, mark)| at(*row, mark));
+        taken.extend(ends.map(|at| Rect::new(at.x, at.y, 0.0, 0.0)));
         for (k, &(row, mark)) in of(Sign::Letter).enumerate() {
             self.begin_mark(canvas, mark);
-            let at = Point::new(self.axis.x(mark.at), self.y(row));
-            self.letter(canvas, at, &letter(k), &mut taken);
+            self.letter(canvas, at(row, mark), &letter(k), &mut taken);
         }
     }
 
     fn begin_mark(&self, canvas: &mut PaperCanvas<'_>, mark: &RowMark) {
-        let class = match mark.sign {
-            Sign::Start => "start",
-            Sign::End => "end",
-            Sign::Dot => "event",
-            Sign::Letter => "letter",
-            Sign::Handover => "handover",
+        let class = match self.density {
+            Density::Paper => mark.sign.word(),
+            Density::Frame | Density::Page => "mark",
         };
         canvas.begin_mark(class, &mark.events, mark.title.clone());
     }
 
-    /// Draws the arrow of a topic that is taken over, with the topic unless it `is_named` already.
-    fn arrow(
-        &self,
-        canvas: &mut PaperCanvas<'_>,
-        (from, to): (usize, usize),
-        mark: &RowMark,
-        is_named: bool,
-        taken: &mut Vec<TakenPlace>,
-    ) {
-        let (from, to) = (self.y(from), self.y(to));
-        let (low, high) = (from.min(to), from.max(to));
-        let mut x = self.axis.x(mark.at);
-        let is_free = |x: f64| {
-            !taken
-                .iter()
-                .any(|t| (t.x - x).abs() < 1.0 && low < t.low && t.high < high)
-        };
-        while !is_free(x) {
-            x += 1.0;
-        }
-        self.begin_mark(canvas, mark);
-        let stroke = Stroke::solid(ink::CHANGED, 0.3);
-        let side = if to > from { -1.0 } else { 1.0 };
-        let tip = Point::new(x, to + side * 0.15);
-        canvas.line(Point::new(x, from), Point::new(x, to + side), &stroke);
-        canvas.disc(Point::new(x, from), 0.55, ink::CHANGED, &Stroke::default());
-        canvas.head(Point::new(x, from), tip, 1.3, ink::CHANGED);
-        taken.push(TakenPlace { x, low, high });
-        if is_named {
-            return;
-        }
-        let text = canvas.cut(&mark.text, Type::Small, self.axis.right - self.axis.left);
+    /// Writes the topic of an arrow between two rows, so that it covers none of their marks.
+    fn topic(&self, canvas: &mut PaperCanvas<'_>, at: Point, topic: &str, taken: &mut Vec<Rect>) {
+        let text = canvas.cut(topic, Type::Small, self.axis.right - self.axis.left);
         let wide = canvas.width(&text, Type::Small);
-        let x = (x + 0.6).min(self.axis.right - wide) + wide / 2.0;
-        // Between two rows, so that it covers none of their marks.
-        let rows = libm::round((from + (to - from) * 0.66 - self.begin()) / self.pitch);
-        let y = self.begin() + rows * self.pitch;
+        let x = (at.x + 0.6).min(self.axis.right - wide) + wide / 2.0;
+        let y = self.begin() + libm::round((at.y - self.begin()) / self.pitch) * self.pitch;
         canvas.label(x, y, Type::Small, ink::CHANGED, &text);
-        let (low, high) = (y - 1.2, y + 1.2);
-        taken.push(TakenPlace { x, low, high });
+        taken.push(Rect::new(x, y - 1.2, 0.0, 2.4));
     }
 
-    /// Draws a circled letter beside a moment, at the nearest free place to the right or to the left.
-    fn letter(
-        &self,
-        canvas: &mut PaperCanvas<'_>,
-        at: Point,
-        text: &str,
-        taken: &mut Vec<TakenPlace>,
-    ) {
+    /// Draws a circled letter at the nearest free place beside a moment.
+    fn letter(&self, canvas: &mut PaperCanvas<'_>, at: Point, text: &str, taken: &mut Vec<Rect>) {
         let radius = LETTER * self.pitch;
-        let near = |x: f64, taken: &[TakenPlace]| {
-            let hit = |t: &&TakenPlace| {
-                (t.x - x).abs() < APART && t.low - 1.0 < at.y && at.y < t.high + 1.0
-            };
-            taken.iter().find(hit).map(|t| t.x)
+        let is_free = |x: &f64| {
+            let is_near =
+                |t: &Rect| (t.x - x).abs() < APART && t.y - 1.0 < at.y && at.y < t.bottom() + 1.0;
+            *x > self.axis.left && *x < self.axis.right - radius && !taken.iter().any(is_near)
         };
-        let free = |mut x: f64, step: f64| {
-            for _ in 0..12 {
-                let Some(other) = near(x, taken) else { break };
-                x = other + step;
-            }
-            x
-        };
-        let (right, left) = (free(at.x + radius, APART), free(at.x - radius, -APART));
-        let is_left = left > self.axis.left && at.x - left < right - at.x;
-        let is_left = is_left || right > self.axis.right - radius;
-        let at = Point::new(if is_left { left } else { right }, at.y);
-        taken.push(TakenPlace::at(at));
+        let far = (0..100).map(|step| radius + f64::from(step) * 0.25);
+        let x = far.flat_map(|far| [at.x + far, at.x - far]).find(is_free);
+        let at = Point::new(x.unwrap_or(at.x), at.y);
+        taken.push(Rect::new(at.x, at.y, 0.0, 0.0));
         canvas.disc(at, radius, ink::PAPER, &Stroke::solid(ink::CHANGED, 0.25));
         canvas.text_middle(at.x, at.y, Type::Strong, ink::CHANGED, text);
     }
 }
 
-/// A place that letters and arrows avoid.
-struct TakenPlace {
-    x: f64,
-    low: f64,
-    high: f64,
-}
-
-impl TakenPlace {
-    fn at(at: Point) -> Self {
-        Self {
-            x: at.x,
-            low: at.y,
-            high: at.y,
-        }
+/// Draws the arrow of a topic that is taken over, beside others; returns its x.
+fn arrow(canvas: &mut PaperCanvas<'_>, from: f64, to: Point, taken: &mut Vec<Rect>) -> f64 {
+    let mut place = Rect::new(to.x, from.min(to.y), 0.0, (to.y - from).abs());
+    let is_taken = |place: &Rect, other: &Rect| {
+        let is_beside = place.y < other.bottom() && other.y < place.bottom();
+        is_beside && (other.x - place.x).abs() < 1.0
+    };
+    while taken.iter().any(|other| is_taken(&place, other)) {
+        place.x += 1.0;
     }
+    let (x, side) = (place.x, if to.y > from { -1.0 } else { 1.0 });
+    let start = Point::new(x, from);
+    canvas.line(
+        start,
+        Point::new(x, to.y + side),
+        &Stroke::solid(ink::CHANGED, 0.3),
+    );
+    canvas.disc(start, 0.55, ink::CHANGED, &Stroke::default());
+    canvas.head(start, Point::new(x, to.y + side * 0.15), 1.3, ink::CHANGED);
+    taken.push(place);
+    x
 }
 
-/// Draws a tick, a cross or a small circle.
-pub(crate) fn put(canvas: &mut PaperCanvas<'_>, sign: Sign, at: Point, pitch: f64) {
-    let Point { x, y } = at;
+/// Draws a tick, a cross or a small circle; `size` is 1 on paper.
+pub(crate) fn put(canvas: &mut PaperCanvas<'_>, sign: Sign, at: Point, size: f64) {
+    let (Point { x, y }, r) = (at, size * 0.5);
     match sign {
         Sign::Start => {
-            let high = TICK * pitch;
+            let high = TICK * canvas.sizes.pitch();
             canvas.fill(Rect::new(x - 0.2, y - high / 2.0, 0.4, high), ink::ADDED);
         }
         Sign::End => {
             let stroke = Stroke::solid(ink::REMOVED, 0.38);
-            for down in [-0.675, 0.675] {
+            for down in [-1.35 * r, 1.35 * r] {
                 canvas.line(
-                    Point::new(x - 0.5, y - down),
-                    Point::new(x + 0.5, y + down),
+                    Point::new(x - r, y - down),
+                    Point::new(x + r, y + down),
                     &stroke,
                 );
             }
         }
-        _ => canvas.disc(at, 0.5, ink::PAPER, &Stroke::solid(ink::CHANGED, 0.25)),
+        _ => canvas.disc(at, r, ink::PAPER, &Stroke::solid(ink::CHANGED, 0.25)),
     }
 }
 

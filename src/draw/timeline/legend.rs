@@ -6,12 +6,10 @@ use super::drawer::{clock, letter, put};
 use super::marks::Sign;
 use super::notes::{InlineSign, TextRun, Unbroken, sentence};
 use super::rows::{Level, Row};
-use super::source::FigureSource;
 use crate::base::geometry::{Point, Rect};
 use crate::base::name::last_part;
 use crate::base::words;
 use crate::draw::scene::Stroke;
-use crate::mission::event_log::Kind;
 
 /// The most names of one kind that are reported in a note; the others are counted.
 pub(crate) const MOST_NAMED: usize = 60;
@@ -32,12 +30,8 @@ pub(crate) fn letters(timeline: &Timeline) -> Vec<Unbroken> {
     letters.map(item).collect()
 }
 
-/// The notes: the members of collapsed rows unless they are beside them, and the number of events without a letter.
-pub(crate) fn notes(
-    source: &FigureSource<'_>,
-    timeline: &Timeline,
-    is_beside: bool,
-) -> Vec<Unbroken> {
+/// The notes: the members of collapsed rows, unless they are beside them.
+pub(crate) fn notes(timeline: &Timeline, is_beside: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
     let mut space = "";
     for row in timeline.rows.iter().filter(|_| !is_beside) {
@@ -47,24 +41,13 @@ pub(crate) fn notes(
         if !row.folded.is_empty() {
             let names: Vec<&str> = row.folded.iter().map(|name| last_part(name)).collect();
             let names = words::some_of(&names, MOST_NAMED);
-            items.push(sentence(
-                ink::QUIET,
-                format!("Throughout in {space}: {names}."),
-            ));
+            let within = match space {
+                "" => String::new(),
+                space => format!(" in {space}"),
+            };
+            let text = format!("Throughout{within}: {names}.");
+            items.push(sentence(ink::QUIET, text));
         }
-    }
-    let has_words = |id| {
-        let event = source.mission.log.events.get(id);
-        event.is_some_and(|e| !matches!(e.kind, Kind::Appeared | Kind::Vanished))
-    };
-    let marks = timeline.rows.iter().flat_map(|row| &row.marks);
-    let dots = marks.filter(|mark| mark.sign == Sign::Dot);
-    let many = dots
-        .filter(|mark| mark.events.iter().copied().any(has_words))
-        .count();
-    if many > 0 {
-        let many = words::count(many, "smaller change");
-        items.push(sentence(ink::QUIET, format!("{many} without a letter.")));
     }
     items
 }
@@ -83,54 +66,32 @@ pub(crate) fn signs(timeline: &Timeline) -> Vec<Unbroken> {
     };
     let marks = || timeline.rows.iter().flat_map(|row| &row.marks);
     let has = |sign| marks().any(|mark| mark.sign == sign);
-    let all: [(bool, InlineSign, &str); 7] = [
-        (
-            open.iter().any(|row| !row.bars.is_empty()),
-            (LONG, bar),
-            "publishes (height: share of the row’s maximum)",
-        ),
-        (
-            open.iter().any(is_silent),
-            (LONG, |c, x, y| line(c, x, y, &[])),
-            "silent",
-        ),
-        (
-            open.iter().any(|row| row.is_inferred),
-            (LONG, |c, x, y| line(c, x, y, &[0.55, 0.5])),
-            "inferred",
-        ),
-        (
-            has(Sign::Start),
-            (0.6, |c, x, y| sign(c, Sign::Start, x + 0.3, y)),
-            "starts",
-        ),
-        (
-            has(Sign::End),
-            (1.2, |c, x, y| sign(c, Sign::End, x + 0.6, y)),
-            "ends",
-        ),
-        (
-            marks().any(|mark| timeline.giver(mark).is_some()),
-            (LONG, arrow),
-            "topic is taken over",
-        ),
-        (
-            has(Sign::Dot),
-            (1.0, |c, x, y| sign(c, Sign::Dot, x + 0.5, y)),
-            "other change",
-        ),
-    ];
-    let drawn = all.into_iter().filter(|(is, ..)| *is);
-    let item = |(_, sign, words): (bool, InlineSign, &str)| {
+    let mut items = Vec::new();
+    let mut add = |is_drawn: bool, sign: InlineSign, words: &str| {
         let words = TextRun::Words(Type::Small, ink::QUIET, words.to_owned());
-        vec![TextRun::Sign(sign), words]
+        items.extend(is_drawn.then(|| vec![TextRun::Sign(sign), words]));
     };
-    drawn.map(item).collect()
+    let sends = open.iter().any(|row| !row.bars.is_empty());
+    let words = "publishes (height: share of the row’s maximum)";
+    add(sends, (LONG, bar), words);
+    let is_silent = open.iter().any(is_silent);
+    add(is_silent, (LONG, |c, x, y| line(c, x, y, &[])), "silent");
+    let is_inferred = open.iter().any(|row| row.is_inferred);
+    let dashed: InlineSign = (LONG, |c, x, y| line(c, x, y, &[0.55, 0.5]));
+    add(is_inferred, dashed, "inferred");
+    let start: InlineSign = (0.6, |c, x, y| sign(c, Sign::Start, x + 0.3, y));
+    add(has(Sign::Start), start, "starts");
+    let end: InlineSign = (1.2, |c, x, y| sign(c, Sign::End, x + 0.6, y));
+    add(has(Sign::End), end, "ends");
+    let is_given = marks().any(|mark| timeline.giver(mark).is_some());
+    add(is_given, (LONG, arrow), "topic is taken over");
+    let dot: InlineSign = (1.0, |c, x, y| sign(c, Sign::Dot, x + 0.5, y));
+    add(has(Sign::Dot), dot, "other change");
+    items
 }
 
 fn sign(canvas: &mut PaperCanvas<'_>, sign: Sign, x: f64, y: f64) {
-    let pitch = canvas.sizes.pitch();
-    put(canvas, sign, Point::new(x, y), pitch);
+    put(canvas, sign, Point::new(x, y), 1.0);
 }
 
 fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {

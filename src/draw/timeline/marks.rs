@@ -7,7 +7,7 @@ use super::rows::{Row, relative};
 use super::source::FigureSource;
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
-use crate::base::words;
+use crate::base::words::{self, worded};
 use crate::graph::{Element, NodeId};
 use crate::mission::EventId;
 use crate::mission::event_log::{Detail, Event, Kind, Parts};
@@ -16,19 +16,21 @@ use crate::mission::events::{predicate, sentence};
 /// The most letters, and the most arrows: more crowd the rows. Other events are marked by a small circle.
 const MOST: (usize, usize) = (10, 6);
 
-/// The sign of a mark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sign {
-    /// A tick: it began.
-    Start,
-    /// A cross: it ended.
-    End,
-    /// A small circle: anything else.
-    Dot,
-    /// A letter, explained below the rows. Without space for words, a small circle.
-    Letter,
-    /// An arrow from another row: it takes over a topic. Without space for words, a small circle.
-    Handover,
+worded! {
+    /// The sign of a mark.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) enum Sign {
+        /// A tick: it began.
+        Start = "start",
+        /// A cross: it ended.
+        End = "end",
+        /// A small circle: anything else.
+        Dot = "event",
+        /// A letter, explained below the rows. Without space for words, a small circle.
+        Letter = "letter",
+        /// An arrow from another row: it takes over a topic. Without space for words, a small circle.
+        Handover = "handover",
+    }
 }
 
 /// A mark on a row.
@@ -46,24 +48,23 @@ pub(crate) struct RowMark {
     pub(crate) from: Option<NodeId>,
 }
 
-/// The log with the sentences of its events.
-pub(super) struct Sentences<'a> {
-    source: &'a FigureSource<'a>,
-    parts: Parts,
-}
-
-impl<'a> Sentences<'a> {
-    pub(super) fn new(source: &'a FigureSource<'a>) -> Self {
-        let parts = source.mission.log.all_parts();
-        Self { source, parts }
+impl RowMark {
+    pub(super) fn is_turn(&self) -> bool {
+        matches!(self.sign, Sign::Start | Sign::End)
     }
 
-    pub(super) fn mark(&self, id: EventId, event: &Event, sign: Sign) -> RowMark {
-        RowMark {
+    /// The mark of an event; `parts` are those of all events.
+    pub(super) fn new(
+        source: &FigureSource<'_>,
+        parts: &Parts,
+        (id, event): (EventId, &Event),
+        sign: Sign,
+    ) -> Self {
+        Self {
             at: event.time,
             sign,
             events: vec![id],
-            title: sentence(self.source.mission, &self.parts, id, event),
+            title: sentence(source.mission, parts, id, event),
             text: String::new(),
             from: None,
         }
@@ -73,7 +74,7 @@ impl<'a> Sentences<'a> {
 /// The rows with the marks of their events.
 pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> {
     let places = Places::new(&rows);
-    let sentences = Sentences::new(source);
+    let parts = source.mission.log.all_parts();
     let mut arrows = 0;
     // Events that get a letter if they are important enough.
     let mut others: Vec<(usize, RowMark, &Event)> = Vec::new();
@@ -81,14 +82,17 @@ pub(crate) fn marked(source: &FigureSource<'_>, mut rows: Vec<Row>) -> Vec<Row> 
         if event.quiet {
             continue;
         }
-        let mark = |sign| sentences.mark(id, event, sign);
+        let mark = |sign| RowMark::new(source, &parts, (id, event), sign);
         if let [Some((from, _)), Some((_, to))] = places.hands(source, event)
             && arrows < MOST.1
             && places.nodes(from) != Some(to)
         {
             arrows += 1;
+            let topic = source.mission.elements.ends(event.what).1;
             rows[to].marks.push(RowMark {
-                text: last_part(source.name(event.what)).to_owned(),
+                text: topic
+                    .map_or("", |id| last_part(source.topic(id)))
+                    .to_owned(),
                 from: Some(from),
                 ..mark(Sign::Handover)
             });
@@ -155,9 +159,9 @@ impl Row {
     }
 
     /// The ticks and crosses.
-    fn turns(&self) -> impl Iterator<Item = &RowMark> {
+    pub(super) fn turns(&self) -> impl Iterator<Item = &RowMark> {
         let marks = self.marks.iter();
-        marks.filter(|mark| matches!(mark.sign, Sign::Start | Sign::End))
+        marks.filter(|mark| mark.is_turn())
     }
 
     /// Whether it ends for good: its last tick or cross is a cross.

@@ -1,12 +1,9 @@
 //! The phases of the mission: their names in the band above rows, and their titles below a figure.
 
-use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::drawer::Axis;
+use super::canvas::{PaperCanvas, Type, ink};
 use super::notes::{TextRun, Unbroken, flow};
 use super::source::FigureSource;
-use crate::base::geometry::Point;
 use crate::base::time::Span;
-use crate::draw::scene::Stroke;
 use crate::mission::event_log::Phase;
 
 /// A phase in the band.
@@ -15,8 +12,6 @@ pub(crate) struct PhaseLabel {
     pub(crate) span: Span,
     /// Its names, the best first; the last is its number.
     pub(crate) names: Vec<String>,
-    /// Whether elements begin or end in it one after another.
-    pub(crate) is_ramp: bool,
 }
 
 /// The phases by their numbers, which a figure explains below.
@@ -24,7 +19,6 @@ pub(crate) fn numbered(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
     let label = |(k, phase): (usize, &Phase)| PhaseLabel {
         span: phase.span,
         names: vec![(k + 1).to_string()],
-        is_ramp: phase.is_ramp,
     };
     source.phases.iter().enumerate().map(label).collect()
 }
@@ -59,7 +53,6 @@ pub(crate) fn named(source: &FigureSource<'_>) -> Vec<PhaseLabel> {
         phases.push(PhaseLabel {
             span: phase.span,
             names,
-            is_ramp: false,
         });
     }
     phases
@@ -101,68 +94,19 @@ pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     format!("{name}{counts}{}", again.unwrap_or_default())
 }
 
-/// Draws the names of the phases from `y` on: at their positions on at most two lines if `axis` is long
-/// enough, else as running text. Returns the y at which they end.
+/// Draws the titles of the phases as running text from `y` on; returns the y at which they end.
 pub(crate) fn names(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,
     width: f64,
     y: f64,
-    at: Option<&Axis>,
 ) -> f64 {
-    let titles: Vec<String> = (0..source.phases.len()).map(|k| title(source, k)).collect();
-    if let Some(end) = at.and_then(|axis| staircase(canvas, source, axis, y, &titles)) {
-        return end;
-    }
-    let items: Vec<Unbroken> = titles
-        .iter()
-        .enumerate()
-        .map(|(k, title)| {
-            vec![
-                TextRun::Words(Type::Strong, ink::TEXT, format!("{} ", k + 1)),
-                TextRun::Words(Type::Small, ink::TEXT, title.clone()),
-            ]
-        })
-        .collect();
+    let item = |k: usize| {
+        vec![
+            TextRun::Words(Type::Strong, ink::TEXT, format!("{} ", k + 1)),
+            TextRun::Words(Type::Small, ink::TEXT, title(source, k)),
+        ]
+    };
+    let items: Vec<Unbroken> = (0..source.phases.len()).map(item).collect();
     flow(canvas, width, y, &items)
-}
-
-/// Draws the titles of the phases, set from the right: each is placed a line lower than every later one that
-/// it overlaps, so that no leader crosses a text. Returns the y at which they end; `None` if that takes more
-/// than three lines.
-fn staircase(
-    canvas: &mut PaperCanvas<'_>,
-    source: &FigureSource<'_>,
-    axis: &Axis,
-    y: f64,
-    titles: &[String],
-) -> Option<f64> {
-    let line = canvas.sizes.line();
-    let mut placed: Vec<(f64, f64, usize)> = Vec::new();
-    for (phase, title) in source.phases.iter().zip(titles).rev() {
-        let wide = canvas.width(title, Type::Small) + 0.7;
-        let left = axis.x(phase.span.start).min(axis.right - wide);
-        let under = placed
-            .iter()
-            .filter(|(other, ..)| left + wide + 1.2 > *other);
-        let row = under.map(|(.., row)| row + 1).max().unwrap_or(0);
-        placed.push((left, wide, row));
-    }
-    let rows = placed.iter().map(|(.., row)| row + 1).max()?;
-    if rows > 3 {
-        return None;
-    }
-    placed.reverse();
-    let leader = Stroke::solid(ink::RULE, HAIRLINE);
-    for ((phase, title), (left, _, row)) in source.phases.iter().zip(titles).zip(&placed) {
-        let middle = y + 0.5 + line * (*row as f64 + 0.5);
-        let x = axis.x(phase.span.start).max(axis.left + 0.1);
-        canvas.line(
-            Point::new(x, y),
-            Point::new(x, middle + line / 2.0),
-            &leader,
-        );
-        canvas.text(left + 0.7, middle, Type::Small, ink::TEXT, title);
-    }
-    Some(y + 0.5 + line * rows as f64)
 }

@@ -1,7 +1,7 @@
 //! A row per node or topic: the times at which it existed and published, and its rates. Lifetimes and rates are
 //! those of the mission's history; the height of a bar only changes where the log has another rate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::marks::{RowMark, marked};
@@ -10,7 +10,7 @@ use crate::base::name::namespace;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
 use crate::graph::history::{Sender, Stretch};
-use crate::graph::{EdgeId, Element, NodeId, TopicId};
+use crate::graph::{ById, EdgeId, Element, NodeId, TopicId};
 use crate::mission::event_log::Kind;
 
 /// The length above which a silence visibly interrupts a bar: in nanoseconds, and as a fraction of the
@@ -91,18 +91,24 @@ impl Row {
     }
 }
 
-/// A row per role, or per topic if publishers are unknown, with their events.
+/// A row per role, or per topic if publishers are unknown.
 pub(crate) fn known(source: &FigureSource<'_>) -> Vec<Row> {
     if source.knows_publishers() {
-        marked(source, of_nodes(source))
+        of_nodes(source)
     } else {
-        marked(source, of_topics(source))
+        of_topics(source)
     }
 }
 
-/// A row per role.
+/// A row per role, with its events.
 pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
-    let steps = Steps::new(source);
+    let (steps, elements) = (Steps::new(source), &source.mission.elements);
+    let mut received = ById::like(&elements.nodes, BTreeSet::new());
+    for edge in &elements.subscribes {
+        if source.shows(edge.topic) && !source.is_hub(edge.topic) {
+            received[edge.node].insert(source.topic(edge.topic));
+        }
+    }
     let row = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
         let publications = source.publications(nodes);
         let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
@@ -111,17 +117,21 @@ pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Row> {
             name: Arc::clone(role),
             nodes: nodes.clone(),
             beside: [
-                arrowed("→", role, sent_by(source, &steps, &publications)),
-                arrowed("←", role, received_by(source, nodes)),
+                arrowed(
+                    "→",
+                    role,
+                    sent_by(source, &steps, &publications).into_iter(),
+                ),
+                arrowed("←", role, nodes.iter().flat_map(|id| received[*id].clone())),
             ],
             ..own
         }
     };
     let rows = source.roles.iter().map(row);
-    rows.filter(|row| !row.lives.is_empty()).collect()
+    marked(source, rows.filter(|row| !row.lives.is_empty()).collect())
 }
 
-/// A row per topic that carried a message.
+/// A row per topic that carried a message, with its events.
 pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
     let steps = Steps::new(source);
     let row = |id: TopicId| {
@@ -136,8 +146,8 @@ pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Row> {
         }
     };
     let rows = source.shown_topics().map(row);
-    rows.filter(|row| !row.lives.is_empty() && !row.bars.is_empty())
-        .collect()
+    let rows = rows.filter(|row| !row.lives.is_empty() && !row.bars.is_empty());
+    marked(source, rows.collect())
 }
 
 /// The row of some elements drawn as one, without its name.
@@ -149,7 +159,13 @@ fn row(source: &FigureSource<'_>, steps: &Steps, elements: &[Element], senders: 
     let rates: Vec<Vec<Piece>> = senders.iter().map(|s| steps.pieces(s, whole)).collect();
     let hz = rates.iter().filter_map(|pieces| mean(pieces));
     let hz = hz.reduce(|a, b| a + b);
-    let mut bars = bars(&rates, whole);
+    let pieces = summed(&rates, whole);
+    let most = pieces.iter().map(|piece| piece.hz).fold(0.0, f64::max);
+    let bar = |piece: &Piece| SendingBar {
+        span: piece.span,
+        share: if most > 0.0 { piece.hz / most } else { 1.0 },
+    };
+    let mut bars: Vec<SendingBar> = pieces.iter().map(bar).collect();
     if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
         && life.end.since(bar.span.end) <= silence(whole)
         && life.end == whole.end
@@ -178,28 +194,20 @@ fn sent_by<'s>(source: &'s FigureSource<'_>, steps: &Steps, edges: &[EdgeId]) ->
     };
     let mut rated: Vec<(f64, &str)> = edges.iter().filter_map(rated).collect();
     rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    rated.into_iter().map(|(_, name)| name).collect()
+}
+
+/// The names of topics as a node of this name sees them, each once, an arrow before the first.
+fn arrowed<'t>(arrow: &str, node: &str, topics: impl Iterator<Item = &'t str>) -> Vec<String> {
     let mut seen = BTreeSet::new();
-    let names = rated.into_iter().map(|(_, name)| name);
-    names.filter(|name| seen.insert(*name)).collect()
-}
-
-/// The topics that tell something about the nodes that subscribe to them, by name.
-fn received_by<'s>(source: &'s FigureSource<'_>, nodes: &[NodeId]) -> Vec<&'s str> {
-    let all = source.mission.elements.subscribes.iter();
-    let own =
-        all.filter(|e| nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic));
-    let names: BTreeSet<&str> = own.map(|e| source.topic(e.topic)).collect();
-    names.into_iter().collect()
-}
-
-/// The names of topics as a node of this name sees them, an arrow before the first.
-fn arrowed(arrow: &str, node: &str, topics: Vec<&str>) -> Vec<String> {
-    let names = topics.into_iter().map(|topic| relative(topic, node));
-    let text = |(at, name): (usize, &str)| match at {
-        0 => format!("{arrow} {name}"),
-        _ => name.to_owned(),
-    };
-    names.enumerate().map(text).collect()
+    let topics = topics.filter(|topic| seen.insert(*topic));
+    let mut names: Vec<String> = topics
+        .map(|topic| relative(topic, node).to_owned())
+        .collect();
+    if let Some(first) = names.first_mut() {
+        first.insert_str(0, &format!("{arrow} "));
+    }
+    names
 }
 
 /// A topic's name inside the namespace of a node.
@@ -275,64 +283,38 @@ pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
     (time > 1e-3).then(|| count / time)
 }
 
-/// The bars of several senders together.
-fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
-    let pieces = summed(rates, whole);
-    let most = pieces.iter().map(|p| p.hz).fold(0.0, f64::max);
-    let bar = |piece: Piece| SendingBar {
-        span: piece.span,
-        share: if most > 0.0 { piece.hz / most } else { 1.0 },
-    };
-    pieces.into_iter().map(bar).collect()
-}
-
-/// The sum of several rates over time; pieces too short to be visible belong to their neighbours.
+/// The sum of several rates over time. Pieces too short to be visible belong to their neighbours, and so do silences.
 fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
-    let all = || rates.iter().flatten();
-    let mut turns: Vec<(Stamp, f64, i64)> = all().map(|p| (p.span.start, p.hz, 1)).collect();
-    turns.extend(all().map(|p| (p.span.end, -p.hz, -1)));
-    turns.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.cmp(&a.2)).then(a.1.total_cmp(&b.1)));
+    // The changes of the rate, and of the number of senders.
+    let mut turns: BTreeMap<Stamp, (f64, i64)> = BTreeMap::new();
+    for piece in rates.iter().flatten() {
+        for (at, sign) in [(piece.span.start, 1), (piece.span.end, -1)] {
+            let turn = turns.entry(at).or_default();
+            *turn = (turn.0 + piece.hz * sign as f64, turn.1 + sign);
+        }
+    }
+    let is_short = |span: Span| span.nanos() < whole.nanos() / SEEN;
     let mut found: Vec<Piece> = Vec::new();
     let (mut hz, mut many) = (0.0, 0);
-    for (pair, next) in turns.iter().zip(turns.iter().skip(1)) {
-        hz += pair.1;
-        many += pair.2;
-        let span = Span::new(pair.0, next.0);
-        if many == 0 || span.start >= span.end {
-            continue;
-        }
-        let short = span.nanos() < whole.nanos() / SEEN;
-        match found.last_mut() {
-            Some(last) if last.span.end == span.start && (short || same(last.hz, hz)) => {
-                last.span.end = span.end;
+    for ((at, turn), end) in turns.iter().zip(turns.keys().skip(1)) {
+        (hz, many) = (hz + turn.0, many + turn.1);
+        let new = Piece {
+            span: Span::new(*at, *end),
+            hz: f64::max(hz, 0.0),
+        };
+        let before = found.last_mut();
+        match before.filter(|last| at.since(last.span.end) < silence(whole)) {
+            _ if many == 0 => {}
+            Some(last) if same(last.hz, new.hz) || is_short(new.span) => last.span.end = *end,
+            Some(last) if is_short(last.span) => (last.span.end, last.hz) = (*end, new.hz),
+            Some(last) => {
+                last.span.end = *at;
+                found.push(new);
             }
-            Some(last)
-                if last.span.end == span.start && last.span.nanos() < whole.nanos() / SEEN =>
-            {
-                (last.span.end, last.hz) = (span.end, f64::max(hz, 0.0));
-            }
-            _ => found.push(Piece {
-                span,
-                hz: f64::max(hz, 0.0),
-            }),
+            None => found.push(new),
         }
     }
-    // Bars separated by a silence too short to be visible are drawn without it.
-    let mut joined: Vec<Piece> = Vec::new();
-    for piece in found {
-        match joined.last_mut() {
-            Some(last) if piece.span.start.since(last.span.end) < silence(whole) => {
-                last.span.end = piece.span.start;
-                if same(last.hz, piece.hz) {
-                    last.span.end = piece.span.end;
-                } else {
-                    joined.push(piece);
-                }
-            }
-            _ => joined.push(piece),
-        }
-    }
-    joined
+    found
 }
 
 /// Whether two rates cannot be distinguished as heights of bars.

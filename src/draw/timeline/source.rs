@@ -153,22 +153,4 @@ impl<'a> FigureSource<'a> {
             .map(|(_, row)| row.confidence);
         rows.min().unwrap_or(Confidence::Declared)
     }
-
-    /// The name of a node, or the topic of anything else.
-    pub(crate) fn name(&self, what: Element) -> &str {
-        match self.mission.elements.ends(what) {
-            (_, Some(topic)) => self.topic(topic),
-            (Some(node), None) => {
-                let node = self.mission.elements.nodes.get(node);
-                node.map_or("", |n| n.name.as_str())
-            }
-            (None, None) => "",
-        }
-    }
-
-    /// The number of the phase that contains a point in time, counted from 0.
-    pub(crate) fn phase_at(&self, at: Stamp) -> usize {
-        let next = self.phases.partition_point(|p| p.span.start <= at);
-        next.saturating_sub(1)
-    }
 }

@@ -63,29 +63,20 @@ pub(super) fn timeline(rows: Option<&Timeline>) -> String {
     };
     let marks = timeline.marks();
     let has = |signs: &[Sign]| marks.iter().any(|(_, mark)| signs.contains(&mark.sign));
-    let signs = [
-        (has(&[Sign::Start]), "start", "M18 3v14", "begins"),
-        (has(&[Sign::End]), "end", "M13 5l10 10m0 -10l-10 10", "ends"),
-        (
-            has(&[Sign::Dot, Sign::Letter]),
-            "event",
-            "M13 10l5 -5l5 5l-5 5z",
-            "changes",
-        ),
-        (
-            has(&[Sign::Handover]),
-            "takeover",
-            "M18 3V17m-3 -4l3 4l3 -4",
-            "handed over",
-        ),
-    ];
     let mut out = String::new();
-    for (_, class, path, words) in signs.iter().filter(|(occurs, ..)| *occurs) {
-        let _ = write!(
-            out,
-            "<span><svg viewBox=\"0 0 40 20\" class=\"marks\"><path class=\"{class}\" d=\"{path}\"/></svg> {words}</span>"
-        );
-    }
+    let mut add = |signs: &[Sign], class: &str, path: &str, words: &str| {
+        if has(signs) {
+            let path = format!("<path class=\"{class}\" d=\"{path}\"/>");
+            let svg = format!("<svg viewBox=\"0 0 40 20\" class=\"marks\">{path}</svg>");
+            let _ = write!(out, "<span>{svg} {words}</span>");
+        }
+    };
+    let dots = [Sign::Dot, Sign::Letter];
+    add(&[Sign::Start], "start", "M18 3v14", "begins");
+    add(&[Sign::End], "end", "M13 5l10 10m0 -10l-10 10", "ends");
+    add(&dots, "event", "M13 10l5 -5l5 5l-5 5z", "changes");
+    let arrow = "M18 3V17m-3 -4l3 4l3 -4";
+    add(&[Sign::Handover], "takeover", arrow, "handed over");
     out
 }
 

@@ -449,6 +449,7 @@ pub(crate) fn pairs(
                         .filter(|_| !is_topic)
                         .into_iter()
                         .collect(),
+                    marks: Vec::new(),
                     topic: drawn.elements.topic(&name).filter(|_| is_topic),
                     ..moved(
                         row,
