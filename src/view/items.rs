@@ -3,14 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::bundles;
-use super::group::{Groups, groups};
-use super::homes::{Boxes, ItemKey};
-use super::names::is_debug_label;
-use super::replicas::Fleets;
-use super::roles;
-use super::select::{Selection, finish, select};
-use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Mode, ViewOptions};
+use super::choose::{Selection, finish, is_debug_label, select};
+use super::fold::equal::Fleets;
+use super::fold::keys::{Boxes, ItemKey, NodeKeys, TopicKeys};
+use super::fold::namespaces::headlines;
+use super::fold::roles;
+use super::fold::topics::{Groups, groups};
+use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Mode, ViewOptions, listed};
 use crate::graph::{ById, Edge, EdgeId, Element, Elements, Id as _, NodeId, PerElement, TopicId};
 use crate::mission::Mission;
 
@@ -105,11 +104,11 @@ impl Viewed {
         viewed.drawn = ById::like(&elements.topics, true);
         viewed.nodes_in_words = ById::like(&elements.nodes, false);
         if options.is_bundled {
-            viewed.drawn = bundles::drawn(mission, options);
+            viewed.drawn = listed::drawn(mission, options);
         }
         // Outputs that are files of data or can be expanded have a box for each.
         if options.is_bundled && options.is_picture {
-            viewed.nodes_in_words = bundles::nodes_in_words(
+            viewed.nodes_in_words = listed::nodes_in_words(
                 mission,
                 (&viewed.selection, &viewed.drawn),
                 options.are_leaves_in_words,
@@ -117,7 +116,7 @@ impl Viewed {
         }
         viewed.set_items(mission, options, &groups);
         if options.mode.is_direct() {
-            viewed.bundled = bundles::names(elements, &groups);
+            viewed.bundled = listed::names(elements, &groups);
             viewed.set_direct(elements, options);
             if options.is_bundled {
                 viewed.set_leaves(elements);
@@ -420,5 +419,104 @@ pub(super) fn arrow(
         is_service: members.iter().all(|what| elements.is_service(*what)),
         members,
         topics: Vec::new(),
+    }
+}
+
+impl Viewed {
+    /// Finds the topics to list as words: those without a known endpoint, and in bundles those with an event
+    /// although no line carries them; of the latter, those with one known endpoint get a box beside it
+    /// instead.
+    pub(super) fn set_apart(
+        &mut self,
+        mission: &Mission,
+        options: &ViewOptions,
+        (nodes, topics): (&NodeKeys, &mut TopicKeys),
+    ) {
+        let elements = &mission.elements;
+        let mut ends: ById<TopicId, [BTreeSet<&ItemKey>; 2]> =
+            ById::like(topics, Default::default());
+        for (edges, way) in [(&elements.publishes, 0), (&elements.subscribes, 1)] {
+            for edge in edges {
+                ends[edge.topic][way].extend(&nodes[edge.node]);
+            }
+        }
+        let is_bundled = options.is_bundled;
+        let reported: BTreeSet<TopicId> = headlines(mission)
+            .filter_map(|what| elements.ends(what).1)
+            .collect();
+        let is_anything = nodes.iter().any(Option::is_some);
+        if !is_bundled {
+            self.set_nodes_apart(mission);
+        }
+        for (key, (at, ends)) in topics.iter_mut().zip(ends.with_ids()) {
+            let [senders, receivers] = ends;
+            let all: BTreeSet<&ItemKey> = senders.union(receivers).copied().collect();
+            if !is_bundled {
+                self.topics_in_words[at] = is_anything && all.is_empty();
+                continue;
+            }
+            let is_seen = self.selection.topics[at].is_none() && reported.contains(&at);
+            let is_carried =
+                self.drawn[at] && all.len() > 1 && !senders.is_empty() && !receivers.is_empty();
+            if key.is_some() || !is_seen || is_carried {
+                continue;
+            }
+            *key = Some((ItemKind::Topic, elements.topics[at].name.shared()));
+            self.topics_in_words[at] = all.len() != 1;
+            if let Some(owner) = all.first().filter(|_| all.len() == 1) {
+                for (node, words) in nodes.iter().zip(self.nodes_in_words.iter_mut()) {
+                    *words &= node.as_ref() != Some(owner);
+                }
+            }
+        }
+    }
+
+    /// Finds the nodes to list as words: those without a connection and without an event, if most nodes have a connection.
+    fn set_nodes_apart(&mut self, mission: &Mission) {
+        let mut is_busy = ById::like(&mission.elements.nodes, false);
+        for (_, edge) in mission.elements.edges() {
+            is_busy[edge.node] |= self.selection.topics[edge.topic].is_none();
+        }
+        let seen = self
+            .selection
+            .nodes
+            .iter()
+            .filter(|reason| reason.is_none());
+        let is_rule = 2 * is_busy.iter().filter(|busy| **busy).count() >= seen.count();
+        for event in listed::changed(mission) {
+            if let (Some(node), _) = mission.elements.ends(event.what) {
+                is_busy[node] = true;
+            }
+        }
+        self.nodes_in_words = is_busy.iter().map(|busy| is_rule && !busy).collect();
+    }
+
+    /// The arrows between the topics with a box of their own and the only box that they are connected to.
+    pub(super) fn set_leaves(&mut self, elements: &Elements) {
+        for (edges, publishes) in [(&elements.publishes, true), (&elements.subscribes, false)] {
+            for (id, edge) in edges.with_ids() {
+                let Some((node, topic)) = self.ends(edge).filter(|(node, topic)| {
+                    let kind = self.items[*topic].kind;
+                    kind == ItemKind::Topic && self.is_drawn(*node) && self.is_drawn(*topic)
+                }) else {
+                    continue;
+                };
+                let (ends, element, places) = if publishes {
+                    (
+                        (node, topic, ArrowKind::Publish),
+                        Element::Publish(id),
+                        &mut self.publish,
+                    )
+                } else {
+                    (
+                        (topic, node, ArrowKind::Subscribe),
+                        Element::Subscribe(id),
+                        &mut self.subscribe,
+                    )
+                };
+                let arrow = self.arrows.push(arrow(elements, ends, vec![element]));
+                places[id] = EdgePlace::Arrow(arrow);
+            }
+        }
     }
 }

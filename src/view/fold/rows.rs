@@ -5,11 +5,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::looks::{Looks, LooksWriter};
-use super::names::is_infrastructure;
-use super::{Arrow, ArrowId, ArrowKind, Item, ItemId, Shown, TopicRow};
 use crate::base::name::{is_unnamed, namespace};
 use crate::graph::ById;
+use crate::view::choose::is_infrastructure;
+use crate::view::shown::{Looks, LooksWriter};
+use crate::view::{Arrow, ArrowId, ArrowKind, Item, ItemId, Shown, TopicRow};
 
 /// A topic that is a row in a box: one without another known endpoint, or a hub.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,18 +32,18 @@ const FEWEST_ENDS: usize = 6;
 const FEWEST_HOMES: usize = 2;
 
 /// The boxes and arrows of a view, and the looks of each.
-pub(super) struct Drawn {
-    pub(super) items: ById<ItemId, Item>,
-    pub(super) arrows: ById<ArrowId, Arrow>,
-    pub(super) items_shown: ById<ItemId, Looks>,
-    pub(super) arrows_shown: ById<ArrowId, Looks>,
+pub(crate) struct Drawn {
+    pub(crate) items: ById<ItemId, Item>,
+    pub(crate) arrows: ById<ArrowId, Arrow>,
+    pub(crate) items_shown: ById<ItemId, Looks>,
+    pub(crate) arrows_shown: ById<ArrowId, Looks>,
 }
 
 impl Drawn {
     /// Makes topics with one known endpoint rows of its box and, if `hides_infrastructure`, hubs rows of all
     /// connected boxes. Topics that exist without a connection in some window stay boxes. The rows are sorted
     /// by their boxes, publications before subscriptions.
-    pub(super) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
+    pub(crate) fn fold_leaves(&mut self, hides_infrastructure: bool) -> Vec<CardRow> {
         let mut lines: ById<ItemId, Vec<ArrowId>> = ById::like(&self.items, Vec::new());
         for (at, arrow) in self.arrows.with_ids() {
             if let Some((topic, _)) = self.topic_of(arrow) {
@@ -227,7 +227,7 @@ impl Drawn {
 
     /// Combines the two arrows of a box that both publishes and subscribes to a topic into one line, with a
     /// head at each end that is used.
-    pub(super) fn join_twins(&mut self) {
+    pub(crate) fn join_twins(&mut self) {
         let mut stays = ById::like(&self.arrows, true);
         for there in self.arrows.ids() {
             let (from, to) = (self.arrows[there].from, self.arrows[there].to);
@@ -263,14 +263,14 @@ impl Drawn {
     }
 
     /// Removes all other arrows and renumbers those that stay.
-    pub(super) fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
+    pub(crate) fn keep_arrows(&mut self, stays: &ById<ArrowId, bool>) {
         self.arrows.retain(|at| stays[at]);
         self.arrows_shown.retain(|at| stays[at]);
         renumber(&mut self.arrows_shown);
     }
 
     /// Removes all other boxes, to which no arrow may lead, and renumbers those that stay. Returns the new ids.
-    pub(super) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
+    pub(crate) fn keep_items(&mut self, stays: &ById<ItemId, bool>) -> ById<ItemId, ItemId> {
         let mut next = 0;
         let place = |stays: &bool| {
             next += u32::from(*stays);

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::names::is_tf;
-use super::options::Grouping;
 use crate::base::name::namespace;
 use crate::graph::{ById, Elements, TopicId};
+use crate::view::choose::is_tf;
+use crate::view::options::Grouping;
 
 /// The groups by name, and the topics in each, sorted. No topic is in two groups.
 pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;

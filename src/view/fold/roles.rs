@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Item, ItemKind};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::graph::{ById, Elements, Node, NodeId};
+use crate::view::{Item, ItemKind};
 
 /// Per node of the mission, the name of its box: its role, if all nodes of that role existed one after the
 /// other.

@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::collapse::{Collapse, swallows};
-use super::group::Groups;
-use super::replicas::Fleets;
-use super::select::Selection;
-use super::{ItemKind, Mode, ViewOptions, roles};
+use super::equal::Fleets;
+use super::namespaces::{Collapse, swallows};
+use super::roles;
+use super::topics::Groups;
 use crate::graph::{ById, Edge, Elements, NodeId, Topic, TopicId};
+use crate::view::choose::Selection;
+use crate::view::{ItemKind, Mode, ViewOptions};
 
 /// The kind and name of a box.
 pub(crate) type ItemKey = (ItemKind, Arc<str>);
@@ -19,17 +20,17 @@ pub(crate) type NodeKeys = ById<NodeId, Option<ItemKey>>;
 pub(crate) type TopicKeys = ById<TopicId, Option<ItemKey>>;
 
 /// What determines the boxes.
-pub(super) struct Boxes<'a> {
-    pub(super) elements: &'a Elements,
-    pub(super) options: &'a ViewOptions,
-    pub(super) fleets: &'a Fleets,
-    pub(super) selection: &'a Selection,
-    pub(super) groups: &'a Groups,
+pub(crate) struct Boxes<'a> {
+    pub(crate) elements: &'a Elements,
+    pub(crate) options: &'a ViewOptions,
+    pub(crate) fleets: &'a Fleets,
+    pub(crate) selection: &'a Selection,
+    pub(crate) groups: &'a Groups,
 }
 
 impl Boxes<'_> {
     /// The box of each node and of each topic.
-    pub(super) fn keys(&self) -> (NodeKeys, TopicKeys) {
+    pub(crate) fn keys(&self) -> (NodeKeys, TopicKeys) {
         let names = self.names();
         let collapse = self.collapse(&names);
         let nodes = self.nodes(&names, &collapse);

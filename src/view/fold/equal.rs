@@ -1,5 +1,4 @@
-//! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once
-//! for all.
+//! Namespaces and names that only differ in their index, such as the robots of a fleet: they are drawn once for all.
 
 use std::cell::LazyCell;
 use std::cmp::Reverse;
@@ -8,9 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
-use super::ViewOptions;
 use crate::base::name::{is_within, namespace};
 use crate::graph::{Element, Elements};
+use crate::view::ViewOptions;
 
 /// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
