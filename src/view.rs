@@ -58,7 +58,7 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     assembled(viewed, options, frames::Frames::default())
 }
 
-fn assembled(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
+fn assembled(viewed: items::Viewed<'_>, options: &ViewOptions, frames: frames::Frames) -> View {
     let mut list = frames.list;
     let mut drawn = fold::rows::Drawn {
         items: viewed.items,

@@ -24,7 +24,7 @@ const CROWDED: [Kind; 4] = [Kind::Appeared, Kind::Vanished, Kind::Silent, Kind::
 /// A writer of headlines, window by window.
 pub(crate) struct CaptionWriter<'a> {
     elements: &'a Elements,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     log: &'a EventLog,
     /// The parts of each event of the log.
     parts: Parts,
@@ -41,7 +41,7 @@ pub(crate) struct CaptionWriter<'a> {
 type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
 impl<'a> CaptionWriter<'a> {
-    pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed) -> Self {
+    pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed<'a>) -> Self {
         Self {
             elements: &mission.elements,
             viewed,
@@ -314,7 +314,7 @@ impl<'a> CaptionWriter<'a> {
 
     /// The label of its box; its role if it has no box of its own.
     fn node_name(&self, id: NodeId) -> Option<&'a str> {
-        let item = self.viewed.node.get(id).copied().flatten();
+        let item = self.viewed.item_of(Element::Node(id));
         let item = item.and_then(|at| self.viewed.items.get(at));
         match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
             Some(item) => Some(&item.label),

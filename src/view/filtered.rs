@@ -1,8 +1,8 @@
 //! The viewed part of a mission as a separate mission, for data files.
 
+use super::ViewOptions;
 use super::items::Viewed;
 use super::state::shows_node;
-use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::history::{Sender, Sending};
 use crate::graph::{
@@ -45,15 +45,12 @@ struct Keep {
 }
 
 impl Keep {
-    fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed) -> Self {
-        let nodes = numbered(viewed.node.iter().map(Option::is_some));
-        let topics = viewed.topic.with_ids().map(|(id, item)| {
+    fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed<'_>) -> Self {
+        let is_item = |what| viewed.item_of(what).is_some();
+        let nodes = numbered(elements.nodes.ids().map(|id| is_item(Element::Node(id))));
+        let topics = elements.topics.ids().map(|id| {
             let is_carried = !viewed.carriers(Element::Topic(id)).is_empty();
-            match options.mode {
-                Mode::Nodes if options.is_bundled => item.is_some() || is_carried,
-                Mode::Nodes => is_carried,
-                Mode::All => item.is_some(),
-            }
+            is_item(Element::Topic(id)) || options.mode.is_direct() && is_carried
         });
         let topics = numbered(topics);
         let stays =
@@ -134,14 +131,14 @@ impl Keep {
         }
     }
 
-    fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed) -> Graph {
+    fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed<'_>) -> Graph {
         let is_shown = |state: &ElementState| match state.what {
             Element::Node(_) => shows_node(state.state, options),
             Element::Topic(_) | Element::Publish(_) | Element::Subscribe(_) => true,
         };
         let is_there = |what: Element| graph.get(what).is_some_and(is_shown);
         let states = graph.states.iter().filter_map(|state| {
-            let (node, topic) = viewed.ends_of(state.what);
+            let (node, topic) = viewed.elements.ends(state.what);
             let ends = node.map(Element::Node).into_iter();
             let mut ends = ends.chain(topic.map(Element::Topic));
             let stays = is_shown(state) && ends.all(is_there);
@@ -221,7 +218,7 @@ fn kept<I: Id, T: Clone>(all: &ById<I, T>, ids: &NewIds<I>) -> ById<I, T> {
 mod tests {
     use super::*;
     use crate::view::testing::{mission, text};
-    use crate::view::{Hide, NameFilter};
+    use crate::view::{Hide, Mode, NameFilter};
 
     #[test]
     fn hidden_elements_lose_their_edges_and_changes() {

@@ -23,7 +23,7 @@ pub(crate) struct Frames {
 
 /// The windows one after the other. In windows without headlines, only elements whose numbers changed are
 /// updated.
-pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
+pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'_>) -> Frames {
     let mut windows = ShownWindows::new(mission, options, viewed);
     let mut writer = CaptionWriter::new(mission, viewed);
     let mut walk = mission.graphs.walk();
@@ -102,7 +102,7 @@ fn turns(mission: &Mission) -> Vec<bool> {
 /// The picture so far, built window by window.
 struct ShownWindows<'a> {
     mission: &'a Mission,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     lives: ItemTurns<'a>,
     parts: Parts,
     lasting: LastingEvents<'a>,
@@ -162,7 +162,7 @@ impl<I: Id> LooksSoFar<I> {
 }
 
 impl<'a> ShownWindows<'a> {
-    fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+    fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed<'a>) -> Self {
         Self {
             mission,
             viewed,
@@ -260,7 +260,7 @@ impl<'a> ShownWindows<'a> {
 
 /// The presence of each member of each fleet, given the elements that exist before and after the window.
 fn member_lists(
-    viewed: &Viewed,
+    viewed: &Viewed<'_>,
     before: &Alive,
     after: &Alive,
     is_first: bool,

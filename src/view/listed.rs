@@ -1,58 +1,33 @@
 //! The nodes and topics that are listed as words, because a line for each would tell nothing.
+//!
+//! `/rosout`, a node that only publishes it, and a topic without any known node are words. Pictures decide it before their
+//! boxes are made ([`Words`]); pages draw all of a view or a part of it ([`drawn_part`]).
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use super::choose::{Selection, is_infrastructure};
-use super::fold::namespaces;
+use super::fold::namespaces::{clusters, headlines};
 use super::fold::rows::Drawn;
-use super::fold::topics::Groups;
+use super::fold::{self, ItemKey, Keys};
 use super::{AlsoHere, ArrowId, Item, ItemId, ItemKind, Looks, Namespace, View, ViewOptions};
 use crate::base::name::lies_in;
 use crate::base::time::Stamp;
 use crate::graph::window::default_period;
-use crate::graph::{ById, Element, Elements, NodeId, Topic, TopicId};
+use crate::graph::{ById, Element, Elements, NodeId, Topic, TopicId, Wiring};
 use crate::mission::Mission;
 use crate::mission::event_log::{Event, Kind};
-
-/// The name of each topic in a bundle: that of its group, if it is in one.
-pub(crate) fn names(elements: &Elements, groups: &Groups) -> ById<TopicId, Arc<str>> {
-    let names = elements.topics.iter().map(|t| t.name.shared());
-    let mut names: ById<TopicId, Arc<str>> = names.collect();
-    for (name, ids) in groups {
-        let name: Arc<str> = name.as_str().into();
-        for id in ids {
-            names[*id] = Arc::clone(&name);
-        }
-    }
-    names
-}
 
 /// Whether bundles draw each topic: those that half the system is connected to are not drawn, unless one of
 /// their connections changes or there is no other topic.
 pub(crate) fn drawn(mission: &Mission, options: &ViewOptions) -> ById<TopicId, bool> {
-    let elements = &mission.elements;
-    let drawn = plain(elements, options);
-    let mut connected = ById::like(&drawn, 0_u8);
-    let both = [(&elements.publishes, 1), (&elements.subscribes, 2)];
-    for (edges, end) in both {
-        for edge in edges {
-            connected[edge.topic] |= end;
-        }
-    }
-    if !drawn
-        .iter()
-        .zip(&connected)
-        .any(|(drawn, ends)| *drawn && *ends == 3)
-    {
+    let drawn = plain(&mission.elements, options);
+    let wiring = mission.elements.wiring(|_, topic| drawn[topic]);
+    let ends = wiring.publishers.iter().zip(&wiring.subscribers);
+    let mut lines = ends.filter(|(from, to)| !from.is_empty() && !to.is_empty());
+    if lines.next().is_none() {
         return ById::like(&drawn, true);
     }
     with_changing(mission, drawn)
-}
-
-/// Whether pages draw each topic: all but infrastructure without a connection that changes.
-pub(super) fn drawn_in_pages(mission: &Mission, options: &ViewOptions) -> ById<TopicId, bool> {
-    with_changing(mission, plain(&mission.elements, options))
 }
 
 /// Whether each topic is no infrastructure.
@@ -72,84 +47,164 @@ fn with_changing(mission: &Mission, mut drawn: ById<TopicId, bool>) -> ById<Topi
     drawn
 }
 
-/// Whether each node has no line to another, or, if leaves are listed as words, only one whose two ends never
-/// change; no node if fewer than half of the nodes have a line.
-pub(crate) fn nodes_in_words(
-    mission: &Mission,
+/// Whether each node and each topic of a picture is listed as a word; outputs that are files of data or can be expanded
+/// have a box for each.
+pub(crate) struct Words {
+    nodes: ById<NodeId, bool>,
+    topics: ById<TopicId, bool>,
+}
+
+impl Words {
+    /// The words among the elements with a box: nodes without a line, and topics without a known endpoint. In bundles, the
+    /// topics are those with an event although no line carries them; if they have one known endpoint, they get a box beside
+    /// it instead.
+    pub(crate) fn new(
+        mission: &Mission,
+        options: &ViewOptions,
+        (selection, drawn): (&Selection, &ById<TopicId, bool>),
+        keys: &mut Keys,
+    ) -> Self {
+        let elements = &mission.elements;
+        let mut words = Self {
+            nodes: ById::like(&elements.nodes, false),
+            topics: ById::like(&elements.topics, false),
+        };
+        if !options.is_picture {
+            return words;
+        }
+        let wiring = elements.wiring(|node, _| selection.nodes[node].is_none());
+        let changing = changing_nodes(mission, drawn, &wiring);
+        words.nodes = nodes(options, (selection, drawn), &wiring, &changing);
+        let reported: BTreeSet<TopicId> = headlines(mission)
+            .filter_map(|what| elements.ends(what).1)
+            .collect();
+        let is_anything = selection.nodes.iter().any(Option::is_none);
+        for at in elements.topics.ids() {
+            let boxes = |nodes: &[NodeId]| -> BTreeSet<ItemKey> {
+                let keys = nodes.iter().map(|id| fold::of(keys, Element::Node(*id)));
+                keys.flatten().cloned().collect()
+            };
+            let ends = [&wiring.publishers[at], &wiring.subscribers[at]].map(|nodes| boxes(nodes));
+            let all: BTreeSet<&ItemKey> = ends.iter().flatten().collect();
+            if !options.is_bundled {
+                words.topics[at] = is_anything && all.is_empty();
+                continue;
+            }
+            let is_seen = selection.topics[at].is_none() && reported.contains(&at);
+            let is_carried = drawn[at] && all.len() > 1 && !ends.iter().any(BTreeSet::is_empty);
+            let is_inside = fold::of(keys, Element::Topic(at)).is_some();
+            if is_inside || !is_seen || is_carried {
+                continue;
+            }
+            words.topics[at] = all.len() != 1;
+            if let Some(owner) = all.first().filter(|_| all.len() == 1) {
+                for (node, word) in words.nodes.ids().zip(words.nodes.iter_mut()) {
+                    *word &= fold::of(keys, Element::Node(node)) != Some(*owner);
+                }
+            }
+            if let Some(key) = keys.of_mut(Element::Topic(at)) {
+                let name = elements.topics[at].name.shared();
+                let kind = ItemKind::Topic;
+                *key = Some(ItemKey { kind, name });
+            }
+        }
+        words
+    }
+
+    /// Whether an element is one of them.
+    pub(crate) fn has(&self, what: Element) -> bool {
+        match what {
+            Element::Node(id) => self.nodes[id],
+            Element::Topic(id) => self.topics[id],
+            Element::Publish(_) | Element::Subscribe(_) => false,
+        }
+    }
+}
+
+/// Whether each node is a word: without a connection and an event; in bundles without a line to another node, or, if leaves
+/// are words, with only one whose two ends never change. No node if fewer than half of the nodes have a line.
+fn nodes(
+    options: &ViewOptions,
     (selection, drawn): (&Selection, &ById<TopicId, bool>),
-    are_leaves_in_words: bool,
+    wiring: &Wiring,
+    changing: &ById<NodeId, NodeChanges>,
 ) -> ById<NodeId, bool> {
-    let elements = &mission.elements;
-    let wiring = elements.wiring(|node, _| selection.nodes[node].is_none());
-    let ends: ById<TopicId, [Vec<NodeId>; 2]> = wiring
-        .publishers
-        .into_iter()
-        .zip(wiring.subscribers)
-        .map(<[_; 2]>::from)
-        .collect();
-    let (changes, changes_itself) = changing_nodes(mission, drawn, &ends);
-    let is_drawn = drawn.iter().zip(&selection.topics);
-    let is_drawn = is_drawn.map(|(drawn, reason)| *drawn && reason.is_none());
-    // The only partner of each node; itself where there are several.
-    let mut partner: ById<NodeId, Option<NodeId>> = ById::like(&elements.nodes, None);
-    for (ends, _) in ends.iter().zip(is_drawn).filter(|(_, drawn)| *drawn) {
-        for (these, others) in [(&ends[0], &ends[1]), (&ends[1], &ends[0])] {
+    let is_seen = |topic: &TopicId| selection.topics[*topic].is_none();
+    let partners = if options.is_bundled {
+        partners(wiring, |topic| drawn[topic] && is_seen(&topic))
+    } else {
+        let is_connected = |id: NodeId| {
+            let mut topics = wiring.published[id].iter().chain(&wiring.subscribed[id]);
+            topics.any(is_seen).then_some(id)
+        };
+        changing.ids().map(is_connected).collect()
+    };
+    let seen = selection.nodes.iter().filter(|reason| reason.is_none());
+    if 2 * partners.iter().flatten().count() < seen.count() {
+        return ById::like(&partners, false);
+    }
+    let is_hub = |node: NodeId| partners[node] == Some(node);
+    let is_word = |(node, partner): (NodeId, &Option<NodeId>)| match *partner {
+        None => options.is_bundled || !changing[node].itself,
+        Some(other) if other != node && options.are_leaves_in_words => {
+            is_hub(other) && !changing[node].any && !changing[other].itself
+        }
+        Some(_) => false,
+    };
+    partners.with_ids().map(is_word).collect()
+}
+
+/// The only node that each node has a line to, over the topics that are drawn; itself where there are several.
+fn partners(wiring: &Wiring, is_drawn: impl Fn(TopicId) -> bool) -> ById<NodeId, Option<NodeId>> {
+    let mut partners: ById<NodeId, Option<NodeId>> = ById::like(&wiring.published, None);
+    for topic in wiring.publishers.ids().filter(|topic| is_drawn(*topic)) {
+        let ends = [&wiring.publishers[topic], &wiring.subscribers[topic]];
+        for (these, others) in [(ends[0], ends[1]), (ends[1], ends[0])] {
             for node in these {
                 // Two are enough to know that there are several.
                 for other in others.iter().filter(|other| *other != node).take(2) {
-                    let partner = &mut partner[*node];
-                    *partner = Some(if partner.is_none_or(|old| old == *other) {
-                        *other
-                    } else {
-                        *node
-                    });
+                    let partner = &mut partners[*node];
+                    let is_only = partner.is_none_or(|old| old == *other);
+                    *partner = Some(if is_only { *other } else { *node });
                 }
             }
         }
     }
-    let seen = selection
-        .nodes
-        .iter()
-        .filter(|reason| reason.is_none())
-        .count();
-    if 2 * partner.iter().flatten().count() < seen {
-        return ById::like(&partner, false);
-    }
-    let is_hub = |node: NodeId| partner[node] == Some(node);
-    let is_in_words = |(node, changes): (NodeId, &bool)| match partner[node] {
-        None => true,
-        Some(other) if other != node && are_leaves_in_words => {
-            is_hub(other) && !changes && !changes_itself[other]
-        }
-        Some(_) => false,
-    };
-    changes.with_ids().map(is_in_words).collect()
+    partners
 }
 
-/// For each node, whether there is an event about it, its connections or a topic of its own, and whether
-/// there is one about it or its connections. A start in the first window is not a change, as the node exists
-/// in most of the picture.
+/// Whether there is an event about a node or its connections, and whether there is one about these or a topic of its own.
+#[derive(Clone, Copy, Default)]
+struct NodeChanges {
+    itself: bool,
+    any: bool,
+}
+
+/// The changes of each node. A start in the first window is not a change, as the node exists in most of the picture.
 fn changing_nodes(
     mission: &Mission,
     drawn: &ById<TopicId, bool>,
-    ends: &ById<TopicId, [Vec<NodeId>; 2]>,
-) -> (ById<NodeId, bool>, ById<NodeId, bool>) {
-    let mut changes = ById::like(&mission.elements.nodes, false);
-    let mut changes_itself = changes.clone();
+    wiring: &Wiring,
+) -> ById<NodeId, NodeChanges> {
+    let mut changes = ById::like(&mission.elements.nodes, NodeChanges::default());
     for event in changed(mission) {
-        let nodes = match mission.elements.ends(event.what) {
+        match mission.elements.ends(event.what) {
             (Some(node), _) => {
-                changes_itself[node] = true;
-                vec![node]
+                let (itself, any) = (true, true);
+                changes[node] = NodeChanges { itself, any };
             }
-            (None, Some(topic)) if drawn[topic] => ends[topic].concat(),
-            (None, _) => Vec::new(),
-        };
-        for node in nodes {
-            changes[node] = true;
+            (None, Some(topic)) if drawn[topic] => {
+                for node in wiring.publishers[topic]
+                    .iter()
+                    .chain(&wiring.subscribers[topic])
+                {
+                    changes[*node].any = true;
+                }
+            }
+            (None, _) => {}
         }
     }
-    (changes, changes_itself)
+    changes
 }
 
 /// If the mission is one window: the time until which elements that begin appear to have been there from the
@@ -171,9 +226,9 @@ pub(crate) fn changed(mission: &Mission) -> impl Iterator<Item = &Event> {
 }
 
 /// These nodes with their looks, by the innermost namespace with a box.
-pub(super) fn also_here(
-    items: Vec<Item>,
-    shown: Vec<Looks>,
+pub(crate) fn also_here(
+    items: impl IntoIterator<Item = Item>,
+    shown: impl IntoIterator<Item = Looks>,
     namespaces: &[Namespace],
 ) -> Vec<AlsoHere> {
     let mut also: BTreeMap<Option<usize>, AlsoHere> = BTreeMap::new();
@@ -207,7 +262,8 @@ pub(crate) fn drawn_part(
     mission: &Mission,
     options: &ViewOptions,
 ) -> Option<DrawnPart> {
-    let topics = drawn_in_pages(mission, options);
+    // Infrastructure with a connection that changes is drawn.
+    let topics = with_changing(mission, plain(&mission.elements, options));
     let is_hidden = |what: &Element| match what {
         Element::Topic(id) => !topics[*id],
         _ => false,
@@ -240,13 +296,12 @@ pub(crate) fn drawn_part(
         items_shown: view.items_shown.clone(),
         arrows_shown: view.arrows_shown.clone(),
     };
-    let is_word: Vec<bool> = items.iter().map(|drawn| !drawn).collect();
-    let words = filtered(&view.items, &is_word);
-    let shown = filtered(&view.items_shown, &is_word);
+    let (mut words, mut shown) = (view.items.clone(), view.items_shown.clone());
+    words.retain(|at| !items[at]);
+    shown.retain(|at| !items[at]);
     part.keep_arrows(&arrows);
     part.keep_items(&items);
-    let namespaces =
-        namespaces::clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
+    let namespaces = clusters(&mut part.items, options.group.namespaces, &BTreeSet::new());
     Some(DrawnPart {
         view: View {
             also: also_here(words, shown, &namespaces),
@@ -261,11 +316,6 @@ pub(crate) fn drawn_part(
         items,
         arrows,
     })
-}
-
-fn filtered<T: Clone>(all: &[T], kept: &[bool]) -> Vec<T> {
-    let kept = all.iter().zip(kept).filter(|(_, kept)| **kept);
-    kept.map(|(one, _)| one.clone()).collect()
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::items::{EdgePlace, Viewed};
+use super::items::{Place, Viewed};
 use super::state::{LivingItems, Now};
 use super::{ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{ById, Element, Id};
+use crate::graph::{ById, Element};
 use crate::mission::EventLog;
 use crate::mission::event_log::{Detail, Event, EventId, Kind, Parts};
 
@@ -41,7 +41,7 @@ impl WindowMarks {
         log: &EventLog,
         (parts, beginning): (&Parts, Option<Stamp>),
         (span, lasting): (Span, Vec<Lasting>),
-        viewed: &Viewed,
+        viewed: &Viewed<'_>,
     ) -> Self {
         let mut changed = Self::default();
         for last in &lasting {
@@ -74,22 +74,20 @@ impl WindowMarks {
         changed
     }
 
-    fn report(&mut self, viewed: &Viewed, event: &Event, headline: EventId, part: Part) {
+    fn report(&mut self, viewed: &Viewed<'_>, event: &Event, headline: EventId, part: Part) {
         let sign = EventSign::of(event, headline, part);
         self.add(viewed, event.what, &sign);
         match (&event.detail, event.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
                 for node in from.iter().chain(to) {
-                    if let Ok(edge) = viewed.published.binary_search(&(*node, topic)) {
-                        let edge = Element::Publish(Id::of(edge));
+                    if let Some(edge) = viewed.elements.published((*node, topic)) {
                         self.add_carriers(viewed, edge, &sign);
                     }
                 }
             }
-            (Detail::Rates { .. }, Element::Publish(edge)) => {
+            (Detail::Rates { .. }, Element::Publish(_)) => {
                 self.add_carriers(viewed, event.what, &sign);
-                let topic = viewed.published.get(edge);
-                let topic = topic.map(|(_, topic)| Element::Topic(*topic));
+                let topic = viewed.elements.ends(event.what).1.map(Element::Topic);
                 if let Some(topic) = topic.filter(|t| viewed.has_single_sender(*t)) {
                     self.add(viewed, topic, &sign);
                 }
@@ -103,29 +101,22 @@ impl WindowMarks {
         }
     }
 
-    fn add(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
-        let item = |item: Option<&Option<ItemId>>| item.copied().flatten().map(EdgePlace::Item);
-        let place = match what {
-            Element::Node(id) => item(viewed.node.get(id)),
-            Element::Topic(id) => item(viewed.topic.get(id)),
-            Element::Publish(id) => viewed.publish.get(id).copied(),
-            Element::Subscribe(id) => viewed.subscribe.get(id).copied(),
-        };
+    fn add(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
         if !viewed.pairs.is_empty() && what.is_edge() {
             self.add_carriers(viewed, what, sign);
         }
-        match place {
-            Some(EdgePlace::Item(id)) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
-            Some(EdgePlace::Inside(id)) => sign.keep(&mut self.items, id, Reach::Inside),
-            Some(EdgePlace::Arrow(id)) => {
+        match viewed.place(what) {
+            Place::Item(id) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
+            Place::Inside(id) => sign.keep(&mut self.items, id, Reach::Inside),
+            Place::Arrow(id) => {
                 sign.keep(&mut self.arrows, id, Reach::of_arrow(viewed, id));
             }
-            Some(EdgePlace::Hidden) | None => {}
+            Place::Hidden => {}
         }
     }
 
     /// Marks the arrows that carry a topic or publication.
-    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &EventSign) {
+    fn add_carriers(&mut self, viewed: &Viewed<'_>, what: Element, sign: &EventSign) {
         for id in viewed.carriers(what) {
             sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
@@ -144,7 +135,7 @@ enum Reach {
 }
 
 impl Reach {
-    fn of_item(viewed: &Viewed, id: ItemId) -> Self {
+    fn of_item(viewed: &Viewed<'_>, id: ItemId) -> Self {
         match viewed.items.get(id) {
             Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
             Some(item) if item.is_replica => Self::Part,
@@ -155,7 +146,7 @@ impl Reach {
         }
     }
 
-    fn of_arrow(viewed: &Viewed, id: ArrowId) -> Self {
+    fn of_arrow(viewed: &Viewed<'_>, id: ArrowId) -> Self {
         let members = viewed.arrows.get(id).map_or(0, |a| a.members.len());
         let is_role = |id: ItemId| {
             let item = viewed.items.get(id);
@@ -256,7 +247,7 @@ pub(super) struct Marked {
 }
 
 impl WindowTurn {
-    pub(super) fn items(&self, viewed: &Viewed, now: &Now<'_>) -> ById<ItemId, Marked> {
+    pub(super) fn items(&self, viewed: &Viewed<'_>, now: &Now<'_>) -> ById<ItemId, Marked> {
         let item = |(id, item): (ItemId, &super::Item)| {
             let shown = now.item(id);
             let there = (self.before.items[id], self.after.items[id]);
@@ -276,7 +267,7 @@ impl WindowTurn {
     /// An arrow appears and vanishes with its ends, unless it has events of its own.
     pub(super) fn arrow(
         &self,
-        viewed: &Viewed,
+        viewed: &Viewed<'_>,
         now: &Now<'_>,
         items: &ById<ItemId, Marked>,
         id: ArrowId,
@@ -306,7 +297,7 @@ impl WindowTurn {
     /// A changed bundle with the changes of its topics, unless it appeared or vanished as a whole.
     fn with_topics(
         &self,
-        viewed: &Viewed,
+        viewed: &Viewed<'_>,
         now: &Now<'_>,
         arrow: &super::Arrow,
         mut shown: Shown,
@@ -326,7 +317,7 @@ impl WindowTurn {
                 _ => {
                     let name = &arrow.topics[row.topic as usize];
                     for event in shown.events.iter().filter_map(|id| now.event(*id)) {
-                        let topic = viewed.topic_of(event.what);
+                        let topic = viewed.elements.ends(event.what).1;
                         if topic.is_some_and(|topic| viewed.bundled[topic] == *name) {
                             (row.mark, row.rates) = changed(event);
                         }
@@ -474,7 +465,7 @@ pub(crate) struct LastingEvents<'a> {
 }
 
 impl<'a> LastingEvents<'a> {
-    pub(crate) fn new(log: &'a EventLog, viewed: &Viewed) -> Self {
+    pub(crate) fn new(log: &'a EventLog, viewed: &Viewed<'_>) -> Self {
         let lasts = |event: &Event| {
             event.until.is_some_and(|until| until > event.time)
                 && event.is_headline()

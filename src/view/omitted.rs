@@ -18,7 +18,7 @@ const EXAMPLES: usize = 3;
 
 /// One notice per reason for hiding, with the number of elements hidden. Grouped and collapsed elements are seen as
 /// part of their box.
-pub(crate) fn notes(elements: &Elements, viewed: &Viewed, options: &ViewOptions) -> Notices {
+pub(crate) fn notes(elements: &Elements, viewed: &Viewed<'_>, options: &ViewOptions) -> Notices {
     let nodes = elements.nodes.iter().map(|n| n.name.as_str());
     let topics = elements.topics.iter().map(|t| t.name.as_str());
     let reasons = viewed

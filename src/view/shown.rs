@@ -1,6 +1,6 @@
 //! The look of an item or arrow: its state, change and numbers in one window, and those of all windows in little memory.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{ArrowId, Counts, ItemId};
@@ -292,6 +292,19 @@ impl Looks {
     pub(super) fn spans(&self, windows: u32) -> impl Iterator<Item = (u32, u32, u32, &Shown)> {
         let look = |(from, to, place)| Some((from, to, place, self.distinct.get(place as usize)?));
         self.runs.spans(windows).filter_map(look)
+    }
+
+    /// The looks made by `look` in the windows in which one of `all` changes.
+    pub(crate) fn made_of<'a>(
+        all: impl Iterator<Item = &'a Self>,
+        look: impl Fn(usize) -> Option<Shown>,
+    ) -> Self {
+        let windows: BTreeSet<u32> = all.flat_map(Self::runs).map(|run| run.0).collect();
+        let mut writer = LooksWriter::default();
+        for window in windows {
+            writer.show(window, look(window as usize));
+        }
+        writer.finish()
     }
 
     /// The looks in the windows of a sequence, one event per window.

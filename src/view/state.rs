@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::items::{EdgePlace, Viewed};
+use super::items::Viewed;
 use super::{
     Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions, sum,
 };
@@ -75,7 +75,7 @@ pub(crate) struct LivingItems {
 }
 
 impl LivingItems {
-    pub(crate) fn of(viewed: &Viewed, alive: &Alive) -> Self {
+    pub(crate) fn of(viewed: &Viewed<'_>, alive: &Alive) -> Self {
         let lives = |element: &Element| alive.is(*element);
         let items = viewed
             .items
@@ -122,7 +122,7 @@ pub(crate) fn shows_node(state: State, options: &ViewOptions) -> bool {
 pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
-    viewed: &'a Viewed,
+    viewed: &'a Viewed<'a>,
     /// The current window, or an earlier one of the same length.
     span: Span,
     /// The elements that exist in it, and those that pause.
@@ -139,10 +139,14 @@ pub(crate) struct Now<'a> {
 
 impl<'a> Now<'a> {
     /// The state before the first window, in which nothing is known.
-    pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+    pub(crate) fn new(
+        mission: &'a Mission,
+        options: &'a ViewOptions,
+        viewed: &'a Viewed<'a>,
+    ) -> Self {
         let mut senders = ById::like(&mission.elements.topics, Vec::new());
-        for (id, (_, topic)) in viewed.published.with_ids() {
-            senders[*topic].push(id);
+        for (id, edge) in mission.elements.publishes.with_ids() {
+            senders[edge.topic].push(id);
         }
         Self {
             mission,
@@ -211,10 +215,9 @@ impl<'a> Now<'a> {
         let Element::Publish(id) = what else {
             return None;
         };
-        let (_, topic) = self.viewed.published.get(id)?;
-        let sole = self.sole.get(*topic)?;
-        sole.filter(|sole| *sole == id)?;
-        self.rows.of(Element::Topic(*topic))?.as_ref()
+        let topic = self.mission.elements.ends(what).1?;
+        self.sole.get(topic)?.filter(|sole| *sole == id)?;
+        self.rows.of(Element::Topic(topic))?.as_ref()
     }
 
     /// The topic of an element, if its first message comes after the window. A latched one needs no message.
@@ -318,8 +321,8 @@ impl<'a> Now<'a> {
             let one = match member {
                 Element::Publish(edge) => self.one(Element::Publish(*edge)),
                 Element::Subscribe(edge) => {
-                    let ends = self.viewed.subscribed.get(*edge);
-                    let topic = ends.and_then(|(_, topic)| self.one(Element::Topic(*topic)));
+                    let topic = self.mission.elements.ends(*member).1;
+                    let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
                     self.one(Element::Subscribe(*edge))
                         .filter(|_| topic.is_some())
                 }
@@ -357,7 +360,7 @@ impl<'a> Now<'a> {
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
-            let topic = self.viewed.subscribed.get(*subscribe).map(|s| s.1);
+            let topic = self.mission.elements.ends(Element::Subscribe(*subscribe)).1;
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
@@ -416,21 +419,7 @@ impl<'a> Now<'a> {
 
     /// The item that shows an element, and the arrows.
     pub(crate) fn shown_by(&self, what: Element) -> (Option<ItemId>, &[ArrowId]) {
-        let is_direct = self.options.mode.is_direct();
-        let edge = |place: Option<&'a EdgePlace>| match place {
-            _ if is_direct => self.viewed.carriers(what),
-            Some(EdgePlace::Arrow(id)) => std::slice::from_ref(id),
-            _ => &[],
-        };
-        match what {
-            Element::Node(id) => (self.viewed.node.get(id).copied().flatten(), &[]),
-            Element::Topic(id) => {
-                let item = self.viewed.topic.get(id).copied().flatten();
-                (item, self.viewed.carriers(what))
-            }
-            Element::Publish(id) => (None, edge(self.viewed.publish.get(id))),
-            Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id))),
-        }
+        (self.viewed.item_of(what), self.viewed.carriers(what))
     }
 }
 
@@ -453,7 +442,7 @@ fn has_nodes(item: &Item) -> bool {
     matches!(item.members.first(), Some(Element::Node(_)))
 }
 
-fn is_single(viewed: &Viewed, item: ItemId) -> bool {
+fn is_single(viewed: &Viewed<'_>, item: ItemId) -> bool {
     let item = viewed.items.get(item);
     item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
 }

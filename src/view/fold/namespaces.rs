@@ -85,6 +85,19 @@ pub(crate) fn swallows<'a>(
     (*first).filter(|_| same && (both || own == *first))
 }
 
+/// The collapsed namespace that contains a topic whose lines run from node to node: that of all its `publishers`; without
+/// any, its `own`. Changes of topics that several boxes publish are only shown on the arrows, so these topics are in none.
+pub(crate) fn sent_from<'a>(
+    own: Option<&'a str>,
+    publishers: &[Option<&'a str>],
+) -> Option<&'a str> {
+    let mut publishers = publishers.iter();
+    let Some(first) = publishers.next() else {
+        return own;
+    };
+    first.filter(|_| publishers.all(|other| other == first))
+}
+
 /// A namespace that could be collapsed to one box.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Collapsible {

@@ -1,96 +1,77 @@
 //! Topics that are drawn as one box: actions, service events, image transports, the transform tree.
+//!
+//! `/go/goal`, `/go/cancel`, `/go/status`, `/go/feedback` and `/go/result` are the box `/go/action_topics`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use super::{Fold, ItemKey, Keys, names};
 use crate::base::name::namespace;
-use crate::graph::{ById, Elements, TopicId};
+use crate::graph::{ById, Element, Elements, TopicId};
 use crate::view::choose::is_tf;
-use crate::view::options::Grouping;
+use crate::view::{Grouping, ItemKind};
 
 /// The groups by name, and the topics in each, sorted. No topic is in two groups.
 pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;
 
+/// The topics that are still free, by name.
+type Free<'a> = BTreeMap<&'a str, TopicId>;
+
 /// Groups the topics that are still `seen`. ROS 1 actions, images and the transform tree follow `rqt_graph`'s
-/// rules; ROS 2 actions and service events, which it does not know, are grouped if at least two of their
-/// topics are present.
+/// rules: all five topics of an action, three of the four of an image. ROS 2 actions and service events, which it does not
+/// know, are grouped if at least two of their topics are present.
 pub(crate) fn groups(elements: &Elements, seen: &ById<TopicId, bool>, wish: Grouping) -> Groups {
     let topics = elements.topics.with_ids().filter(|(id, _)| seen[*id]);
-    let topics = topics.map(|(id, topic)| (topic.name.as_str(), id));
-    let mut free: BTreeMap<&str, TopicId> = topics.collect();
+    let mut free: Free<'_> = topics
+        .map(|(id, topic)| (topic.name.as_str(), id))
+        .collect();
     let mut groups = Groups::new();
     if wish.actions {
-        by_suffix(&mut free, &mut groups, &ACTION);
-        by_key(&mut free, &mut groups, action_of_ros2);
-        by_key(&mut free, &mut groups, service_events);
+        take(&mut free, &mut groups, 5, |_, name| action(name));
+        take(&mut free, &mut groups, 2, |_, name| action_of_ros2(name));
+        take(&mut free, &mut groups, 2, |_, name| service_events(name));
     }
     if wish.images {
-        by_suffix(&mut free, &mut groups, &IMAGE);
+        take(&mut free, &mut groups, 3, image);
     }
     if wish.tf {
-        let found: BTreeSet<&str> = free.keys().copied().filter(|name| is_tf(name)).collect();
-        if !found.is_empty() {
-            take(&mut free, &mut groups, "/tf".to_owned(), &found);
-        }
+        let tf = |_: &Free<'_>, name: &str| is_tf(name).then(|| "/tf".to_owned());
+        take(&mut free, &mut groups, 1, tf);
     }
     groups
 }
 
-/// A family of topics with a common prefix.
-struct Family {
-    /// The suffix of the topic whose presence starts the search for the others.
-    sign: &'static str,
-    suffixes: &'static [&'static str],
-    at_least: usize,
-    name: &'static str,
-}
-
-const ACTION: Family = Family {
-    sign: "/feedback",
-    suffixes: &["/status", "/result", "/goal", "/cancel", "/feedback"],
-    at_least: 5,
-    name: "/action_topics",
-};
-
-const IMAGE: Family = Family {
-    sign: "/compressed",
-    suffixes: &["/compressed", "/compressedDepth", "/theora", ""],
-    at_least: 3,
-    name: "/image_topics",
-};
-
-fn by_suffix<'a>(free: &mut BTreeMap<&'a str, TopicId>, groups: &mut Groups, family: &Family) {
-    let names: Vec<&'a str> = free.keys().copied().collect();
-    for prefix in names.iter().filter_map(|n| n.strip_suffix(family.sign)) {
-        let names = family.suffixes.iter().map(|s| format!("{prefix}{s}"));
-        let found: BTreeSet<&'a str> = names
-            .filter_map(|name| free.get_key_value(name.as_str()).map(|(key, _)| *key))
-            .collect();
-        if found.len() >= family.at_least {
-            take(free, groups, format!("{prefix}{}", family.name), &found);
-        }
-    }
-}
-
-fn by_key<'a>(
-    free: &mut BTreeMap<&'a str, TopicId>,
+/// Moves the topics with the same group into it if they are at least so many.
+fn take<'a>(
+    free: &mut Free<'a>,
     groups: &mut Groups,
-    key: impl Fn(&'a str) -> Option<String>,
+    at_least: usize,
+    group: impl Fn(&Free<'a>, &'a str) -> Option<String>,
 ) {
-    let mut found: BTreeMap<String, BTreeSet<&'a str>> = BTreeMap::new();
+    let mut found: BTreeMap<String, Vec<&'a str>> = BTreeMap::new();
     for name in free.keys().copied() {
-        if let Some(key) = key(name) {
-            found.entry(key).or_default().insert(name);
+        if let Some(group) = group(free, name) {
+            found.entry(group).or_default().push(name);
         }
     }
-    for (key, names) in found.into_iter().filter(|(_, names)| names.len() >= 2) {
-        take(free, groups, key, &names);
+    for (group, names) in found.into_iter().filter(|f| f.1.len() >= at_least) {
+        let members = groups.entry(group).or_default();
+        members.extend(names.iter().filter_map(|name| free.remove(name)));
+        members.sort_unstable();
     }
+}
+
+/// The group of an action's topic.
+fn action(topic: &str) -> Option<String> {
+    const SUFFIXES: [&str; 5] = ["/status", "/result", "/goal", "/cancel", "/feedback"];
+    let action = SUFFIXES.iter().find_map(|end| topic.strip_suffix(end))?;
+    Some(format!("{action}/action_topics"))
 }
 
 /// The group of `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
 fn action_of_ros2(topic: &str) -> Option<String> {
     let (action, _) = topic.split_once("/_action/")?;
-    Some(format!("{action}{}", ACTION.name))
+    Some(format!("{action}/action_topics"))
 }
 
 /// The group of the event topics of the services of one namespace, which is usually a node's name.
@@ -100,16 +81,54 @@ fn service_events(topic: &str) -> Option<String> {
     Some(format!("{space}/service_events"))
 }
 
-/// Moves these topics into the group, which is extended if it exists.
-fn take<'a>(
-    free: &mut BTreeMap<&'a str, TopicId>,
-    groups: &mut Groups,
-    group: String,
-    names: &BTreeSet<&'a str>,
-) {
-    let members = groups.entry(group).or_default();
-    members.extend(names.iter().filter_map(|name| free.remove(name)));
-    members.sort_unstable();
+/// The group of an image or of one of its transports; only if there is a compressed one.
+fn image(free: &Free<'_>, topic: &str) -> Option<String> {
+    const SUFFIXES: [&str; 4] = ["/compressed", "/compressedDepth", "/theora", ""];
+    let images = SUFFIXES.iter().filter_map(|end| topic.strip_suffix(end));
+    let mut images = images.map(|image| (image, format!("{image}/compressed")));
+    let (image, _) = images.find(|(_, compressed)| free.contains_key(compressed.as_str()))?;
+    Some(format!("{image}/image_topics"))
+}
+
+/// The topics of each group, whose name is made different from those of all other boxes of topics.
+pub(crate) fn folds(groups: &Groups, keys: &Keys) -> Vec<Fold> {
+    let grouped: BTreeSet<Element> = groups
+        .values()
+        .flatten()
+        .map(|id| Element::Topic(*id))
+        .collect();
+    let others = keys
+        .iter()
+        .filter(|(what, _)| what.is_topic() && !grouped.contains(what));
+    let mut taken = names(others.filter_map(|(_, key)| key.as_ref()));
+    let mut folds = Vec::new();
+    for (name, ids) in groups {
+        let mut name = name.clone();
+        while taken.contains(name.as_str()) {
+            name.push_str("_2");
+        }
+        let (kind, name): (_, Arc<str>) = (ItemKind::Group, name.into());
+        taken.insert(Arc::clone(&name));
+        let key = ItemKey { kind, name };
+        folds.extend(ids.iter().map(|id| Fold {
+            what: Element::Topic(*id),
+            key: key.clone(),
+        }));
+    }
+    folds
+}
+
+/// The name of each topic on a line: that of its group, if it is in one.
+pub(crate) fn on_lines(elements: &Elements, groups: &Groups) -> ById<TopicId, Arc<str>> {
+    let names = elements.topics.iter().map(|t| t.name.shared());
+    let mut names: ById<TopicId, Arc<str>> = names.collect();
+    for (name, ids) in groups {
+        let name: Arc<str> = name.as_str().into();
+        for id in ids {
+            names[*id] = Arc::clone(&name);
+        }
+    }
+    names
 }
 
 #[cfg(test)]
