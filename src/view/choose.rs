@@ -3,7 +3,7 @@
 use crate::base::name::is_quiet;
 
 use super::options::ViewOptions;
-use crate::graph::{ById, Elements, NodeId, Topic, TopicId};
+use crate::graph::{ById, Elements, Node, NodeId, TopicId};
 
 /// The reason for leaving a node or topic out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,126 +29,72 @@ pub(crate) struct Selection {
     pub(crate) topics: ById<TopicId, Option<Reason>>,
 }
 
-/// The number of connections of a topic.
-#[derive(Clone, Copy, Default)]
-struct TopicDegrees {
-    publishers: usize,
-    subscribers: usize,
-    /// The number of both that pass the filter of namespaces.
-    kept: usize,
-    /// Whether a hidden recorder or player is another end of it.
-    is_recorded: bool,
-}
-
-/// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without
-/// remaining nodes.
+/// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters. Hidden recorders and players are no
+/// connections of a topic.
 pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
-    let hide_recorder = options.hide.quiet;
-    let recorders: ById<NodeId, bool> = elements
-        .nodes
-        .iter()
-        .map(|n| hide_recorder && n.records())
-        .collect();
-    let nodes: ById<NodeId, Option<Reason>> = elements
-        .nodes
-        .iter()
-        .map(|n| (!options.ns_filter.passes(n.name.as_str())).then_some(Reason::NsFilter))
-        .collect();
-    let ends = ends(elements, &nodes, &recorders);
-    let topics = elements.topics.iter().zip(&ends);
-    let topics = topics.map(|(t, ends)| {
-        let reason = topic_reason(t.name.as_str(), *ends, elements, options);
-        let is_hidden = options.hide.services && t.is_service();
-        let reason = reason.or(is_hidden.then_some(Reason::Services));
-        reason.or_else(|| is_only_recorded(t, *ends).then_some(Reason::Recorder))
-    });
-    let topics = topics.collect();
-    let mut selection = Selection { nodes, topics };
-    for (reason, is_recorder) in selection.nodes.iter_mut().zip(recorders) {
-        if is_recorder {
-            reason.get_or_insert(Reason::Recorder);
-        }
-    }
-    selection
-}
-
-fn ends(
-    elements: &Elements,
-    nodes: &ById<NodeId, Option<Reason>>,
-    recorders: &ById<NodeId, bool>,
-) -> ById<TopicId, TopicDegrees> {
-    let mut all = ById::like(&elements.topics, TopicDegrees::default());
-    let publishes = elements.publishes.iter().map(|e| (e, true));
-    let subscribes = elements.subscribes.iter().map(|e| (e, false));
-    for (edge, publishes) in publishes.chain(subscribes) {
-        let ends = &mut all[edge.topic];
-        if recorders[edge.node] {
-            ends.is_recorded = true;
-            continue;
-        }
-        ends.publishers += usize::from(publishes);
-        ends.subscribers += usize::from(!publishes);
-        ends.kept += usize::from(nodes[edge.node].is_none());
-    }
-    all
-}
-
-/// Whether only a hidden recorder subscribes to a topic, which has no other endpoint and no message.
-fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
-    let connected = topic.seen.evidence.has("connection");
-    ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
-}
-
-fn topic_reason(
-    name: &str,
-    ends: TopicDegrees,
-    elements: &Elements,
-    options: &ViewOptions,
-) -> Option<Reason> {
     let hide = options.hide;
-    let all = ends.publishers + ends.subscribers;
+    let is_tool = |node: &Node| hide.quiet && node.records();
+    let tools: ById<NodeId, bool> = elements.nodes.iter().map(is_tool).collect();
+    let nodes = elements.nodes.iter().zip(&tools).map(|(node, is_tool)| {
+        let is_outside = !options.ns_filter.passes(node.name.as_str());
+        let outside = is_outside.then_some(Reason::NsFilter);
+        outside.or(is_tool.then_some(Reason::Recorder))
+    });
     let exists =
         |other: &str| elements.topic(other).is_some() && options.topic_filter.passes(other);
-    if !options.topic_filter.passes(name) {
-        Some(Reason::TopicFilter)
-    } else if hide.dead && ends.subscribers == 0 {
-        Some(Reason::Dead)
-    } else if hide.leaf && all < 2 {
-        Some(Reason::Leaf)
-    } else if hide.tf && is_tf(name) {
-        Some(Reason::Tf)
-    } else if hide.params && is_params(name, exists) {
-        Some(Reason::Params)
-    } else if hide.quiet && is_quiet(name) {
-        Some(Reason::Quiet)
-    } else {
-        None
+    let wiring = elements.wiring(|_, _| true);
+    let others = |nodes: &[NodeId]| nodes.iter().filter(|id| !tools[**id]).count();
+    let topics = elements.topics.with_ids().map(|(id, topic)| {
+        let name = topic.name.as_str();
+        let (from, to) = (&wiring.publishers[id], &wiring.subscribers[id]);
+        let (publishers, subscribers) = (others(from), others(to));
+        let connected = publishers + subscribers;
+        let is_recorded = connected == 0 && !(from.is_empty() && to.is_empty());
+        let reasons = [
+            (Reason::TopicFilter, !options.topic_filter.passes(name)),
+            (Reason::Dead, hide.dead && subscribers == 0),
+            (Reason::Leaf, hide.leaf && connected < 2),
+            (Reason::Tf, hide.tf && is_tf(name)),
+            (Reason::Params, hide.params && is_params(name, exists)),
+            (Reason::Quiet, hide.quiet && is_quiet(name)),
+            (Reason::Services, hide.services && topic.is_service()),
+            // Only they subscribe to it, and it has no message.
+            (
+                Reason::Recorder,
+                is_recorded && !topic.seen.evidence.has("connection"),
+            ),
+        ];
+        let reason = reasons.into_iter().find(|(_, is_one)| *is_one);
+        reason.map(|(reason, _)| reason)
+    });
+    Selection {
+        nodes: nodes.collect(),
+        topics: topics.collect(),
     }
 }
 
-/// The last steps, after the grouping: separate topics with all of their nodes filtered out, then "Debug".
-/// `grouped` marks topics that are in a group, which these steps do not affect.
+/// The last steps, after the grouping: separate topics with all of their nodes filtered out, then "Debug". Nodes hidden for
+/// another reason than the filter still keep their topics visible. `grouped` marks topics that are in a group, which these
+/// steps do not affect.
 pub(crate) fn finish(
     selection: &mut Selection,
     elements: &Elements,
     options: &ViewOptions,
     grouped: &ById<TopicId, bool>,
 ) {
-    let nobody = ById::like(&elements.nodes, false);
-    let ends = ends(elements, &selection.nodes_by_filter(), &nobody);
-    for (reason, (id, topic)) in selection.topics.iter_mut().zip(elements.topics.with_ids()) {
-        let (ends, grouped) = (ends[id], grouped[id]);
-        if reason.is_some() {
-            continue;
-        }
-        if !grouped && ends.kept == 0 && ends.publishers + ends.subscribers > 0 {
-            *reason = Some(Reason::Orphan);
-        } else if !grouped
-            && options.hide.debug
-            && !options.mode.is_direct()
-            && is_debug(topic.name.as_str())
-        {
-            *reason = Some(Reason::Debug);
+    let wiring = elements.wiring(|_, _| true);
+    let hides_debug = options.hide.debug && !options.mode.is_direct();
+    for (id, topic) in elements.topics.with_ids().filter(|(id, _)| !grouped[*id]) {
+        let mut ends = wiring.publishers[id]
+            .iter()
+            .chain(&wiring.subscribers[id])
+            .peekable();
+        let is_outside = |node: &NodeId| selection.nodes[*node] == Some(Reason::NsFilter);
+        let reason = &mut selection.topics[id];
+        if ends.peek().is_some() && ends.all(is_outside) {
+            reason.get_or_insert(Reason::Orphan);
+        } else if hides_debug && is_debug(topic.name.as_str()) {
+            reason.get_or_insert(Reason::Debug);
         }
     }
     for (node, reason) in elements.nodes.iter().zip(selection.nodes.iter_mut()) {
@@ -158,15 +104,6 @@ pub(crate) fn finish(
         } else if options.hide.quiet && is_quiet(name) {
             reason.get_or_insert(Reason::Quiet);
         }
-    }
-}
-
-impl Selection {
-    /// The nodes that the filter of namespaces alone accepts: nodes hidden for another reason still keep
-    /// their topics visible.
-    fn nodes_by_filter(&self) -> ById<NodeId, Option<Reason>> {
-        let by_filter = |reason: &Option<Reason>| reason.filter(|r| *r == Reason::NsFilter);
-        self.nodes.iter().map(by_filter).collect()
     }
 }
 

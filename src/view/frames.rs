@@ -3,11 +3,11 @@
 use super::caption::CaptionWriter;
 use super::items::Viewed;
 use super::listed::beginning;
-use super::marked::{LastingEvents, WindowMarks, WindowTurn, marked, with_ends};
+use super::marked::{LastingEvents, WindowChanges, WindowMarks};
 use super::shown::{Looks, LooksWriter};
 use super::state::{Alive, ItemTurns, LivingItems, Now};
 use super::steady::{Lengths, stable};
-use super::{ArrowId, Counts, Crowd, ItemId, Lasting, MemberState, Shown, ViewOptions};
+use super::{ArrowId, Counts, Crowd, ItemId, Lasting, Mark, MemberState, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{ById, Element, Id};
 use crate::mission::event_log::{EventId, Kind, Parts};
@@ -28,22 +28,22 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed<'
     let mut writer = CaptionWriter::new(mission, viewed);
     let mut walk = mission.graphs.walk();
     let mut list = Vec::with_capacity(mission.windows.len());
-    let turns = turns(mission);
-    for ((at, window), has_turn) in (0..).zip(&mission.windows).zip(turns) {
+    let changing = changing(mission);
+    for ((at, window), is_changing) in (0..).zip(&mission.windows).zip(changing) {
         walk.next(|what, row| windows.apply(what, row));
         let hides = windows.now.hides_the_silent() && windows.is_touched();
-        if has_turn || hides || windows.now.is_other_length(window.span) {
-            windows.turn(at, window);
+        if is_changing || hides || windows.now.is_other_length(window.span) {
+            windows.change(at, window);
         } else {
             windows.go_on(at);
         }
-        let headlines = std::mem::take(&mut windows.turn.changed.headlines);
+        let headlines = std::mem::take(&mut windows.changes.marks.headlines);
         let mut frame = Frame {
             partial: window.partial,
             messages: window.messages,
             counts: Counts::of(&headlines),
             headlines,
-            lasting: windows.turn.changed.lasting.clone(),
+            lasting: windows.changes.marks.lasting.clone(),
             member_lists: windows.member_lists.clone(),
             ..Frame::empty(window.index, window.span)
         };
@@ -80,23 +80,21 @@ fn join_empty(frames: &mut [Frame]) {
 
 /// For each window, whether it is the first, contains the first message of a topic, or an event of the log
 /// begins or ends in it or in the previous one; in all others nothing changes.
-fn turns(mission: &Mission) -> Vec<bool> {
+fn changing(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
-    let mut turns = vec![false; windows.len()];
+    let mut changing = vec![false; windows.len()];
     let events = mission.log.events.iter();
     let times = events.flat_map(|event| [Some(event.time), event.until]);
     let first = mission.elements.topics.iter().map(|topic| topic.seen.first);
     for time in times.chain(first).flatten() {
         let from = windows.partition_point(|w| w.span.end <= time);
         let to = windows.partition_point(|w| w.span.start <= time) + 1;
-        for turn in turns.iter_mut().take(to).skip(from) {
-            *turn = true;
-        }
+        changing[from..to.min(windows.len())].fill(true);
     }
-    if let Some(first) = turns.first_mut() {
+    if let Some(first) = changing.first_mut() {
         *first = true;
     }
-    turns
+    changing
 }
 
 /// The picture so far, built window by window.
@@ -109,7 +107,7 @@ struct ShownWindows<'a> {
     /// A beginning before this time is not a change.
     beginning: Option<Stamp>,
     now: Now<'a>,
-    turn: WindowTurn,
+    changes: WindowChanges,
     member_lists: Vec<Vec<MemberState>>,
     items: LooksSoFar<ItemId>,
     arrows: LooksSoFar<ArrowId>,
@@ -171,7 +169,7 @@ impl<'a> ShownWindows<'a> {
             lasting: LastingEvents::new(&mission.log, viewed),
             beginning: beginning(mission),
             now: Now::new(mission, options, viewed),
-            turn: WindowTurn::default(),
+            changes: WindowChanges::default(),
             member_lists: Vec::new(),
             items: LooksSoFar::new(&viewed.items),
             arrows: LooksSoFar::new(&viewed.arrows),
@@ -194,16 +192,16 @@ impl<'a> ShownWindows<'a> {
     }
 
     /// Shows a window with headlines, or the first after one with headlines.
-    fn turn(&mut self, at: u32, window: &Window) {
+    fn change(&mut self, at: u32, window: &Window) {
         let span = window.span;
         let alive = self.lives.during(span);
         let paused = self.lives.paused(span, &alive);
         let (before, after) = (self.lives.before(span.start), self.lives.before(span.end));
         self.now.live(span, alive, paused);
-        self.turn = WindowTurn {
+        self.changes = WindowChanges {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
-            changed: WindowMarks::new(
+            marks: WindowMarks::new(
                 &self.mission.log,
                 (&self.parts, self.beginning),
                 (span, self.lasting.at(span)),
@@ -213,13 +211,28 @@ impl<'a> ShownWindows<'a> {
         self.member_lists = member_lists(self.viewed, &before, &after, window.index == 0);
         self.items.take_touched();
         self.arrows.take_touched();
-        let items = self.turn.items(self.viewed, &self.now);
-        for id in self.viewed.arrows.ids() {
-            let shown = self.turn.arrow(self.viewed, &self.now, &items, id);
+        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let there = |id| (changes.before.items[id], changes.after.items[id]);
+        let items = self.viewed.items.ids();
+        let items = items.map(|id| changes.item(now, id, there(id)));
+        let items: ById<ItemId, Option<Shown>> = items.collect();
+        for (id, arrow) in self.viewed.arrows.with_ids() {
+            let mut shown = None;
+            if let (Some(from), Some(to)) = (&items[arrow.from], &items[arrow.to]) {
+                // A node that restarts keeps its arrows, even if it is away when the window ends.
+                let is_back = |end: &Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
+                let is_kept = is_back(from) || is_back(to);
+                let there = (
+                    changes.before.arrows[id],
+                    changes.after.arrows[id] || is_kept,
+                );
+                let ends = [from, to].map(|end| Some((end.mark, &end.events[..])));
+                shown = changes.arrow(now, id, there, ends);
+            }
             self.arrows.show(at, id, shown);
         }
         for (id, shown) in self.viewed.items.ids().zip(items) {
-            self.items.show(at, id, shown.marked);
+            self.items.show(at, id, shown);
         }
     }
 
@@ -231,29 +244,18 @@ impl<'a> ShownWindows<'a> {
                 MemberState::Left | MemberState::Away => MemberState::Away,
             };
         }
+        let (changes, now) = (&self.changes, (self.viewed, &self.now));
+        let (after, stays) = (&changes.after, (true, true));
         for id in self.items.take_touched() {
-            let is_there = self.turn.after.items[id];
-            let shown = is_there.then(|| self.now.item(id)).flatten();
-            let reported = self.turn.changed.items.get(&id);
-            let shown = shown.and_then(|shown| marked(shown, (true, true), reported));
-            self.items.show(at, id, shown);
+            let shown = after.items[id].then(|| changes.item(now, id, stays));
+            self.items.show(at, id, shown.flatten());
         }
         for id in self.arrows.take_touched() {
-            let arrow = &self.viewed.arrows[id];
-            let is_item = |id: ItemId| self.turn.after.items[id];
-            let ends = is_item(arrow.from) && is_item(arrow.to);
-            let is_there = ends && self.turn.after.arrows[id];
-            let shown = is_there.then(|| self.now.arrow(id)).flatten();
-            let shown = shown.and_then(|shown| {
-                let changed = &self.turn.changed;
-                let ends = [arrow.from, arrow.to].map(|id| changed.items.get(&id));
-                let ends = ends
-                    .map(|reported| reported.map(|reported| (reported.mark, &reported.events[..])));
-                let reported = changed.arrows.get(&id).cloned();
-                let reported = reported.or_else(|| with_ends((true, true), ends));
-                marked(shown, (true, true), reported.as_ref())
-            });
-            self.arrows.show(at, id, shown);
+            let ends = [self.viewed.arrows[id].from, self.viewed.arrows[id].to];
+            let is_there = after.arrows[id] && ends.iter().all(|end| after.items[*end]);
+            let marks = ends.map(|id| Some(changes.marks.items.get(&id)?.as_end()));
+            let shown = is_there.then(|| changes.arrow(now, id, stays, marks));
+            self.arrows.show(at, id, shown.flatten());
         }
     }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::items::{Place, Viewed};
 use super::state::{LivingItems, Now};
-use super::{ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
+use super::{Arrow, ArrowId, ArrowKind, Counts, Headline, ItemId, ItemKind, Mark, Shown, TopicRow};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{ById, Element};
+use crate::graph::Element;
 use crate::mission::EventLog;
 use crate::mission::event_log::{Detail, Event, EventId, Kind, Parts};
 
@@ -22,6 +22,13 @@ pub(crate) struct Changed {
     pub(crate) rates: Option<(f64, f64)>,
     /// The headlines behind the mark, sorted.
     pub(crate) events: Vec<EventId>,
+}
+
+impl Changed {
+    /// As the end of an arrow.
+    pub(crate) fn as_end(&self) -> EndMark<'_> {
+        (self.mark, &self.events)
+    }
 }
 
 /// The changes of one window by the id of the item or arrow.
@@ -233,77 +240,59 @@ fn weight(mark: Mark) -> u8 {
 
 /// The items and arrows that exist before and after a window, and the changes in between.
 #[derive(Default)]
-pub(super) struct WindowTurn {
-    pub(super) before: LivingItems,
-    pub(super) after: LivingItems,
-    pub(super) changed: WindowMarks,
+pub(crate) struct WindowChanges {
+    pub(crate) before: LivingItems,
+    pub(crate) after: LivingItems,
+    pub(crate) marks: WindowMarks,
 }
 
-/// An item in a window with headlines.
-pub(super) struct Marked {
-    /// Whether any part of it exists.
-    is_there: bool,
-    pub(super) marked: Option<Shown>,
-}
+/// The mark of an end of an arrow, and the events behind it.
+pub(crate) type EndMark<'a> = (Option<Mark>, &'a [EventId]);
 
-impl WindowTurn {
-    pub(super) fn items(&self, viewed: &Viewed<'_>, now: &Now<'_>) -> ById<ItemId, Marked> {
-        let item = |(id, item): (ItemId, &super::Item)| {
-            let shown = now.item(id);
-            let there = (self.before.items[id], self.after.items[id]);
-            Marked {
-                is_there: shown.is_some(),
-                marked: shown.and_then(|shown| {
-                    let mut shown = marked(shown, there, self.changed.items.get(&id))?;
-                    let is_folded = item.kind == ItemKind::Namespace;
-                    shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
-                    Some(shown)
-                }),
-            }
-        };
-        viewed.items.with_ids().map(item).collect()
+impl WindowChanges {
+    /// The look of an item; `there` is whether it exists before and after.
+    pub(crate) fn item(
+        &self,
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        id: ItemId,
+        there: (bool, bool),
+    ) -> Option<Shown> {
+        let mut shown = marked(now.item(id)?, there, self.marks.items.get(&id))?;
+        if viewed.items[id].kind == ItemKind::Namespace {
+            shown.inside = self.inside(&shown);
+        }
+        Some(shown)
     }
 
-    /// An arrow appears and vanishes with its ends, unless it has events of its own.
-    pub(super) fn arrow(
+    /// The look of an arrow, which appears and vanishes with its ends, unless it has events of its own.
+    pub(crate) fn arrow(
         &self,
-        viewed: &Viewed<'_>,
-        now: &Now<'_>,
-        items: &ById<ItemId, Marked>,
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
         id: ArrowId,
+        there: (bool, bool),
+        ends: [Option<EndMark<'_>>; 2],
     ) -> Option<Shown> {
         let arrow = viewed.arrows.get(id)?;
-        let [from, to] = [items.get(arrow.from)?, items.get(arrow.to)?];
-        let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
-        let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
-        // A node that restarts keeps its arrows, even if it is away when the window ends.
-        let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
-        let is_kept = ends.iter().any(is_back);
-        let there = (self.before.arrows[id], self.after.arrows[id] || is_kept);
-        let reported = self.changed.arrows.get(&id).cloned();
-        let ends = ends.map(|end| Some((end.mark, &end.events[..])));
+        let shown = now.arrow(id)?;
+        let reported = self.marks.arrows.get(&id).cloned();
         let reported = reported.or_else(|| with_ends(there, ends));
-        let shown = marked(shown, there, reported.as_ref())?;
-        if arrow.kind != ArrowKind::Bundle {
-            return Some(shown);
+        let mut shown = marked(shown, there, reported.as_ref())?;
+        if arrow.kind == ArrowKind::Bundle {
+            shown.inside = self.inside(&shown);
+            self.mark_topics((viewed, now), arrow, &mut shown);
         }
-        let inside = self.inside(&shown);
-        Some(Shown {
-            inside,
-            ..self.with_topics(viewed, now, arrow, shown)
-        })
+        Some(shown)
     }
 
-    /// A changed bundle with the changes of its topics, unless it appeared or vanished as a whole.
-    fn with_topics(
+    /// Marks the topics of a bundle, unless it appeared or vanished as a whole.
+    fn mark_topics(
         &self,
-        viewed: &Viewed<'_>,
-        now: &Now<'_>,
-        arrow: &super::Arrow,
-        mut shown: Shown,
-    ) -> Shown {
+        (viewed, now): (&Viewed<'_>, &Now<'_>),
+        arrow: &Arrow,
+        shown: &mut Shown,
+    ) {
         if shown.mark.is_none_or(|mark| mark.class() != "changed") {
-            return shown;
+            return;
         }
         let lives = |items: &LivingItems, row: &TopicRow| {
             let all = items.topics.get(ArrowId(shown.id));
@@ -325,12 +314,11 @@ impl WindowTurn {
                 }
             }
         }
-        shown
     }
 
     /// The number of headlines reported on a collapsed namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
-        let reported = self.changed.headlines.iter();
+        let reported = self.marks.headlines.iter();
         let counts = Counts::of(reported.filter(|h| shown.events.binary_search(&h.event).is_ok()));
         (counts.total() > 0).then(|| Box::new(counts))
     }
@@ -355,10 +343,7 @@ fn changed(event: &Event) -> (Option<Mark>, Option<(f64, f64)>) {
 
 /// The changes of an arrow that follow from the marks of its ends and their events; `there` is whether it
 /// exists before and after.
-pub(super) fn with_ends(
-    there: (bool, bool),
-    ends: [Option<(Option<Mark>, &[EventId])>; 2],
-) -> Option<Changed> {
+fn with_ends(there: (bool, bool), ends: [Option<EndMark<'_>>; 2]) -> Option<Changed> {
     let marks: &[Mark] = match there {
         // A node may return with other lines.
         (false, true) => &[Mark::Added, Mark::Restarted],
@@ -380,11 +365,7 @@ pub(super) fn with_ends(
 
 /// The look of an item or arrow that exists before, after, or both; `None` for one that ended without an
 /// event.
-pub(super) fn marked(
-    shown: Shown,
-    there: (bool, bool),
-    reported: Option<&Changed>,
-) -> Option<Shown> {
+fn marked(shown: Shown, there: (bool, bool), reported: Option<&Changed>) -> Option<Shown> {
     let Some(reported) = reported else {
         return there.1.then_some(shown);
     };

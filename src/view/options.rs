@@ -206,7 +206,7 @@ impl ViewOptions {
     /// Whether they choose elements, rather than only how these are drawn.
     pub(crate) fn is_filter(&self) -> bool {
         let plain = Self::default();
-        let is_named = !self.ns_filter.is_empty() || !self.topic_filter.is_empty();
+        let is_named = !self.ns_filter.passes_all() || !self.topic_filter.passes_all();
         is_named || self.mode != plain.mode || self.hide != plain.hide
     }
 
@@ -263,11 +263,6 @@ struct FilterToken {
 }
 
 impl NameFilter {
-    /// Whether it accepts every name.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.includes.is_empty() && self.excludes.is_empty()
-    }
-
     /// The filter of this text.
     ///
     /// # Errors

@@ -129,18 +129,6 @@ pub struct Members {
     pub topics: usize,
 }
 
-impl Shown {
-    /// The item that looks like this.
-    pub fn item(&self) -> ItemId {
-        ItemId(self.id)
-    }
-
-    /// The arrow that looks like this.
-    pub fn arrow(&self) -> ArrowId {
-        ArrowId(self.id)
-    }
-}
-
 impl Members {
     /// The number written in the box: of its nodes, or of its topics if it has no nodes; `None` if it is not
     /// a collapsed namespace.
@@ -154,6 +142,16 @@ impl Members {
 }
 
 impl Shown {
+    /// The item that looks like this.
+    pub fn item(&self) -> ItemId {
+        ItemId(self.id)
+    }
+
+    /// The arrow that looks like this.
+    pub fn arrow(&self) -> ArrowId {
+        ArrowId(self.id)
+    }
+
     /// An element about which nothing else is known.
     pub fn plain(id: u32, state: State, confidence: Confidence) -> Self {
         Self {
@@ -162,6 +160,17 @@ impl Shown {
             confidence,
             ..Self::default()
         }
+    }
+
+    /// Adds another element of the same item or arrow: the most active state and the strongest confidence are kept, rates
+    /// and counts are summed.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.is_paused &= other.is_paused;
+        self.is_starved &= other.is_starved;
+        self.state = self.state.min(other.state);
+        self.confidence = self.confidence.min(other.confidence);
+        self.hz = sum(self.hz, other.hz, |a, b| a + b);
+        self.count = sum(self.count, other.count, u64::saturating_add);
     }
 
     /// The rate that is written, and its number of messages, as far as they are known.
@@ -223,6 +232,21 @@ pub struct TopicRow {
 pub(super) type RowKey = (u32, [bool; 2], bool, State, [Option<u64>; 2]);
 
 impl TopicRow {
+    /// An unmarked topic that looks like this.
+    pub(crate) fn of(topic: u32, ways: [bool; 2], shown: &Shown) -> Self {
+        Self {
+            topic,
+            ways,
+            is_service: false,
+            is_starved: shown.is_starved,
+            state: shown.state,
+            hz: shown.hz,
+            count: shown.count,
+            mark: None,
+            rates: None,
+        }
+    }
+
     /// Adds the same topic on another line; messages of different senders are summed.
     pub(crate) fn join(&mut self, other: &Self, is_other_sender: bool) {
         let is_sum = is_other_sender && self.count.is_some() && other.count.is_some();

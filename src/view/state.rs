@@ -7,61 +7,24 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::items::Viewed;
 use super::{
-    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions, sum,
+    Arrow, ArrowId, ArrowKind, Item, ItemId, ItemKind, Members, Shown, TopicRow, ViewOptions,
 };
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Confidence;
-use crate::graph::{ById, EdgeId, Element, Elements, NodeId, PerElement, Row, State, TopicId};
+use crate::graph::{ById, EdgeId, Element, Elements, PerElement, Row, State, TopicId};
 use crate::mission::Mission;
 use crate::mission::event_log::{Event, EventId, Kind};
 
-/// Adds an element of an item or arrow: the most active state and the strongest confidence are kept, rates
-/// and counts are summed.
-fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
-    let (state, confidence) = (one.state, one.confidence);
-    let shown = slot.get_or_insert_with(|| Shown {
-        is_paused: true,
-        is_starved: true,
-        ..Shown::plain(id, state, confidence)
-    });
+/// Adds an element to an item or arrow.
+fn gather(slot: &mut Option<Shown>, id: u32, one: Shown) {
     // Elements that exist without publishing would dilute the rate of each.
-    shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
-    shown.is_paused &= one.is_paused;
-    shown.is_starved &= one.is_starved;
-    shown.state = shown.state.min(state);
-    shown.confidence = shown.confidence.min(confidence);
-    shown.hz = sum(shown.hz, one.hz, |a, b| a + b);
-    shown.count = sum(shown.count, one.count, u64::saturating_add);
-}
-
-/// One element of the graph in a window.
-#[derive(Clone, Copy)]
-struct One {
-    state: State,
-    confidence: Confidence,
-    hz: Option<f64>,
-    count: Option<u64>,
-    is_paused: bool,
-    is_starved: bool,
-}
-
-impl One {
-    /// An element that exists without a message in the window.
-    const WITHOUT_MESSAGES: Self = Self {
-        state: State::Silent,
-        confidence: Confidence::Declared,
-        hz: None,
-        count: None,
-        is_paused: false,
-        is_starved: false,
-    };
-
-    fn new(state: State, confidence: Confidence) -> Self {
-        Self {
-            state,
-            confidence,
-            ..Self::WITHOUT_MESSAGES
+    let each = usize::from(one.hz.is_some_and(|hz| hz > 0.0));
+    match slot {
+        Some(all) => {
+            all.add(&one);
+            all.each += each;
         }
+        None => *slot = Some(Shown { id, each, ..one }),
     }
 }
 
@@ -178,36 +141,37 @@ impl<'a> Now<'a> {
         window.nanos() != self.span.nanos()
     }
 
-    /// The state of an element, `None` if it does not exist; [`One::WITHOUT_MESSAGES`] if it exists without messages.
-    fn one(&self, what: Element) -> Option<One> {
+    /// The look of an element, `None` if it does not exist; silent and only declared if it exists without messages.
+    fn one(&self, what: Element) -> Option<Shown> {
         let (alive, paused) = &self.lives;
-        // Few bags count what subscribers get, so that lines to all of them look alike.
-        let counted = !matches!(what, Element::Subscribe(_));
-        let known = |row: &Row| One {
-            hz: row.hz(self.span).filter(|_| counted),
-            count: row.count.filter(|_| counted),
-            ..One::new(row.state, row.confidence)
-        };
-        alive.is(what).then(|| {
-            let row = self.rows.of(what).and_then(Option::as_ref);
-            let mut one = row.map_or(One::WITHOUT_MESSAGES, known);
-            if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
+        if !alive.is(what) {
+            return None;
+        }
+        let row = self.rows.of(what).and_then(Option::as_ref);
+        let mut one = Shown::plain(0, State::Silent, Confidence::Declared);
+        if let Some(row) = row {
+            one = Shown::plain(0, row.state, row.confidence);
+            // Few bags count what subscribers get, so that lines to all of them look alike.
+            if !matches!(what, Element::Subscribe(_)) {
                 (one.hz, one.count) = (row.hz(self.span), row.count);
             }
-            if paused.is(what) {
-                one.is_paused = true;
-                one.state = one.state.max(State::Silent);
-            }
-            let starves = |(edge, span): &(Element, Span)| {
-                *edge == what && span.start < self.span.end && self.span.start < span.end
-            };
-            one.is_starved = self.starved.iter().any(starves);
-            if let Some(topic) = self.waits_for(what) {
-                one.is_paused = true;
-                one.state = self.state_of_waiting(topic).max(one.state);
-            }
-            one
-        })
+        }
+        if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
+            (one.hz, one.count) = (row.hz(self.span), row.count);
+        }
+        if paused.is(what) {
+            one.is_paused = true;
+            one.state = one.state.max(State::Silent);
+        }
+        let starves = |(edge, span): &(Element, Span)| {
+            *edge == what && span.start < self.span.end && self.span.start < span.end
+        };
+        one.is_starved = self.starved.iter().any(starves);
+        if let Some(topic) = self.waits_for(what) {
+            one.is_paused = true;
+            one.state = self.state_of_waiting(topic).max(one.state);
+        }
+        Some(one)
     }
 
     /// For the only publication of a topic, the row of the topic: all its messages come from there.
@@ -242,40 +206,35 @@ impl<'a> Now<'a> {
         }
     }
 
-    fn node(&self, id: NodeId) -> Option<One> {
-        // The count of a node is that of its topics' messages.
-        let one = self.one(Element::Node(id))?;
-        Some(One { count: None, ..one })
-    }
-
     /// The look of an item; `None` if no part of it exists. Ghosts are excluded.
     pub(crate) fn item(&self, id: ItemId) -> Option<Shown> {
         let item = self.viewed.items.get(id)?;
+        let has_nodes = item.members.first().is_some_and(Element::is_node);
         let mut slot = None;
         for member in &item.members {
-            let one = match member {
-                Element::Node(node) => self
-                    .node(*node)
-                    .filter(|one| shows_node(one.state, self.options)),
-                Element::Topic(topic) => self
-                    .one(Element::Topic(*topic))
-                    // The nodes inside a collapsed namespace already count what they publish.
-                    .map(|one| One {
-                        hz: one.hz.filter(|_| !has_nodes(item)),
-                        ..one
-                    }),
-                Element::Publish(_) | Element::Subscribe(_) => None,
+            let Some(mut one) = self.one(*member) else {
+                continue;
             };
-            if let Some(one) = one {
-                gather(&mut slot, id.0, &one);
+            if member.is_topic() && has_nodes {
+                // The nodes inside a collapsed namespace already count what they publish.
+                one.hz = None;
+            } else if member.is_node() {
+                if !shows_node(one.state, self.options) {
+                    continue;
+                }
+                // The count of a node is that of its topics' messages.
+                one.count = None;
             }
+            gather(&mut slot, id.0, one);
         }
         let mut shown = slot?;
         if item.is_service {
             shown.is_called();
         }
-        if let ([Element::Node(node)], true) = (&item.members[..], is_single(self.viewed, id)) {
-            let row = self.rows.of(Element::Node(*node)).and_then(Option::as_ref);
+        if let [node @ Element::Node(_)] = &item.members[..]
+            && item.kind != ItemKind::Namespace
+        {
+            let row = self.rows.of(*node).and_then(Option::as_ref);
             shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
         }
         if !item.is_replica {
@@ -318,18 +277,14 @@ impl<'a> Now<'a> {
     fn edges(&self, id: ArrowId, arrow: &Arrow) -> Option<Shown> {
         let mut slot = None;
         for member in &arrow.members {
-            let one = match member {
-                Element::Publish(edge) => self.one(Element::Publish(*edge)),
-                Element::Subscribe(edge) => {
-                    let topic = self.mission.elements.ends(*member).1;
-                    let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
-                    self.one(Element::Subscribe(*edge))
-                        .filter(|_| topic.is_some())
+            if let Element::Subscribe(_) = member {
+                let topic = self.mission.elements.ends(*member).1;
+                if !topic.is_some_and(|topic| self.lives.0.is(Element::Topic(topic))) {
+                    continue;
                 }
-                Element::Node(_) | Element::Topic(_) => None,
-            };
-            if let Some(one) = one {
-                gather(&mut slot, id.0, &one);
+            }
+            if let Some(one) = self.one(*member) {
+                gather(&mut slot, id.0, one);
             }
         }
         slot
@@ -365,15 +320,14 @@ impl<'a> Now<'a> {
             // The rate of the whole topic counts once, regardless of the number of publishers.
             let topic = topic.filter(|_| is_new || !is_bundle);
             let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
-            let joined = One {
+            let joined = Shown {
                 state: p.state.max(s.state),
                 confidence: p.confidence.max(s.confidence),
                 hz: p.hz.or_else(|| topic.and_then(|t| t.hz)),
-                count: p.count,
-                is_paused: p.is_paused,
                 is_starved: s.is_starved,
+                ..p
             };
-            gather(&mut slot, id.0, &joined);
+            gather(&mut slot, id.0, joined.clone());
             if let Some((topic, _)) = row {
                 if self
                     .mission
@@ -382,25 +336,17 @@ impl<'a> Now<'a> {
                 {
                     services.insert(topic);
                 }
-                gather(&mut rows.entry(topic).or_default().0, topic, &joined);
+                gather(&mut rows.entry(topic).or_default().0, topic, joined);
             }
         }
         let topics = rows.into_values().filter_map(|(shown, ways)| {
-            let shown = shown?;
+            let mut shown = shown?;
+            if shown.is_paused {
+                shown.state = shown.state.max(State::Silent);
+            }
             Some(TopicRow {
-                topic: shown.id,
-                ways,
                 is_service: services.contains(&shown.id),
-                is_starved: shown.is_starved,
-                state: if shown.is_paused {
-                    shown.state.max(State::Silent)
-                } else {
-                    shown.state
-                },
-                hz: shown.hz,
-                count: shown.count,
-                mark: None,
-                rates: None,
+                ..TopicRow::of(shown.id, ways, &shown)
             })
         });
         let topics = topics.collect();
@@ -436,15 +382,6 @@ fn starved(mission: &Mission) -> Vec<(Element, Span)> {
         (event.what, Span::new(event.time, end))
     };
     edges.map(lasts).collect()
-}
-
-fn has_nodes(item: &Item) -> bool {
-    matches!(item.members.first(), Some(Element::Node(_)))
-}
-
-fn is_single(viewed: &Viewed<'_>, item: ItemId) -> bool {
-    let item = viewed.items.get(item);
-    item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
 }
 
 /// Beginnings and ends in continuous time.

@@ -302,11 +302,13 @@ fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
             Ok(place) => add_row(&mut sum.topics[place], &row),
         }
     }
-    sum.state = sum.state.min(shown.state);
-    sum.confidence = sum.confidence.min(shown.confidence);
-    sum.is_starved &= shown.is_starved;
-    sum.hz = added(sum.hz, shown.hz.map(|hz| hz * length), |a, b| a + b);
-    sum.count = added(sum.count, count, u64::saturating_add);
+    sum.add(&Shown {
+        hz: shown.hz.map(|hz| hz * length),
+        count,
+        is_paused: shown.is_paused,
+        is_starved: shown.is_starved,
+        ..Shown::plain(0, shown.state, shown.confidence)
+    });
 }
 
 fn add_row(sum: &mut TopicRow, row: &TopicRow) {

@@ -272,17 +272,7 @@ fn both_ways(ways: [&Looks; 2]) -> Looks {
         let look = reported(looks.into_iter().flatten())?;
         Some(Shown {
             events: events(looks.into_iter().flatten()),
-            topics: vec![TopicRow {
-                topic: 0,
-                ways: looks.map(|look| look.is_some()),
-                is_service: false,
-                is_starved: look.is_starved,
-                state: look.state,
-                hz: look.hz,
-                count: look.count,
-                mark: None,
-                rates: None,
-            }],
+            topics: vec![TopicRow::of(0, looks.map(|look| look.is_some()), look)],
             ..look.clone()
         })
     })
